@@ -1,0 +1,161 @@
+"""Frames: site, Earth rate, gravity, table and mounts.
+
+Local frame L = (E, N, U).  An attitude is a 3x3 matrix whose ROWS are the body axes written in the other
+frame: ``v_body = C v_local``.  Gyro axes are I, O, S (input, output, spin reference), right-handed.
+
+A table with its axis on the pole has, at angle 0, the axes x_T = E, y_T = p x E, z_T = p, where p is the
+direction of the north pole of the sky.  Turned by +angle (right-handed about z_T): ``v_table = Rz(angle) base
+v_local``, and a gyro on it reads ``v_face = face v_table``.  The book turns the table against the Earth and
+counts that positive: ``theta_book = -angle``.  [spec d1, 0.1, TUM1-GEOM; 000_791234d3afc34a0c.txt eq.
+3-12..3-16]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gyrobench.units import EARTH_RATE, G0
+
+__all__ = [
+    "EARTH_RATE",
+    "G0",
+    "MOUNTS",
+    "E",
+    "N",
+    "U",
+    "check_rotation",
+    "earth_rate_local",
+    "normal_gravity",
+    "passive_z",
+    "polar_table",
+    "pole",
+    "rotation",
+    "to_face",
+    "tumble_faces",
+]
+
+Array = NDArray[np.float64]
+
+E = np.array([1.0, 0.0, 0.0])
+N = np.array([0.0, 1.0, 0.0])
+U = np.array([0.0, 0.0, 1.0])
+
+# WGS84 (NIMA TR8350.2): semi-major axis m, flattening, gravity at the equator m/s2, Somigliana's k, m = w2 a2
+# b/GM
+_A, _F = 6378137.0, 1.0 / 298.257223563
+_GAMMA_E, _K, _M = 9.7803253359, 1.931852652458e-3, 3.449786506841e-3
+
+#: Mounts of the single-axis tumble whose output axis lies along the table axis: rows I, O, S in table axes.
+#: 1: I = x_T (east), O = +z_T (pole), S = I x O;  2: mount 1 turned 180 degrees about I.
+MOUNTS: dict[int, Array] = {
+    1: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    2: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+}
+
+
+def check_latitude(latitude: float) -> float:
+    """``latitude`` (rad) itself; raises ValueError outside -90..90 degrees or when it is no finite number."""
+    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
+        raise ValueError(f"latitude {math.degrees(latitude):.6g} deg lies outside -90..90 deg")
+    return latitude
+
+
+def normal_gravity(latitude: float, height: float = 0.0) -> float:
+    """WGS84 normal gravity, m/s2, at geodetic ``latitude`` (rad) and ``height`` (m) above the ellipsoid.
+
+    Somigliana's formula (1e-11 m/s2 of the exact normal field on the ellipsoid) with the second-order height
+    term, whose gradient neglects squares of the flattening: 1.1e-7 m/s2 at worst per km of height.  Not
+    modelled: the real field's anomaly (some 1e-4 m/s2); give a measured value where it matters. Raises
+    ValueError for a latitude outside -90..90 deg or a height outside -11..100 km.
+    """
+    check_latitude(latitude)
+    if not -11e3 <= height <= 100e3:
+        raise ValueError(f"height {height:.6g} m lies outside -11000..100000 m")
+    s2 = math.sin(latitude) ** 2
+    surface = _GAMMA_E * (1.0 + _K * s2) / math.sqrt(1.0 - _F * (2.0 - _F) * s2)
+    x = height / _A
+    return surface * (1.0 - 2.0 * (1.0 + _F + _M - 2.0 * _F * s2) * x + 3.0 * x * x)
+
+
+def pole(latitude: float) -> Array:
+    """Unit vector to the north celestial pole in (E, N, U)."""
+    return np.array([0.0, math.cos(latitude), math.sin(latitude)])
+
+
+def earth_rate_local(latitude: float, rate: float = EARTH_RATE) -> Array:
+    """Earth rate vector in (E, N, U), rad/s."""
+    return rate * pole(latitude)
+
+
+def passive_z(angle: float) -> Array:
+    """Coordinates in axes turned by +``angle`` (rad) about the third axis: ``v_new = passive_z(angle)
+    v_old``.
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation(axis: ArrayLike, angle: float) -> Array:
+    """Active right-handed rotation by ``angle`` (rad) about ``axis`` (any length but zero): ``v_turned = R
+    v``.
+    """
+    n = np.asarray(axis, dtype=float)
+    size = float(np.linalg.norm(n))
+    if not (math.isfinite(size) and size > 0.0):
+        raise ValueError(f"rotation axis {n.tolist()} has no direction")
+    x, y, z = n / size
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    out: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    return out
+
+
+def check_rotation(matrix: ArrayLike, name: str, tolerance: float = 1e-9) -> Array:
+    """``matrix`` as a 3x3 array; ValueError naming ``name`` and the defect unless orthonormal with
+    determinant +1.
+    """
+    c = np.asarray(matrix, dtype=float)
+    if c.shape != (3, 3):
+        raise ValueError(f"{name}: a 3x3 matrix is expected (rows = body axes), got shape {c.shape}")
+    if not np.all(np.isfinite(c)):
+        raise ValueError(f"{name}: the matrix holds a non-finite number")
+    defect = float(np.max(np.abs(c @ c.T - np.eye(3))))
+    if defect > tolerance:
+        raise ValueError(
+            f"{name}: rows are not orthonormal (largest defect of C C' - 1 is {defect:.3g}, "
+            f"allowed {tolerance:g}); each row is a unit vector at right angles to the others"
+        )
+    if np.linalg.det(c) < 0.0:
+        raise ValueError(f"{name}: determinant is -1, a left-handed set of axes; reverse one row")
+    return c
+
+
+def polar_table(latitude: float) -> Array:
+    """Base matrix of a table with its axis on the pole: rows x_T = E, y_T = p x E, z_T = p at angle 0."""
+    p = pole(check_latitude(latitude))
+    return np.array([E, np.cross(p, E), p])
+
+
+def tumble_faces(latitude: float) -> dict[str, Array]:
+    """The four attitudes of the single-axis tumble, rows I, O, S in table axes at angle 0.
+
+    ``mount1``, ``mount2``: output axis along +pole and -pole, input axis east.  ``static3``, ``static4``:
+    input axis east, output axis up and down (these two depend on latitude because the table axis does).
+    """
+    base = polar_table(latitude)
+    up, down = np.array([E, U, np.cross(E, U)]), np.array([E, -U, np.cross(E, -U)])
+    return {"mount1": MOUNTS[1], "mount2": MOUNTS[2], "static3": up @ base.T, "static4": down @ base.T}
+
+
+def to_face(vector: ArrayLike, face: ArrayLike, base: ArrayLike, angle: float) -> Array:
+    """A local (E, N, U) vector in face axes with the table at ``angle`` (rad)."""
+    out: Array = np.asarray(face) @ passive_z(angle) @ np.asarray(base) @ np.asarray(vector)
+    return out
+
+
+def rows(matrix: Sequence[Sequence[float]]) -> list[float]:
+    """A 3x3 matrix as nine numbers row by row (the form of the sequencer's ``faces`` parameter)."""
+    return [float(v) for row in matrix for v in row]
