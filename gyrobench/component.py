@@ -513,6 +513,8 @@ def phi1(z: list[list[float]]) -> list[list[float]]:
     """phi1(z) = sum z^k / (k+1)!  by Taylor on z / 2^s and doubling phi1(2z) = phi1(z) (I + z phi1(z) / 2)."""
     n = len(z)
     norm = max(sum(abs(a) for a in row) for row in z)
+    if not norm < 1e300:
+        norm = 0.0  # not finite: found by the check of the states
     s = 0
     while norm > 0.5:
         norm = norm * 0.5

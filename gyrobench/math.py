@@ -185,5 +185,25 @@ def index(x: Number) -> int:
 
 
 FUNCTIONS = (
-    *("sin cos tan asin atan atan2 sqrt exp log tanh floor fabs where minimum maximum clip sign".split()),
+    *(
+        [
+            "sin",
+            "cos",
+            "tan",
+            "asin",
+            "atan",
+            "atan2",
+            "sqrt",
+            "exp",
+            "log",
+            "tanh",
+            "floor",
+            "fabs",
+            "where",
+            "minimum",
+            "maximum",
+            "clip",
+            "sign",
+        ]
+    ),
 )

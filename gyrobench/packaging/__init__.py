@@ -1,0 +1,7 @@
+"""Component -> FMU: description, native target, Python target, build cache, validation."""
+
+from gyrobench.packaging.compiler import CompilerError
+from gyrobench.packaging.fmu import BuildError, build, load_part
+from gyrobench.packaging.translate import SubsetError
+
+__all__ = ["BuildError", "CompilerError", "SubsetError", "build", "load_part"]

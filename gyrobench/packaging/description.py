@@ -1,0 +1,157 @@
+"""modelDescription.xml (FMI 2.0) of a part: units, bounds, starts, dependencies, initial unknowns."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from gyrobench.component import Component, Scalar
+from gyrobench.packaging.translate import Source, dependencies
+from gyrobench.units import base_unit
+
+#: section -> causality, variability, initial
+ATTRIBUTES = {
+    "parameter": ("parameter", "fixed", "exact"),
+    "input": ("input", "continuous", None),
+    "output": ("output", "continuous", "calculated"),
+    "state": ("local", "continuous", "exact"),
+    "derivative": ("local", "continuous", "calculated"),
+    "discrete": ("local", "discrete", "calculated"),
+}
+TYPES = {float: "Real", int: "Integer", bool: "Boolean"}
+
+
+def summary(cls: type[Component]) -> str:
+    """The first line of the docstring, without its source marks."""
+    return (cls.__doc__ or cls.__name__).strip().splitlines()[0].split("  [")[0].rstrip(".")
+
+
+def number(x: float, kind: type) -> str:
+    if kind is bool:
+        return "true" if x else "false"
+    return str(int(x)) if kind is int else repr(x)
+
+
+def _unit(decl_unit: str, derivative: bool) -> str:
+    return (f"{decl_unit}/s" if decl_unit != "1" else "1/s") if derivative else decl_unit
+
+
+def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+    causality, variability, initial = ATTRIBUTES[s.section]
+    d = s.decl
+    kind = TYPES[d.type]
+    if kind != "Real" and variability == "continuous":
+        variability = "discrete"
+    attributes = {
+        "name": s.name,
+        "valueReference": str(s.reference),
+        "causality": causality,
+        "variability": variability,
+    }
+    if initial:
+        attributes["initial"] = initial
+    if d.doc:
+        attributes["description"] = d.doc
+    v = ET.SubElement(parent, "ScalarVariable", attributes)
+    of_type: dict[str, str] = {}
+    derivative = s.section == "derivative"
+    if kind == "Real":
+        of_type["unit"] = _unit(d.unit, derivative)
+    if s.section in ("parameter", "input", "state"):
+        lo = d.min if d.min is not None else d.above
+        hi = d.max if d.max is not None else d.below
+        if kind != "Boolean" and lo is not None:
+            of_type["min"] = number(lo, d.type)
+        if kind != "Boolean" and hi is not None:
+            of_type["max"] = number(hi, d.type)
+        of_type["start"] = number(s.start, d.type)
+    if derivative:
+        state = next(x for x in cls.states if x.name == s.name[4:-1])
+        of_type["derivative"] = str(state.reference + 1)
+    ET.SubElement(v, kind, of_type)
+
+
+def _units(root: ET.Element, cls: type[Component]) -> None:
+    used = sorted({_unit(s.decl.unit, s.section == "derivative") for s in cls.layout if s.decl.type is float})
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name in used:
+        u = ET.SubElement(definitions, "Unit", {"name": name})
+        base = base_unit(name)
+        if base is not None:  # FMI has whole exponents only: sqrt(Hz) is named but not spelled out
+            exponents, factor = base
+            attributes = {k: str(v) for k, v in exponents.items() if v}
+            if factor != 1.0:
+                attributes["factor"] = repr(factor)
+            ET.SubElement(u, "BaseUnit", attributes)
+
+
+def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
+    """The XML text.  ``target`` is "native" or "python": what each can do differs."""
+    source = Source(cls)
+    root = ET.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "modelName": cls.__name__,
+            "guid": guid,
+            "description": summary(cls),
+            "version": cls.version,
+            "license": "BSD-3-Clause",
+            "generationTool": "gyrobench",
+            "variableNamingConvention": "structured",
+            "numberOfEventIndicators": "0",
+        },
+    )
+    native = target == "native"
+    co = ET.SubElement(
+        root,
+        "CoSimulation",
+        {
+            "modelIdentifier": identifier,
+            "needsExecutionTool": str(not native).lower(),
+            "canHandleVariableCommunicationStepSize": "true",
+            "canNotUseMemoryManagementFunctions": "true",
+            "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true",
+            "providesDirectionalDerivative": str(native).lower(),
+        },
+    )
+    if native:
+        files = ET.SubElement(co, "SourceFiles")
+        ET.SubElement(files, "File", {"name": "fmi2.c"})
+    _units(root, cls)
+    categories = ET.SubElement(root, "LogCategories")
+    ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
+    ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})
+    variables = ET.SubElement(root, "ModelVariables")
+    for s in cls.layout:
+        _variable(variables, cls, s)
+    _structure(ET.SubElement(root, "ModelStructure"), cls, source)
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
+    """Outputs with the inputs and states they follow without delay; derivatives; initial unknowns."""
+    depends = {
+        "output": dependencies(source, "outputs"),
+        "derivative": {},
+    }
+    outputs = [s for s in cls.layout if s.section == "output"]
+    derivatives = [s for s in cls.layout if s.section == "derivative"]
+    node = ET.SubElement(parent, "Outputs") if outputs else None
+    for s in outputs:
+        on = depends["output"].get(s.decl.name, set())
+        indices = [x.reference + 1 for x in cls.layout if x.section == "input" and x.decl.name in on]
+        indices += [x.reference + 1 for x in cls.states]
+        assert node is not None
+        ET.SubElement(
+            node, "Unknown", {"index": str(s.reference + 1), "dependencies": " ".join(map(str, indices))}
+        )
+    if derivatives:
+        node = ET.SubElement(parent, "Derivatives")
+        for s in derivatives:
+            ET.SubElement(node, "Unknown", {"index": str(s.reference + 1)})
+    if outputs or derivatives:
+        node = ET.SubElement(parent, "InitialUnknowns")
+        for s in (*outputs, *derivatives):
+            ET.SubElement(node, "Unknown", {"index": str(s.reference + 1)})

@@ -1,0 +1,182 @@
+"""Part -> FMU: loading, building, the cache by content, validation, reference runs."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import shutil
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+from types import ModuleType
+
+from gyrobench.bench import Bench
+from gyrobench.component import Component
+from gyrobench.packaging import compiler, native, python_target
+from gyrobench.packaging.description import model_description
+
+EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
+
+
+class BuildError(Exception):
+    """A part that cannot be built; the text says which and why."""
+
+
+def import_file(path: Path, name: str) -> ModuleType:
+    """Imports one file under a module name of its own, so that parts of two benches do not mix."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def load_part(name: str, bench: Path | None = None) -> type[Component]:
+    """The Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
+    folder = Bench.find(bench).part_folder(name)
+    path = folder / "model.py"
+    key = (
+        "gyrobench_part_" + hashlib.sha256(str(path.resolve()).encode() + path.read_bytes()).hexdigest()[:16]
+    )
+    module = sys.modules.get(key) or import_file(path, key)
+    own = [
+        c
+        for c in vars(module).values()
+        if inspect.isclass(c) and issubclass(c, Component) and c.__module__ == module.__name__
+    ]
+    if len(own) != 1:
+        raise BuildError(f"{path}: one Component class is expected, found {len(own)}")
+    cls: type[Component] = own[0]
+    return cls
+
+
+def _hash(*texts: str) -> str:
+    h = hashlib.sha256()
+    for t in texts:
+        h.update(t.encode() + b"\0")
+    return h.hexdigest()
+
+
+def _guid(digest: str) -> str:
+    return "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]))
+
+
+def _tool_text() -> str:
+    """All files whose text decides what a build writes."""
+    here = Path(__file__).parent
+    files = sorted([*here.glob("*.py"), *here.glob("*.c"), *here.glob("*.h")])
+    files += [here.parent / "component.py", here.parent / "math.py", here.parent / "units.py"]
+    return "".join(f.read_text(encoding="utf-8") for f in files)
+
+
+def _zip(path: Path, entries: dict[str, bytes]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    os.close(handle)
+    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as z:
+        for name in sorted(entries):
+            info = zipfile.ZipInfo(name, EPOCH)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            z.writestr(info, entries[name])
+    os.chmod(temporary, 0o644)
+    os.replace(temporary, path)  # a build that is stopped leaves no half file
+
+
+def _native_entries(
+    cls: type[Component], guid: str, name: str, platforms: tuple[str, ...], fmi: int
+) -> dict[str, bytes]:
+    files = native.source_files(cls, guid, fmi)
+    entries = {f"sources/{n}": t.encode() for n, t in files.items()}
+    with tempfile.TemporaryDirectory() as folder:
+        for n, t in files.items():
+            (Path(folder) / n).write_text(t, encoding="utf-8")
+        for platform in platforms:
+            suffix = compiler.PLATFORMS[platform][0]
+            library = Path(folder) / f"{name}-{platform}{suffix}"
+            compiler.compile_library(Path(folder) / f"fmi{fmi}.c", library, (Path(folder),), platform)
+            entries[f"binaries/{_folder_of(platform, fmi)}/{name}{suffix}"] = library.read_bytes()
+    return entries
+
+
+def _folder_of(platform: str, fmi: int) -> str:
+    """FMI 2 calls it linux64, FMI 3 x86_64-linux."""
+    three = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
+    return three.get(platform, platform) if fmi == 3 else platform
+
+
+def _python_entries(cls: type[Component], guid: str, name: str) -> dict[str, bytes]:
+    module, files = python_target.resources(cls, guid)
+    entries = {f"resources/{n}": t.encode() for n, t in files.items()}
+    entries["resources/slavemodule.txt"] = module.encode()
+    spec = importlib.util.find_spec("pythonfmu")
+    assert spec is not None and spec.origin is not None
+    root = Path(spec.origin).parent
+    for f in root.glob("*.py"):
+        entries[f"resources/pythonfmu/{f.name}"] = f.read_bytes()
+    binaries = root / "resources" / "binaries"
+    for f in binaries.rglob("*"):
+        if f.suffix in (".so", ".dll", ".dylib"):
+            entries[f"binaries/{f.parent.name}/{name}{f.suffix}"] = f.read_bytes()
+    return entries
+
+
+def build(
+    part: str | type[Component],
+    target: str = "native",
+    fmi: int = 2,
+    out: Path | None = None,
+    bench: Path | None = None,
+    platforms: tuple[str, ...] = (),
+) -> Path:
+    """Builds a part and returns the path of its FMU; an unchanged part is taken from the cache.
+
+    The file is ``<out or bench/fmus>/<name>[-python][-fmi3].fmu``.  Raises BuildError, SubsetError (an
+    equation outside the subset) and CompilerError.
+    """
+    if target not in ("native", "python"):
+        raise BuildError(f"target {target!r}: one of native, python")
+    if fmi not in (2, 3) or (fmi == 3 and target == "python"):
+        raise BuildError(f"FMI {fmi} {target}: there are FMI 2 native, FMI 2 python, FMI 3 native")
+    platforms = platforms or (compiler.this_platform(),)
+    cls = load_part(part, bench) if isinstance(part, str) else part
+    name = part if isinstance(part, str) else Path(inspect.getfile(cls)).parent.name
+    identifier = name
+    model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
+    what = _hash(model, _tool_text(), target, str(fmi), name)
+    how = "".join(p + compiler.identity(p) for p in platforms) if target == "native" else ""
+    guid = _guid(what)
+    home = Bench.find(bench)
+    suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
+    cached = home.cache / f"{name}{suffix}-{_hash(what, how)[:20]}.fmu"
+    if not cached.exists():
+        if target == "native":
+            entries = _native_entries(cls, guid, identifier, platforms, fmi)
+        else:
+            entries = _python_entries(cls, guid, identifier)
+        if fmi == 3:
+            from gyrobench.packaging.description3 import model_description3
+
+            entries["modelDescription.xml"] = model_description3(cls, guid, identifier).encode()
+        else:
+            entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()
+        readme = Path(inspect.getfile(cls)).parent / "README.md"
+        if readme.exists():
+            entries["documentation/README.md"] = readme.read_bytes()
+        _zip(cached, entries)
+    path = (out or home.fmus) / f"{name}{suffix}.fmu"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    os.close(handle)
+    shutil.copyfile(cached, temporary)
+    os.chmod(temporary, 0o644)
+    os.replace(temporary, path)
+    return path

@@ -1,0 +1,123 @@
+"""The native target: the part as one C file, readable beside its Python, and as a shared library."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+from gyrobench.component import Component, Scalar
+from gyrobench.packaging.translate import Source, equations
+
+HERE = Path(__file__).parent
+PER = {"start": 0, "step": 1, "second": 2}
+
+
+def _dimensions(shape: tuple[int, ...]) -> str:
+    return "".join(f"[{n}]" for n in shape)
+
+
+def _struct(cls: type[Component]) -> str:
+    """``Vars``: the declarations in the order of the value references."""
+    lines: list[str] = []
+    done: set[tuple[str, str]] = set()
+    inner: list[str] = []
+    for s in cls.layout:
+        if s.section == "derivative":
+            if ("der", s.decl.name) not in done:
+                done.add(("der", s.decl.name))
+                inner.append(f"{s.decl.name}{_dimensions(s.decl.shape)}")
+            continue
+        if inner:
+            lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
+            inner = []
+        if ("", s.decl.name) not in done:
+            done.add(("", s.decl.name))
+            lines.append(
+                f"    double {s.decl.name}{_dimensions(s.decl.shape)}; /* {s.decl.unit}, {s.decl.doc} */"
+            )
+    if inner:
+        lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
+    if cls.noises:
+        lines.append(f"    struct {{ double {', '.join(n.name for n in cls.noises)}; }} noise; /* samples */")
+    lines.append("    double t, h, tick; /* time, internal step, count of internal steps */")
+    return "\n".join(["typedef struct {", *lines, "} Vars;"])
+
+
+def _table(head: str, rows: list[str], empty: str) -> str:
+    return f"{head} = {{\n" + ",\n".join(f"    {r}" for r in rows or [empty]) + "\n};"
+
+
+def first_of(cls: type[Component], section: str) -> int:
+    """The first value reference of a section, or where it would stand."""
+    order = ("parameter", "input", "output", "state", "derivative", "discrete")
+    return sum(1 for s in cls.layout if order.index(s.section) < order.index(section))
+
+
+def _bounds(s: Scalar) -> list[str]:
+    limits = (s.decl.min, s.decl.max, s.decl.above, s.decl.below)
+    return [f"{{{s.reference}, {k}, {b!r}}}" for k, b in enumerate(limits) if b is not None]
+
+
+def c_source(cls: type[Component], guid: str) -> str:
+    """model.c of a part.  Raises SubsetError where an equation leaves the subset."""
+    source = Source(cls)
+    layout = cls.layout
+    counts = {s: sum(1 for x in layout if x.section == s) for s in {x.section for x in layout}}
+    checked = [s for s in layout if s.section in ("parameter", "input", "state")]
+    bounds = [b for s in checked for b in _bounds(s)]
+    samples = len(layout)
+    param = {s.name: s.reference for s in layout if s.section == "parameter"}
+    ports = [f"{{{param[n.name]}, {samples + i}, {PER[n.per]}}}" for i, n in enumerate(cls.noises)]
+    defines = {
+        "MODEL_GUID": f'"{guid}"',
+        "N_REFERENCES": f"{len(layout)}u",
+        "U0": first_of(cls, "input"),
+        "Y0": first_of(cls, "output"),
+        "X0": first_of(cls, "state"),
+        "DX0": first_of(cls, "derivative"),
+        "Q0": first_of(cls, "discrete"),
+        "N_U": counts.get("input", 0),
+        "N_Y": counts.get("output", 0),
+        "N_X": counts.get("state", 0),
+        "N_Q": counts.get("discrete", 0),
+        "N_PORTS": len(ports),
+        "N_BOUNDS": len(bounds),
+        "NONLINEAR": int(cls.nonlinear),
+        "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
+        "LARGEST_STEP(p, step)": "((p)->n.v.step)" if "step" in cls.declarations else "(step)",
+    }
+    names = [f'"{s.name}"' for s in layout]
+    units = [f'"{s.decl.unit}"' for s in layout]
+    parts = [
+        f"/* {cls.__name__} {cls.version}: generated from its model.py, line by line. */",
+        _struct(cls),
+        "\n".join(f"#define {k} {v}" for k, v in defines.items()),
+        _table("static const double starts[]", [repr(s.start) for s in layout], "0.0"),
+        _table("static const char *const names[]", names, '""'),
+        _table("static const char *const unit_names[]", units, '""'),
+        "/* kind of bound: 0 >=, 1 <=, 2 >, 3 <.  per: 0 start, 1 internal step, 2 second */",
+        _table("static const struct { int reference, kind; double limit; } bounds[]", bounds, "{-1, 0, 0.0}"),
+        _table("static const struct { int parameter, sample, per; } ports[]", ports, "{0, 0, 0}"),
+        '#include "core.h"',
+        equations(source),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def header_folder() -> Path:
+    """The FMI headers that the installed FMPy brings."""
+    spec = importlib.util.find_spec("fmpy")
+    assert spec is not None and spec.origin is not None
+    return Path(spec.origin).parent / "c-code"
+
+
+def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
+    """Everything a C compiler needs, by file name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
+    headers = [f"fmi{fmi}Functions.h", f"fmi{fmi}FunctionTypes.h"]
+    headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
+    return {
+        "model.c": c_source(cls, guid),
+        "core.h": (HERE / "core.h").read_text(encoding="utf-8"),
+        f"fmi{fmi}.c": (HERE / f"fmi{fmi}.c").read_text(encoding="utf-8"),
+        **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
+    }
