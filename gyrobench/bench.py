@@ -34,9 +34,7 @@ class Bench:
         """
         if folder is not None:
             if not (folder / "components").is_dir():
-                raise BenchError(
-                    f"{folder} is no bench: it has no folder components/ (make one: gyrobench init NAME)"
-                )
+                raise BenchError(f"{folder} is no bench: it has no folder components/ (make one: gyrobench init NAME)")
             return Bench(folder.resolve())
         for here in (Path.cwd(), *Path.cwd().parents):
             if all((here / room).is_dir() for room in ROOMS):

@@ -20,6 +20,7 @@ After the last one ``outputs`` is evaluated and everything is checked to be fini
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -83,10 +84,10 @@ class Declaration:
         if not math.isfinite(x):
             return "finite"
         for limit, word, ok in (
-            (self.min, ">=", lambda a, b: a >= b),
-            (self.max, "<=", lambda a, b: a <= b),
-            (self.above, ">", lambda a, b: a > b),
-            (self.below, "<", lambda a, b: a < b),
+            (self.min, ">=", operator.ge),
+            (self.max, "<=", operator.le),
+            (self.above, ">", operator.gt),
+            (self.below, "<", operator.lt),
         ):
             if limit is not None and not ok(x, limit):
                 return f"{word} {limit:g}"
@@ -325,9 +326,7 @@ class Component:
                 x = self._at(s)
                 wrong = s.decl.bound_broken(x)
                 if wrong:
-                    raise PartError(
-                        f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}"
-                    )
+                    raise PartError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
         self._evaluate_start()
         self._finite()
         self._running = True

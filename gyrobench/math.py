@@ -185,25 +185,6 @@ def index(x: Number) -> int:
 
 
 FUNCTIONS = (
-    *(
-        [
-            "sin",
-            "cos",
-            "tan",
-            "asin",
-            "atan",
-            "atan2",
-            "sqrt",
-            "exp",
-            "log",
-            "tanh",
-            "floor",
-            "fabs",
-            "where",
-            "minimum",
-            "maximum",
-            "clip",
-            "sign",
-        ]
-    ),
-)
+    "sin", "cos", "tan", "asin", "atan", "atan2", "sqrt", "exp", "log", "tanh", "floor",
+    "fabs", "where", "minimum", "maximum", "clip", "sign",
+)  # fmt: skip

@@ -144,9 +144,7 @@ def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None
         indices = [x.reference + 1 for x in cls.layout if x.section == "input" and x.decl.name in on]
         indices += [x.reference + 1 for x in cls.states]
         assert node is not None
-        ET.SubElement(
-            node, "Unknown", {"index": str(s.reference + 1), "dependencies": " ".join(map(str, indices))}
-        )
+        ET.SubElement(node, "Unknown", {"index": str(s.reference + 1), "dependencies": " ".join(map(str, indices))})
     if derivatives:
         node = ET.SubElement(parent, "Derivatives")
         for s in derivatives:

@@ -43,9 +43,7 @@ def load_part(name: str, bench: Path | None = None) -> type[Component]:
     """The Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
     folder = Bench.find(bench).part_folder(name)
     path = folder / "model.py"
-    key = (
-        "gyrobench_part_" + hashlib.sha256(str(path.resolve()).encode() + path.read_bytes()).hexdigest()[:16]
-    )
+    key = "gyrobench_part_" + hashlib.sha256(str(path.resolve()).encode() + path.read_bytes()).hexdigest()[:16]
     module = sys.modules.get(key) or import_file(path, key)
     own = [
         c

@@ -32,9 +32,7 @@ def _struct(cls: type[Component]) -> str:
             inner = []
         if ("", s.decl.name) not in done:
             done.add(("", s.decl.name))
-            lines.append(
-                f"    double {s.decl.name}{_dimensions(s.decl.shape)}; /* {s.decl.unit}, {s.decl.doc} */"
-            )
+            lines.append(f"    double {s.decl.name}{_dimensions(s.decl.shape)}; /* {s.decl.unit}, {s.decl.doc} */")
     if inner:
         lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
     if cls.noises:

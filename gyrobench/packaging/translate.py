@@ -37,55 +37,12 @@ WRITABLE: dict[str, tuple[type, ...]] = {
     "flow": (),
     "outputs": (Output,),
 }
-RESERVED = set(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "part",
-        "self",
-        "seed",
-        "dual",
-        "value",
-        "start",
-        "flow",
-        "outputs",
-        "ticks",
-        "main",
-        "errno",
-    ]
-)
+RESERVED = {
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
+    "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
+    "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
+    "part", "self", "seed", "dual", "value", "start", "flow", "outputs", "ticks", "main", "errno",
+}  # fmt: skip
 
 
 class SubsetError(Exception):
@@ -210,9 +167,7 @@ class Method:
             return self.expression(e.operand)
         if isinstance(e, ast.IfExp):
             return f"({self.condition(e.test)} ? {self.expression(e.body)} : {self.expression(e.orelse)})"
-        if isinstance(e, ast.Compare | ast.BoolOp) or (
-            isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.Not)
-        ):
+        if isinstance(e, ast.Compare | ast.BoolOp) or (isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.Not)):
             return f"d_con({self.condition(e)})" if d else f"(double)({self.condition(e)})"
         if isinstance(e, ast.Call):
             return self.call(e)
@@ -233,9 +188,7 @@ class Method:
             return f"({self.condition(e.args[0])} ? {a} : {b})"
         if name not in FUNCTIONS:
             known = ", ".join(FUNCTIONS)
-            raise self.source.refuse(
-                e, f"{ast.unparse(e.func)!r} is not callable in equations; these are: {known}"
-            )
+            raise self.source.refuse(e, f"{ast.unparse(e.func)!r} is not callable in equations; these are: {known}")
         args = ", ".join(self.expression(a) for a in e.args)
         if d:
             return f"d_{name}({args})"
@@ -269,11 +222,7 @@ class Method:
         pad = "    " * depth
         if isinstance(s, ast.Pass) or (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)):
             return []
-        if (
-            isinstance(s, ast.Expr)
-            and isinstance(s.value, ast.Call)
-            and ast.unparse(s.value.func) == "self.refuse"
-        ):
+        if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call) and ast.unparse(s.value.func) == "self.refuse":
             return self.refusal(s.value, pad)
         if isinstance(s, ast.Assign | ast.AnnAssign):
             target = s.targets[0] if isinstance(s, ast.Assign) else s.target
@@ -354,9 +303,7 @@ class Method:
         size = f"[{len(rows)}]"
         if rows and isinstance(rows[0][1], ast.List):
             width = len(rows[0][1].elts)
-            cells = [
-                (f"{i}[{j}]", e) for i, r in rows if isinstance(r, ast.List) for j, e in enumerate(r.elts)
-            ]
+            cells = [(f"{i}[{j}]", e) for i, r in rows if isinstance(r, ast.List) for j, e in enumerate(r.elts)]
             size, rows = f"[{len(rows)}][{width}]", cells
         self.locals.setdefault(target.id, size)
         name = self.c_name(target.id)
@@ -364,14 +311,8 @@ class Method:
 
     def refusal(self, call: ast.Call, pad: str) -> list[str]:
         if self.helper:
-            raise self.source.refuse(
-                call, "a helper method does not refuse: do it in start, flow, outputs or a tick"
-            )
-        if (
-            len(call.args) != 2
-            or not isinstance(call.args[1], ast.Constant)
-            or not isinstance(call.args[1].value, str)
-        ):
+            raise self.source.refuse(call, "a helper method does not refuse: do it in start, flow, outputs or a tick")
+        if len(call.args) != 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
             raise self.source.refuse(call, 'write self.refuse(condition, "message with {H}")')
         message = call.args[1].value
         names = re.findall(r"\{(\w+)\}", message)
@@ -400,8 +341,7 @@ class Method:
         lines = self.body(self.node.body, 1) if self.node else []
         zero = "{0.0, 0.0}" if self.dual else "0.0"
         declared = [
-            f"    {number} {self.c_name(n)}{size}{'' if size else f' = {zero}'};"
-            for n, size in self.locals.items()
+            f"    {number} {self.c_name(n)}{size}{'' if size else f' = {zero}'};" for n, size in self.locals.items()
         ]
         opening = ["    Vars *self = &part->n.v;"]
         if not any("self->" in x for x in lines):
@@ -469,9 +409,7 @@ def dependencies(source: Source, method: str = "outputs") -> dict[str, set[str]]
 
     node = source.methods.get(method)
     before = None
-    while (
-        before != (before := {k: frozenset(v) for k, v in reach.items()}) or not reach
-    ):  # loops carry values
+    while before != (before := {k: frozenset(v) for k, v in reach.items()}) or not reach:  # loops carry values
         run(node.body if node else [], set())
         if not reach:
             break
