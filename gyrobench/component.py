@@ -204,7 +204,7 @@ class Component:
         if any(isinstance(d, Noise) for d in found.values()):
             found["seed"] = Parameter(1, int, "seed of the noise of this instance", min=0)
         methods = {n: m for n, m in vars(cls).items() if hasattr(m, "_every")}
-        if methods or any(isinstance(d, State) for d in found.values()):
+        if "step" not in found and (methods or any(isinstance(d, State) for d in found.values())):
             found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
         for n, d in found.items():
             d.name = n
