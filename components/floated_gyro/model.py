@@ -1,0 +1,176 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.math import clip, cos, exp, fabs, pi, sin, sqrt
+
+DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
+IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+
+class FloatedGyro(Component):
+    """Single-degree-of-freedom floated rate-integrating gyro.  [GYRO-DYN-1, GYRO-STATIC-10, GYRO-COEFF-TIME-TEMP]
+
+    Axes I, O, S (input, output, spin reference) are those of the mount: v_gyro = mount v_case.
+
+        b' = r,   J r' = -C r + H (w_I cos b - w_S sin b - omega_d - k i (1 + k2 i + k3 i2)) - J alpha_O
+        u = K_sg b + noise, limited to +-u_max                                 [seed eq. 2-50..2-56, DYN-CROSS]
+
+    b is the float angle.  In the steady state of a rebalance loop k i (1 + k2 i + k3 i2) = omega_IA - omega_d.
+    Drift rate omega_d in precession sign, (X, Y, Z) = -f/g0 along I, O, S, g0 = 9.80665 m/s2   [2-36, 2-47..2-49]
+
+        omega_d = F + X I + Y O + Z S + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
+                  + turn-on constant + Gauss-Markov + white
+        F = D_F (1 + p_F T)                          I = D_I (1 + p_I T) + D_TI dT_S
+        O = D_O (1 + p_O T) - D_TO dT_O              S = D_S (1 + p_S T) - D_TS dT_I        T = age + time
+
+    The second block is the book's 2-39..2-42, which stands in torque sign omega_M = -omega_d, with every
+    coefficient's sign turned: D_F = -D_K, D_I = -U_z, D_O = -U_y, D_S = +U_x, and of the thermal terms
+    -D_Tzx dT_z X -> +D_TI dT_S X, +D_Tyy dT_y Y -> -D_TO dT_O Y, +D_Txz dT_x Z -> -D_TS dT_I Z.  dT_j is the
+    temperature difference between the two ends of the float along j.  p_O has no physical cause in the book.
+
+    `terms` says which model is meant: 3 = F, I, S; 4 = 3 + IS; 5 = 4 + II; 8 = 5 + SS, IO, OS; 9 = 8 + O;
+    10 = 9 + OO.  A coefficient outside it must be 0.  Gauss-Markov: g+ = e^(-h/tau) g + sqrt(1 - e^(-2 h/tau))
+    rms xi, stationary from the start, held over each internal step; white drift and pickoff noise by density.
+    With the default sizes a 60 s mean scatters by 0.0030 deg/h (white 0.0023, Gauss-Markov 0.0019, pickoff 0.0003).
+
+    Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
+    vibration, hysteresis and warm-up, float stops (b goes on where the pickoff saturates), torquer axis error.
+    Source: 000_791234d3afc34a0c.txt ch. 2.
+    """
+
+    version = "1.0.0"
+
+    H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
+    J = Parameter(2e-4, "kg.m2", "float inertia about the output axis", above=0.0)
+    C = Parameter(0.2, "N.m.s/rad", "float damping", above=0.0)
+    K_sg = Parameter(10.0, "V/rad", "pickoff gain", above=0.0)
+    u_max = Parameter(0.1, "V", "pickoff saturation", above=0.0)
+    k = Parameter(17.2e3 * DEG_H, "rad/s/A", "torquer scale factor (17.2 deg/h/mA)", above=0.0)
+    k2 = Parameter(0.0, "1/A", "torquer nonlinearity, relative, even in the rate")
+    k3 = Parameter(0.0, "1/A2", "torquer nonlinearity, relative, odd in the rate")
+    mount = Parameter(IDENTITY, "1", "rows: gyro axes I, O, S in case axes")
+
+    terms = Parameter(9, int, "terms of the static model: 3, 4, 5, 8, 9 or 10")
+    D_F = Parameter(-0.3 * DEG_H, "rad/s", "constant drift (-0.3 deg/h)")
+    D_I = Parameter(-0.9 * DEG_H, "rad/s", "drift per g0 along I, mass unbalance along S (-0.9 deg/h/g)")
+    D_O = Parameter(0.1 * DEG_H, "rad/s", "drift per g0 along O, empirical (0.1 deg/h/g)")
+    D_S = Parameter(-0.7 * DEG_H, "rad/s", "drift per g0 along S, mass unbalance along I (-0.7 deg/h/g)")
+    D_II = Parameter(-0.05 * DEG_H, "rad/s", "drift per g0 squared along I (-0.05 deg/h/g2)")
+    D_OO = Parameter(0.0, "rad/s", "drift per g0 squared along O, empirical")
+    D_SS = Parameter(0.04 * DEG_H, "rad/s", "drift per g0 squared along S (0.04 deg/h/g2)")
+    D_IO = Parameter(-0.03 * DEG_H, "rad/s", "drift per g0 squared, I and O (-0.03 deg/h/g2)")
+    D_OS = Parameter(-0.02 * DEG_H, "rad/s", "drift per g0 squared, O and S (-0.02 deg/h/g2)")
+    D_IS = Parameter(-0.15 * DEG_H, "rad/s", "drift per g0 squared, I and S, anisoelasticity (-0.15 deg/h/g2)")
+
+    age = Parameter(0.0, "s", "age at time 0", min=0.0)
+    p_F = Parameter(0.0, "1/s", "ageing of D_F, relative (typical 1e-8)")
+    p_I = Parameter(0.0, "1/s", "ageing of D_I, relative (typical 1e-8)")
+    p_O = Parameter(0.0, "1/s", "ageing of D_O, relative")
+    p_S = Parameter(0.0, "1/s", "ageing of D_S, relative (typical 1e-8)")
+    D_TI = Parameter(0.0, "rad/s/K", "D_Tzx: drift per g0 along I and temperature difference along S")
+    D_TO = Parameter(0.0, "rad/s/K", "D_Tyy: drift per g0 along O and temperature difference along O")
+    D_TS = Parameter(0.0, "rad/s/K", "D_Txz: drift per g0 along S and temperature difference along I")
+
+    turn_on = Noise(0.0, "rad/s", "rms of the turn-on drift, one value a run", per="start")
+    markov = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift (0.002 deg/h)", per="step")
+    markov_tau = Parameter(300.0, "s", "correlation time of the Gauss-Markov drift", above=0.0)
+    white = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density (0.0178 deg/h/sqrt(Hz))")
+    pickoff = Noise(5e-8, "V/sqrt(Hz)", "pickoff noise density")
+
+    omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
+    alpha = Input([0.0, 0.0, 0.0], "rad/s2", "angular acceleration, case axes")
+    f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
+    i = Input(0.0, "A", "torquer current")
+    dT = Input([0.0, 0.0, 0.0], "K", "temperature differences along I, O, S")
+
+    u = Output("V", "pickoff voltage")
+    drift = Output("rad/s", "drift rate omega_d, precession sign")
+    b = Output("rad", "float angle")
+    saturated = Output("1", "1 while the pickoff is saturated")
+
+    float_angle = State(0.0, "rad", "float angle b about O relative to the case")
+    float_rate = State(0.0, "rad/s", "its rate r")
+
+    wander = Discrete(0.0, "rad/s", "Gauss-Markov drift")
+    decay = Discrete(0.0, "1", "its decay in one internal step")
+    fresh = Discrete(0.0, "1", "size of its innovation")
+    h_last = Discrete(0.0, "s", "internal step they were made for")
+    per_g = Discrete(0.0, "s2/m", "-1 / g0")
+
+    def start(self) -> None:
+        n = self.terms
+        self.refuse(
+            not (n == 3.0 or n == 4.0 or n == 5.0 or n == 8.0 or n == 9.0 or n == 10.0),
+            "terms = {terms} is no static model: it must be 3, 4, 5, 8, 9 or 10",
+        )
+        self.refuse(n < 4.0 and self.D_IS != 0.0, "D_IS must be 0 with terms = {terms} (from 4 on)")
+        self.refuse(n < 5.0 and self.D_II != 0.0, "D_II must be 0 with terms = {terms} (from 5 on)")
+        self.refuse(n < 8.0 and self.D_SS != 0.0, "D_SS must be 0 with terms = {terms} (from 8 on)")
+        self.refuse(n < 8.0 and self.D_IO != 0.0, "D_IO must be 0 with terms = {terms} (from 8 on)")
+        self.refuse(n < 8.0 and self.D_OS != 0.0, "D_OS must be 0 with terms = {terms} (from 8 on)")
+        self.refuse(n < 9.0 and self.D_O != 0.0, "D_O must be 0 with terms = {terms} (from 9 on)")
+        self.refuse(n < 10.0 and self.D_OO != 0.0, "D_OO must be 0 with terms = {terms} (from 10 on)")
+        for i in range(3):
+            for j in range(3):
+                dot = 0.0 if i != j else -1.0
+                for m in range(3):
+                    dot = dot + self.mount[i][m] * self.mount[j][m]
+                self.refuse(
+                    fabs(dot) > 1e-9,
+                    "mount is no rotation: its rows must be unit vectors at right angles, to 1e-9",
+                )
+        det = self.mount[0][0] * (self.mount[1][1] * self.mount[2][2] - self.mount[1][2] * self.mount[2][1])
+        det = det - self.mount[0][1] * (self.mount[1][0] * self.mount[2][2] - self.mount[1][2] * self.mount[2][0])
+        det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
+        self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
+        self.per_g = -1.0 / 9.80665
+        self.wander = self.noise.markov
+        self.h_last = 0.0
+
+    def static_drift(self, x, y, z):
+        age = self.age + self.t
+        fixed = self.D_F * (1.0 + self.p_F * age)
+        along_i = self.D_I * (1.0 + self.p_I * age) + self.D_TI * self.dT[2]
+        along_o = self.D_O * (1.0 + self.p_O * age) - self.D_TO * self.dT[1]
+        along_s = self.D_S * (1.0 + self.p_S * age) - self.D_TS * self.dT[0]
+        along_i = along_i + self.D_II * x + self.D_IO * y + self.D_IS * z
+        along_o = along_o + self.D_OO * y + self.D_OS * z
+        along_s = along_s + self.D_SS * z
+        return fixed + along_i * x + along_o * y + along_s * z
+
+    def flow(self) -> None:
+        w = [0.0, 0.0, 0.0]
+        g = [0.0, 0.0, 0.0]
+        for j in range(3):
+            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
+            w[j] = row + self.mount[j][2] * self.omega[2]
+            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
+            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
+        turn = self.mount[1][0] * self.alpha[0] + self.mount[1][1] * self.alpha[1]
+        turn = turn + self.mount[1][2] * self.alpha[2]
+        drift = self.static_drift(g[0], g[1], g[2]) + self.noise.turn_on + self.wander + self.noise.white
+        pull = self.k * self.i * (1.0 + self.k2 * self.i + self.k3 * self.i * self.i)
+        sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
+        self.der.float_angle = self.float_rate
+        torque = self.H * (sensed - drift - pull) - self.C * self.float_rate
+        self.der.float_rate = torque / self.J - turn
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if self.h != self.h_last:
+            self.decay = exp(-self.h / self.markov_tau)
+            self.fresh = sqrt(1.0 - self.decay * self.decay)
+            self.h_last = self.h
+        self.wander = self.decay * self.wander + self.fresh * self.noise.markov
+
+    def outputs(self) -> None:
+        g = [0.0, 0.0, 0.0]
+        for j in range(3):
+            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
+            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
+        known = self.static_drift(g[0], g[1], g[2]) + self.noise.turn_on
+        self.drift = known + self.wander + self.noise.white
+        self.b = self.float_angle
+        wish = self.K_sg * self.float_angle + self.noise.pickoff
+        self.u = clip(wish, -self.u_max, self.u_max)
+        self.saturated = 1.0 if self.u != wish else 0.0

@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
+from gyrobench.math import fabs, floor, index
+
+IDENTITY = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+MOVE, SETTLE, OPEN, CLOSE, DONE = 0.0, 1.0, 2.0, 3.0, 4.0  # stages of a phase
+GUARD = 3.0  # samples
+
+
+class Sequencer(Component):
+    """Runs the plan of a test: up to 99 labelled phases.  [TABLE-PROGRAM; 001... ch. 5.4, 6.1]
+
+    Each phase gives the table a mode, a target and a mount (face), and goes through
+
+        move    until the table reports in_position (after at least GUARD = 3 samples: the report may be that
+                of the phase before, one step old)
+        settle  t - t_move >= settle
+        open    the gate is open: 1 (hold and index phases; windows by time) until t - t_open >= dwell,
+                2 (rate phases; windows by angle) until |angle - angle_open| >= travel + window / 100
+        close   GUARD further samples with the gate open
+
+    so that a sampler which sees gate or angle a sample late or early, or an encoder with a coarse quantum,
+    still finds its last window complete: it counts windows from its own first open sample.  Times are
+    differences of sample times t0 + k h, rounded to the nearest sample; nothing is accumulated.  A table that
+    leaves its position while settling starts the settling anew.
+
+    One sample is one communication step (`step` is large for that reason); windows must be longer than some
+    four steps.  Whole numbers (phase, mode, gate, done) are Real signals.
+
+    Not modelled: the time that a real change of mount takes, health interlocks, automatic repetition.
+    """
+
+    version = "1.0.0"
+
+    step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
+    phases = Parameter(1, int, "number of phases", min=1, max=99)
+    modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate")
+    targets = Parameter([0.0] * 99, "1", "target of each phase: angle in rad (index), rate in rad/s (rate)")
+    settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
+    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index)")
+    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate)")
+    windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index) or rad (rate)")
+    face_of = Parameter([1] * 99, int, "which of the faces each phase uses, from 1")
+    faces = Parameter([IDENTITY] * 12, "1", "mounts: rows of the face matrix one after the other")
+
+    angle = Input(0.0, "rad", "table angle, cumulative")
+    in_position = Input(1.0, "1", "1 when the table has reached its target")
+
+    phase = Output("1", "number of the running phase, from 1")
+    mode = Output("1", "table mode")
+    target = Output("1", "table target, rad or rad/s by mode")
+    face = Output("1", "mount: rows are the gyro axes in table axes", shape=(3, 3))
+    gate = Output("1", "0 closed, 1 windows by time, 2 windows by angle")
+    window = Output("1", "window length, s or rad by gate")
+    done = Output("1", "1 when the plan is finished")
+
+    now = Discrete(1.0, "1", "running phase")
+    stage = Discrete(0.0, "1", "0 move, 1 settle, 2 open, 3 close, 4 done")
+    waited = Discrete(0.0, "1", "samples in this stage (move, close)")
+    t_ref = Discrete(0.0, "s", "time at which settle or open began")
+    angle_ref = Discrete(0.0, "rad", "angle at which the gate opened")
+    bad_phase = Discrete(0.0, "1", "phase under check")
+    bad_face = Discrete(0.0, "1", "face under check")
+
+    def start(self) -> None:
+        self.now = 1.0
+        self.stage = MOVE
+        self.waited = 0.0
+        for p in range(index(self.phases)):
+            self.bad_phase = p + 1.0
+            rate = self.modes[p] == 2.0
+            self.refuse(
+                not (self.modes[p] == 0.0 or self.modes[p] == 1.0 or rate),
+                "phase {bad_phase}: unknown mode; modes are 0 hold, 1 index, 2 rate",
+            )
+            self.refuse(
+                self.face_of[p] < 1.0 or self.face_of[p] > 12.0 or self.face_of[p] != floor(self.face_of[p]),
+                "phase {bad_phase}: face_of must be 1 to 12",
+            )
+            self.refuse(
+                rate and self.targets[p] == 0.0,
+                "phase {bad_phase}: the table does not turn: a rate phase needs a target other than 0",
+            )
+            self.refuse(
+                rate and self.travel[p] <= 0.0,
+                "phase {bad_phase}: a rate phase needs a travel above 0 rad",
+            )
+            self.refuse(
+                not rate and self.dwell[p] <= 0.0,
+                "phase {bad_phase}: a hold or index phase needs a dwell above 0 s",
+            )
+            self.refuse(self.windows[p] <= 0.0, "phase {bad_phase}: the window must be above 0")
+            longest = (self.travel[p] if rate else self.dwell[p]) * (1.0 + 1e-9)
+            self.refuse(
+                self.windows[p] > longest,
+                "phase {bad_phase}: the window is longer than the dwell (hold, index) or travel (rate)",
+            )
+            self.bad_face = self.face_of[p]
+            for i in range(3):
+                for j in range(3):
+                    dot = 0.0 if i != j else -1.0
+                    for k in range(3):
+                        a = self.faces[index(self.bad_face - 1.0)][3 * i + k]
+                        dot = dot + a * self.faces[index(self.bad_face - 1.0)][3 * j + k]
+                    self.refuse(
+                        fabs(dot) > 1e-9,
+                        "phase {bad_phase}: face {bad_face} is no rotation: its rows must be unit vectors "
+                        "at right angles, to 1e-9",
+                    )
+            m = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+            for k in range(9):
+                m[k] = self.faces[index(self.bad_face - 1.0)][k]
+            det = m[0] * (m[4] * m[8] - m[5] * m[7])
+            det = det - m[1] * (m[3] * m[8] - m[5] * m[6])
+            det = det + m[2] * (m[3] * m[7] - m[4] * m[6])
+            self.refuse(
+                det < 0.0,
+                "phase {bad_phase}: face {bad_face} is left-handed (determinant -1): reverse one row",
+            )
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        half = 0.5 * self.h
+        if self.stage == SETTLE and self.in_position < 0.5:
+            self.stage = MOVE
+        if self.stage == MOVE:
+            self.waited = self.waited + 1.0
+            if self.waited >= GUARD and self.in_position > 0.5:
+                self.stage = SETTLE
+                self.t_ref = self.t
+        if self.stage == SETTLE and self.t - self.t_ref > self.settle[index(self.now - 1.0)] - half:
+            self.stage = OPEN
+            self.t_ref = self.t
+            self.angle_ref = self.angle
+            self.waited = 0.0
+        elif self.stage == OPEN:
+            if self.modes[index(self.now - 1.0)] == 2.0:
+                far = self.travel[index(self.now - 1.0)] + 0.01 * self.windows[index(self.now - 1.0)]
+                if fabs(self.angle - self.angle_ref) >= far:
+                    self.stage = CLOSE
+            elif self.t - self.t_ref > self.dwell[index(self.now - 1.0)] - half:
+                self.stage = CLOSE
+        elif self.stage == CLOSE:
+            self.waited = self.waited + 1.0
+            if self.waited >= GUARD:
+                self.waited = 0.0
+                if self.now < self.phases:
+                    self.now = self.now + 1.0
+                    self.stage = MOVE
+                else:
+                    self.stage = DONE
+
+    def outputs(self) -> None:
+        self.phase = self.now
+        self.mode = self.modes[index(self.now - 1.0)]
+        self.target = self.targets[index(self.now - 1.0)]
+        self.window = self.windows[index(self.now - 1.0)]
+        for i in range(3):
+            for j in range(3):
+                self.face[i][j] = self.faces[index(self.face_of[index(self.now - 1.0)] - 1.0)][3 * i + j]
+        self.gate = 0.0
+        self.done = 0.0
+        if self.stage == OPEN or self.stage == CLOSE:
+            self.gate = 2.0 if self.mode == 2.0 else 1.0
+        if self.stage == DONE:
+            self.mode = 0.0
+            self.target = 0.0
+            self.done = 1.0
