@@ -1,0 +1,136 @@
+"""``result.json`` as a Python object: the only source of every number on a page.
+
+:func:`document` turns a Result into plain JSON values (NaN and infinities become None) and adds
+``derived``: the few numbers a report shows that no reduction delivers (expanded uncertainty, budget
+sums, the plan in shown units).  HTML and PDF take numbers from this document by JSON pointer and from
+nowhere else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from gyrobench.reduction.result import Result
+
+SCHEMA = "gyrobench-result-1"
+MODES = {0: "hold", 1: "index", 2: "rate"}
+
+
+def plain(value: Any) -> Any:
+    """JSON values only: numpy scalars and arrays to Python, NaN and infinities to None."""
+    if value is None or isinstance(value, bool | str):
+        return value
+    if hasattr(value, "tolist"):  # numpy scalar or array
+        value = value.tolist()
+    if isinstance(value, bool | int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, Sequence | set | frozenset) and not isinstance(value, str):
+        return [plain(v) for v in (sorted(value) if isinstance(value, set | frozenset) else value)]
+    return str(value)
+
+
+def document(result: Result) -> dict[str, Any]:
+    """The content of ``result.json``: the result, ``derived``, ``schema`` and ``report_id``."""
+    content = plain(result.as_dict())
+    content["derived"] = _derived(content)
+    return {"schema": SCHEMA, "report_id": _hash(content), **content}
+
+
+def report_id(result: Result) -> str:
+    """Ten hexadecimal digits that stand for the content: same numbers and provenance, same id."""
+    return str(document(result)["report_id"])
+
+
+def load(text: str) -> Result:
+    """The Result in the text of a ``result.json``; raises ValueError when it is not one of ours."""
+    data = json.loads(text)
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise ValueError(f"not a result of this bench: 'schema' must be {SCHEMA!r}")
+    for key in ("schema", "report_id", "derived"):
+        data.pop(key, None)
+    return Result.from_dict(data)
+
+
+def pointer(*path: str | int) -> str:
+    """RFC 6901 JSON pointer of a path: ``pointer("coefficients", 0, "u")`` is ``/coefficients/0/u``."""
+    return "".join("/" + str(p).replace("~", "~0").replace("/", "~1") for p in path)
+
+
+def look(doc: Any, *path: str | int) -> Any:
+    """The value at a path, None where the path ends early."""
+    for key in path:
+        try:
+            doc = doc[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return doc
+
+
+def _hash(content: dict[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:10]
+
+
+def _derived(content: dict[str, Any]) -> dict[str, Any]:
+    coefficients = content["coefficients"]
+    expanded = [_times(c["k"], c["u"]) for c in coefficients]
+    difference = [_minus(c["closed"], c["estimate"]) for c in coefficients]
+    sums: dict[str, float | None] = {}
+    for line in content["budget"]:
+        if line["contribution"] is not None:
+            sums[line["coefficient"]] = math.hypot(sums.get(line["coefficient"]) or 0.0, line["contribution"])
+    plan = look(content, "provenance", "plan")
+    return {
+        "U": expanded,
+        "closed_minus_estimate": difference,
+        "budget_sum": sums,
+        "series": [_moments(s["y"], s["residual"]) for s in content["series"]],
+        "plan": [_phase(p) for p in plan] if isinstance(plan, list) else [],
+    }
+
+
+def _moments(y: Sequence[float | None], residual: Sequence[float | None]) -> dict[str, float | None]:
+    """Mean of the windows and root mean square of the residuals of a series."""
+    ys = [v for v in y if v is not None]
+    rs = [v for v in residual if v is not None]
+    return {
+        "mean": math.fsum(ys) / len(ys) if ys else None,
+        "residual_rms": math.sqrt(math.fsum(r * r for r in rs) / len(rs)) if rs else None,
+    }
+
+
+def _phase(phase: Mapping[str, Any]) -> dict[str, Any]:
+    """A phase of the plan in degrees, degrees per hour and seconds, as the plan table shows it."""
+    mode = phase.get("mode")
+    name = mode if isinstance(mode, str) else MODES.get(int(mode), str(mode)) if mode is not None else ""
+    turning = name == "rate"
+    degree = 180.0 / math.pi
+    return {
+        "phase": phase.get("phase"),
+        "label": str(phase.get("label", "")),
+        "mode": name,
+        "face": phase.get("face"),
+        "angle_deg": None if turning else _times(phase.get("target"), degree),
+        "rate_deg_per_h": _times(phase.get("target"), degree * 3600.0) if turning else None,
+        "settle_s": phase.get("settle"),
+        "dwell_s": None if turning else phase.get("dwell"),
+        "travel_deg": _times(phase.get("travel"), degree) if turning else None,
+        "window_s": None if turning else phase.get("window"),
+        "window_deg": _times(phase.get("window"), degree) if turning else None,
+    }
+
+
+def _times(a: Any, b: Any) -> float | None:
+    return float(a) * float(b) if isinstance(a, int | float) and isinstance(b, int | float) else None
+
+
+def _minus(a: Any, b: Any) -> float | None:
+    return float(a) - float(b) if isinstance(a, int | float) and isinstance(b, int | float) else None

@@ -1,0 +1,288 @@
+"""The figures of a report, one idea each.  Every function returns an SVG or "" when there is nothing to show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .style import (
+    BLUE,
+    GREEN,
+    HALF,
+    INK,
+    MARKERS,
+    MUTED,
+    VERMILION,
+    WIDE,
+    axis_label,
+    degree_ticks,
+    envelope,
+    figure,
+    span_labels,
+    svg,
+    time_axis,
+    zero_line,
+)
+
+Json = Mapping[str, Any]
+
+
+def short(label: str, length: int = 26) -> str:
+    """A series label for a figure: the part before the colon when it is long."""
+    head = label.split(":")[0].strip() or label
+    label = label if len(label) <= length else head
+    return label if len(label) <= length else label[: length - 1] + "…"
+
+
+def finite(*columns: Sequence[float | None]) -> list[list[float]]:
+    """The columns without the rows that hold a None or a value that is not finite."""
+    rows = [r for r in zip(*columns, strict=False) if all(v is not None and math.isfinite(v) for v in r)]
+    return [list(c) for c in zip(*rows, strict=True)] if rows else [[] for _ in columns]
+
+
+def is_curve(series: Json) -> bool:
+    """A series that can be drawn against its position: three or more points that are not all in one place."""
+    x = [v for v in series["x"] if v is not None]
+    return len(x) >= 3 and max(x) > min(x)
+
+
+def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | None:
+    low, high = (min(values), max(values)) if values else (0.0, 0.0)
+    if not values or low == high:
+        return None
+    return low - pad * (high - low), high + pad * (high - low)
+
+
+def fit(series: Sequence[Json], key: str, everything: Sequence[Json]) -> str:
+    """Points, fit and, beneath on the same axis, residuals; scales shared with all other series."""
+    fig, axes = figure(
+        WIDE if len(series) > 1 else WIDE * 0.75, 84, nrows=2, ncols=len(series), sharex="col", sharey="row", height_ratios=[2.2, 1]
+    )
+    for k, s in enumerate(series):
+        top, bottom = axes[0, k], axes[1, k]
+        x, y = finite(s["x"], s["y"])
+        top.plot(x, y, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+        fx, fy = finite(*((s["shown_fit_x"], s["shown_fit_y"]) if s["shown_fit_x"] else (s["x"], s["fit"])))
+        order = sorted(range(len(fx)), key=lambda i, fx=fx: fx[i])  # type: ignore[misc]
+        top.plot([fx[i] for i in order], [fy[i] for i in order], "-", color=VERMILION)
+        top.set_title(short(s["label"], 48), color=INK)
+        rx, ry = finite(s["x"], s["residual"])
+        zero_line(bottom)
+        bottom.plot(rx, ry, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+        bottom.set_xlabel(axis_label(s["x_name"], s["x_unit"]))
+        degree_ticks(bottom, s["x_unit"])
+    first = series[0]
+    axes[0, 0].set_ylabel(axis_label(first["y_name"], first["y_unit"]))
+    axes[1, 0].set_ylabel(axis_label("residual", first["y_unit"]))
+    for row, name in ((0, "y"), (1, "residual")):
+        shared = limits([v for s in everything for v in s[name] if v is not None])
+        if shared:
+            axes[row, 0].set_ylim(*shared)
+    fig.align_ylabels(axes[:, 0])
+    return svg(fig, key)
+
+
+def residuals_in_time(series: Sequence[Json], key: str) -> str:
+    """Residuals of all series against time, the series shaded and named."""
+    seconds = [t for s in series for t in s["t"] if t is not None]
+    if len(seconds) < 3:
+        return ""
+    divisor, unit = time_axis(seconds)
+    fig, axes = figure(WIDE, 58)
+    ax = axes[0, 0]
+    zero_line(ax)
+    spans = []
+    for s in sorted((s for s in series if s["t"]), key=lambda s: min(t for t in s["t"] if t is not None)):
+        t, r = finite(s["t"], s["residual"])
+        if not t:
+            continue
+        t, r = envelope([v / divisor for v in t], r)
+        half = 0.5 * (t[-1] - t[0]) / max(len(t) - 1, 1)
+        spans.append((t[0] - half, t[-1] + half, short(s["label"])))
+        ax.plot(t, r, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+    ax.set_xlabel(axis_label("time", unit))
+    ax.set_ylabel(axis_label("residual", series[0]["y_unit"]))
+    ax.margins(x=0.01)
+    span_labels(ax, spans)
+    return svg(fig, key)
+
+
+def channels(record: Json, name: str, label: str, unit: str, key: str) -> str:
+    """One recorded channel against time, decimated by its min-max envelope."""
+    t, y = finite(list(record["time"]), list(record[name]))
+    if len(t) < 3:
+        return ""
+    divisor, time_unit = time_axis(t)
+    t, y = envelope([v / divisor for v in t], y)
+    fig, axes = figure(WIDE, 48)
+    axes[0, 0].plot(t, y, "-", color=BLUE, linewidth=0.8)
+    axes[0, 0].set_xlabel(axis_label("time", time_unit))
+    axes[0, 0].set_ylabel(axis_label(label, unit))
+    axes[0, 0].margins(x=0.01)
+    return svg(fig, key)
+
+
+def acf(data: Json, key: str) -> str:
+    """Autocorrelation of the residuals with its bounds for white noise."""
+    lag, rho = finite(data["lag"], data["rho"])
+    lag, rho = [m for m in lag if m > 0], [r for m, r in zip(lag, rho, strict=True) if m > 0]
+    if not lag:
+        return ""
+    fig, axes = figure(HALF, 56)
+    ax = axes[0, 0]
+    bound = data.get("bound")
+    bounds = [b for b in (bound if isinstance(bound, list) else [bound]) if b is not None]
+    if len(bounds) == len(data["lag"]):
+        ax.fill_between(data["lag"], [-b for b in bounds], bounds, color=GREEN, alpha=0.2, linewidth=0)
+    elif bounds:
+        ax.axhspan(-abs(bounds[0]), abs(bounds[0]), color=GREEN, alpha=0.2, linewidth=0)
+    zero_line(ax)
+    ax.vlines(lag, 0, rho, color=BLUE, linewidth=1.2)
+    ax.plot(lag, rho, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+    ax.set_xlabel(axis_label("lag", "windows"))
+    ax.set_ylabel(axis_label("autocorrelation", "1"))
+    ax.set_ylim(min(-0.5, min(rho) * 1.1), max(0.5, max(rho) * 1.1))
+    ax.set_xlim(0, max(lag) + 0.5)
+    return svg(fig, key)
+
+
+def quantiles(residuals: Sequence[float], key: str) -> str:
+    """Residuals, standardized, against normal quantiles, with the pointwise 95 % band of normal samples."""
+    import numpy as np
+    from scipy.special import betaincinv, ndtri
+
+    values = np.sort(np.asarray([r for r in residuals if r is not None], float))
+    n = len(values)
+    spread = float(values.std(ddof=1)) if n > 2 else 0.0
+    if n < 5 or spread == 0.0:
+        return ""
+    z = (values - values.mean()) / spread
+    i = np.arange(1, n + 1)
+    x = ndtri((i - 0.375) / (n + 0.25))
+    fig, axes = figure(HALF, 56)
+    ax = axes[0, 0]
+    band = [ndtri(betaincinv(i, n + 1 - i, q)) for q in (0.025, 0.975)]
+    ax.fill_between(x, band[0], band[1], color=GREEN, alpha=0.2, linewidth=0)
+    ends = [float(x[0]), float(x[-1])]
+    ax.plot(ends, ends, "-", color=VERMILION)
+    x, z = envelope(x.tolist(), z.tolist())
+    ax.plot(x, z, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+    ax.set_xlabel(axis_label("normal quantile", "1"))
+    ax.set_ylabel(axis_label("residual / spread", "1").replace(" / 1", ""))
+    return svg(fig, key)
+
+
+def allan(data: Json, key: str) -> str:
+    """Allan deviation against averaging time with 95 % intervals, both axes logarithmic."""
+    tau, dev, low, high = finite(data["tau"], data["dev"], data.get("lo") or data["dev"], data.get("hi") or data["dev"])
+    rows = [r for r in zip(tau, dev, low, high, strict=True) if r[0] > 0 and r[1] > 0]
+    if len(rows) < 2:
+        return ""
+    tau, dev, low, high = (list(c) for c in zip(*rows, strict=True))
+    low = [max(v, 1e-3 * d) for v, d in zip(low, dev, strict=True)]
+    fig, axes = figure(HALF, 62)
+    ax = axes[0, 0]
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.fill_between(tau, low, high, color=BLUE, alpha=0.2, linewidth=0)
+    ax.plot(tau, dev, "o-", color=BLUE, linewidth=0.8, markeredgewidth=0)
+    ax.set_xlabel(axis_label("averaging time", data.get("tau_unit", "s")))
+    ax.set_ylabel(axis_label("Allan deviation", data.get("unit", "")))
+    plain_log(ax, max(high) / min(low))
+    return svg(fig, key)
+
+
+def psd(data: Json, key: str) -> str:
+    """Power spectral density of the residuals, both axes logarithmic."""
+    f, density = finite(data["f"], data["S"])
+    rows = [(a, b) for a, b in zip(f, density, strict=True) if a > 0 and b > 0]
+    if len(rows) < 2:
+        return ""
+    f, density = envelope([r[0] for r in rows], [r[1] for r in rows])
+    fig, axes = figure(HALF, 62)
+    ax = axes[0, 0]
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.plot(f, density, "-", color=BLUE, linewidth=1.0)
+    ax.set_xlabel(axis_label("frequency", data.get("f_unit", "Hz")))
+    ax.set_ylabel(axis_label("density", data.get("unit", "")))
+    plain_log(ax, max(density) / min(density))
+    return svg(fig, key)
+
+
+def plain_log(ax: Any, ratio: float) -> None:
+    """Decades as plain numbers or powers of ten; 2 and 5 between them where the axis is short."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    from .numbers import write_number
+
+    low, high = ax.get_xlim()
+    for axis, span in ((ax.xaxis, high / low), (ax.yaxis, ratio)):
+        axis.set_major_locator(LogLocator(subs=(1.0,) if span > 200 else (1.0, 3.0) if span > 15 else (1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: str) -> str:
+    """Correlation of the estimates, lower triangle, in hundredths."""
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.patches import Rectangle
+
+    n = len(names)
+    if n < 2 or len(matrix) != n:
+        return ""
+    colours = LinearSegmentedColormap.from_list("signed", [VERMILION, "#fefefe", BLUE])
+    side = min(WIDE, max(HALF, (30 + 9 * n) / 25.4))
+    fig, axes = figure(side, 14 + 6.4 * n)
+    ax = axes[0, 0]
+    ax.grid(False)
+    for i in range(1, n):
+        for j in range(i):
+            r = matrix[i][j]
+            if r is None:
+                continue
+            face = colours(0.5 + 0.5 * max(-1.0, min(1.0, r)))
+            ax.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, facecolor=face, edgecolor="none"))
+            dark = 0.299 * face[0] + 0.587 * face[1] + 0.114 * face[2] < 0.52
+            text = f"{r:.2f}".replace("-", "−") if abs(r) >= 0.005 else "0"
+            ax.text(j, i, text, ha="center", va="center", color="#fffffe" if dark else "#000001", fontsize=8)
+    ax.set_xlim(-0.5, n - 1.5)
+    ax.set_ylim(n - 0.5, 0.5)
+    ax.set_xticks(range(n - 1), [short(m, 14) for m in names[:-1]], rotation=0 if max(map(len, names)) < 6 else 40)
+    for label in ax.get_xticklabels():
+        if label.get_rotation():
+            label.set_ha("right")
+    ax.set_yticks(range(1, n), [short(m, 22) for m in names[1:]])
+    return svg(fig, key)
+
+
+def scores(names: Sequence[str], z: Sequence[float], k: Sequence[float], key: str) -> str:
+    """(estimate - truth) / u of each coefficient with the band in which 95 % should lie."""
+    rows = [(n, v, w) for n, v, w in zip(names, z, k, strict=True) if v is not None and w is not None]
+    if not rows:
+        return ""
+    fig, axes = figure(HALF, 14 + 6.4 * len(rows))
+    ax = axes[0, 0]
+    y = range(len(rows))
+    for i, (_, _, w) in enumerate(rows):
+        ax.fill_betweenx([i - 0.5, i + 0.5], -w, w, color=GREEN, alpha=0.2, linewidth=0)
+    ax.axvline(0.0, color=INK, linestyle="--", linewidth=0.9)
+    ax.plot([r[1] for r in rows], y, "o", color=BLUE, markersize=4, markeredgewidth=0)
+    ax.set_yticks(list(y), [short(r[0], 18) for r in rows])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    reach = max(3.0, 1.1 * max(abs(r[1]) for r in rows))
+    ax.set_xlim(-reach, reach)
+    ax.set_xlabel("(estimate − truth) / u")
+    return svg(fig, key)
+
+
+def strip(ax: Any, names: Sequence[str], values: Sequence[tuple[float, float, float]], unit: str, title: str) -> None:
+    """Points with intervals, one row per run, on one axis (comparison reports)."""
+    for i, (value, low, high) in enumerate(values):
+        ax.plot([low, high], [i, i], "-", color=BLUE, linewidth=1.0)
+        ax.plot([value], [i], MARKERS[i % len(MARKERS)], color=BLUE, markersize=4, markeredgewidth=0)
+    ax.axvline(values[0][0], color=MUTED, linestyle="--", linewidth=0.8)
+    ax.set_yticks(range(len(names)), [short(n, 22) for n in names])
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.set_xlabel(axis_label(title, unit))

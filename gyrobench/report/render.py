@@ -1,0 +1,102 @@
+"""The two renderers: HTML by jinja2, PDF by Typst.  Both draw the same :class:`Page`."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .blocks import Equation, Page, walk
+from .content import read_content
+from .style import clean_svg, themed
+
+
+def equations(page: Page) -> None:
+    """Typeset the equations of a page; one that Typst does not understand stays without picture."""
+    for section in page.sections:
+        for k, block in enumerate(b for b in walk(section.blocks) if isinstance(b, Equation)):
+            block.svg = equation_svg(block.source, f"equation-{section.slug}-{k}")
+
+
+def equation_svg(source: str, key: str) -> str:
+    """Typst math as an SVG in the colour of the text; "" when it cannot be read."""
+    import typst
+
+    data = json.dumps({"equation": source}).encode()
+    main = (
+        "#set page(width: auto, height: auto, margin: 1pt, fill: none)\n#set text(size: 12pt)\n"
+        '#math.equation(block: true, eval(json("data.json").equation, mode: "math"))'
+    )
+    try:
+        drawn = typst.compile({"main.typ": main.encode(), "data.json": data}, format="svg", ignore_system_fonts=True)
+    except (RuntimeError, typst.TypstError):
+        return ""
+    text = drawn[0] if isinstance(drawn, list) else drawn
+    return clean_svg(text.decode(), key).replace("#000000", "currentColor")
+
+
+def html(page: Page, bench: Path | None = None) -> str:
+    """The page as one self-contained HTML file."""
+    import jinja2
+
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(read_content("report.html.j2", bench))
+    data = asdict(page)
+    for section in data["sections"]:
+        for block in section["blocks"]:
+            _theme(block)
+    css = jinja2.utils.markupsafe.Markup(read_content("report.css", bench))
+    script = jinja2.utils.markupsafe.Markup(read_content("zoom.js", bench))
+    return template.render(page=_Attributes.of(data), css=css, script=script)
+
+
+def pdf(page: Page, bench: Path | None = None) -> bytes:
+    """The page as a PDF (A4, searchable text, vector figures)."""
+    import matplotlib
+    import typst
+
+    data = asdict(page)
+    files: dict[str, bytes] = {"main.typ": read_content("report.typ", bench).encode()}
+    for picture in page.pictures:
+        files[f"figures/{picture.key}.svg"] = picture.svg.encode()
+    data.pop("pictures")
+    for section in data["sections"]:
+        for block in section["blocks"]:
+            _strip(block)
+    files["data.json"] = json.dumps(data, ensure_ascii=False).encode()
+    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    made: bytes = typst.compile(files, ignore_system_fonts=True, font_paths=[str(fonts)])
+    return made
+
+
+def _theme(block: dict[str, Any]) -> None:
+    for picture in block.get("items", []) if block["kind"] == "pictures" else []:
+        picture["svg"] = themed(picture["svg"])
+    for inner in block.get("blocks", []):
+        _theme(inner)
+
+
+def _strip(block: dict[str, Any]) -> None:
+    """Typst reads the figures from files; it needs their width in pt beside."""
+    if block["kind"] == "equation":
+        block["svg"] = "typeset" if block["svg"] else ""
+    for picture in block.get("items", []) if block["kind"] == "pictures" else []:
+        match = re.search(r'width="([\d.]+)pt"', picture.pop("svg"))
+        picture["width"] = float(match.group(1)) if match else 480.0
+    for inner in block.get("blocks", []):
+        _strip(inner)
+
+
+class _Attributes(dict[str, Any]):
+    """A dictionary whose keys win over dict methods in templates (``block.items`` is the list)."""
+
+    def __getattribute__(self, name: str) -> Any:
+        return self[name] if name in self else super().__getattribute__(name)
+
+    @classmethod
+    def of(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            return cls({k: cls.of(v) for k, v in value.items()})
+        return [cls.of(v) for v in value] if isinstance(value, list | tuple) else value

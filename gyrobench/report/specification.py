@@ -1,0 +1,90 @@
+"""Acceptance specifications: TOML files with a limit per coefficient, in the unit of the report.
+
+    title = "Acceptance of the standard floated gyro"
+
+    [coefficients.D_I]
+    unit = "°/h/g"
+    min = -1.5
+    max = 1.5
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+Limits = dict[str, tuple[float | None, float | None]]
+
+_UNITS = {"deg/h": "°/h", "deg/h/g": "°/h/g", "deg/h/g2": "°/h/g²", "deg/h/g^2": "°/h/g²"}
+
+
+class SpecificationError(ValueError):
+    """An acceptance specification that cannot be used; says file, entry and what would be right."""
+
+
+def surface_unit(unit: str) -> str:
+    """The report's spelling of a unit: "deg/h/g2" is "°/h/g²"."""
+    return _UNITS.get(unit, unit)
+
+
+def load_specification(path: str | Path) -> Limits:
+    """Limits by coefficient name, ``(low, high)`` in surface units; None where a side is open.
+
+    Raises SpecificationError for a file that is no TOML, an unknown key, a missing unit, a limit that
+    is no finite number, limits in the wrong order or an entry without a limit; FileNotFoundError when
+    there is no file.  Whether the unit is that of the reported coefficient is checked by
+    :func:`check_units` once the coefficients are known.
+    """
+    return {name: (entry.get("min"), entry.get("max")) for name, entry in _entries(Path(path)).items()}
+
+
+def check_units(path: str | Path, units: dict[str, str]) -> None:
+    """Raise SpecificationError when an entry names no reported coefficient, or another unit than reported.
+
+    ``units`` maps coefficient names to the units of the report.
+    """
+    for name, entry in _entries(Path(path)).items():
+        if name not in units:
+            known = ", ".join(units)
+            raise SpecificationError(f"{path}: no coefficient {name!r} in this result; there are {known}")
+        if surface_unit(entry["unit"]) != surface_unit(units[name]):
+            raise SpecificationError(f"{path}: {name} is given in {entry['unit']!r}; the report uses {units[name]!r}")
+
+
+def _entries(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SpecificationError(f"{path}: not a TOML file: {error}") from error
+    unknown = set(data) - {"title", "note", "coefficients"}
+    if unknown:
+        raise SpecificationError(f"{path}: unknown key {sorted(unknown)[0]!r}; allowed are title, note, coefficients")
+    entries = data.get("coefficients")
+    if not isinstance(entries, dict) or not entries:
+        raise SpecificationError(f"{path}: no [coefficients.NAME] table; each gives unit and min, max or both")
+    for name, entry in entries.items():
+        _check(path, name, entry)
+    return entries
+
+
+def _check(path: Path, name: str, entry: Any) -> None:
+    where = f"{path}: [coefficients.{name}]"
+    if not isinstance(entry, dict):
+        raise SpecificationError(f"{where} must be a table with unit and min, max or both")
+    unknown = set(entry) - {"unit", "min", "max", "note"}
+    if unknown:
+        raise SpecificationError(f"{where}: unknown key {sorted(unknown)[0]!r}; allowed are unit, min, max, note")
+    if not isinstance(entry.get("unit"), str) or not entry["unit"]:
+        raise SpecificationError(f"{where}: unit is missing, for example unit = \"°/h\"")
+    for side in ("min", "max"):
+        value = entry.get(side)
+        if side in entry and (isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value)):
+            raise SpecificationError(f"{where}: {side} must be a finite number, not {value!r}")
+        if side in entry:
+            entry[side] = float(entry[side])
+    if "min" not in entry and "max" not in entry:
+        raise SpecificationError(f"{where}: neither min nor max")
+    if "min" in entry and "max" in entry and entry["min"] >= entry["max"]:
+        raise SpecificationError(f"{where}: min {entry['min']} is not below max {entry['max']}")

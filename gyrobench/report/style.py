@@ -1,0 +1,202 @@
+"""The look of the figures, and the way from a matplotlib figure to a clean SVG.
+
+Colours are Okabe-Ito; a line style or a marker is always the second cue.  Text is drawn as outlines,
+so that a figure looks the same on every machine.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+MM = 1.0 / 25.4
+WIDE = 170 * MM  # the text width of A4, inch
+HALF = 82 * MM
+
+INK = "#1f2328"  # text, axes
+MUTED = "#5b6168"  # second text
+GRID = "#d5d9de"
+BLUE = "#0072b2"
+VERMILION = "#d55e00"
+GREEN = "#009e73"
+PURPLE = "#cc79a7"
+ORANGE = "#e69f00"
+SKY = "#56b4e9"
+SHADE = "#eef1f4"
+CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+MARKERS = "os^Dv<"
+
+# in HTML the neutral colours follow the reader's light or dark setting
+THEMED = {
+    INK: "var(--ink)",
+    MUTED: "var(--muted)",
+    GRID: "var(--grid)",
+    SHADE: "var(--shade)",
+    BLUE: "var(--blue)",
+    VERMILION: "var(--vermilion)",
+    GREEN: "var(--green)",
+    PURPLE: "var(--purple)",
+}
+
+_RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.spines.left": False,
+    "axes.spines.bottom": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.5,
+    "xtick.major.size": 0.0,
+    "ytick.major.size": 0.0,
+    "xtick.minor.size": 0.0,
+    "ytick.minor.size": 0.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.titlelocation": "left",
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 6),
+    "axes.unicode_minus": True,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 3.0,
+    "hatch.linewidth": 0.6,
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
+    "svg.hashsalt": "gyrobench",
+    "svg.fonttype": "path",
+    "path.simplify": True,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Matplotlib with the report's style; the caller's settings come back afterwards."""
+    import matplotlib
+
+    with matplotlib.rc_context(_RC):
+        yield
+
+
+def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
+    """A figure without a window, and its axes (an array of two dimensions)."""
+    from matplotlib.figure import Figure
+
+    fig = Figure(figsize=(width, height_mm * MM), layout="constrained")
+    fig.get_layout_engine().set(w_pad=0.02, h_pad=0.02)
+    fig.patch.set_visible(False)
+    axes = fig.subplots(squeeze=False, **grid)
+    for ax in axes.flat:
+        ax.patch.set_visible(False)
+    return fig, axes
+
+
+def svg(fig: Any, key: str) -> str:
+    """The figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own."""
+    buffer = io.StringIO()
+    fig.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return clean_svg(buffer.getvalue(), key)
+
+
+def clean_svg(text: str, key: str) -> str:
+    """Strip prologue, metadata, comments and global style; make ids unique; round coordinates."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.S)
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.S)
+    text = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", text, flags=re.S)
+    text = re.sub(r'\bid="', f'id="{key}-', text)
+    text = re.sub(r'href="#', f'href="#{key}-', text)
+    text = re.sub(r"url\(#", f"url(#{key}-", text)
+    text = re.sub(r"(?<![\d(])(\d+\.\d\d)\d+", r"\1", text)  # not in "scale(0.015625)"
+    text = re.sub(r"\n\s*", "\n", text)
+    return text.replace("<svg ", '<svg stroke-linejoin="round" ', 1)
+
+
+def themed(svg_text: str) -> str:
+    """The SVG with neutral colours replaced by the page's CSS variables."""
+    for colour, variable in THEMED.items():
+        svg_text = svg_text.replace(colour, variable)
+    return svg_text
+
+
+def axis_label(name: str, unit: str) -> str:
+    """"drift rate / (°/h)", "table angle / °", "share / 1"."""
+    unit = unit or "1"
+    return f"{name} / ({unit})" if "/" in unit else f"{name} / {unit}"
+
+
+def zero_line(ax: Any) -> None:
+    ax.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
+
+
+def degree_ticks(ax: Any, unit: str) -> None:
+    """Ticks at 0, 90, 180 ... where the axis is an angle of about one turn or more."""
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = ax.get_xlim()
+    if unit == "°" and high - low > 150.0:
+        turns = (high - low) / 360.0
+        ax.xaxis.set_major_locator(MultipleLocator(90.0 if turns < 2.5 else 360.0 * max(1, round(turns / 6))))
+
+
+def time_axis(seconds: Sequence[float]) -> tuple[float, str]:
+    """Divisor and unit in which a time span is readable: s, min, h or d."""
+    span = (max(seconds) - min(seconds)) if len(seconds) else 0.0
+    for limit, divisor, unit in ((300.0, 1.0, "s"), (2 * 3600.0, 60.0, "min"), (72 * 3600.0, 3600.0, "h")):
+        if span <= limit:
+            return divisor, unit
+    return 86400.0, "d"
+
+
+def envelope(x: Sequence[float], y: Sequence[float], buckets: int = 1500) -> tuple[list[float], list[float]]:
+    """Min-max envelope of a long record: every bucket keeps its smallest and its largest sample, in order.
+
+    Records of at most ``4 * buckets`` samples come back whole.  No extreme is ever lost.
+    """
+    import numpy as np
+
+    xs, ys = np.asarray(x, float), np.asarray(y, float)
+    if len(xs) <= 4 * buckets:
+        return xs.tolist(), ys.tolist()
+    keep: list[int] = []
+    for part in np.array_split(np.arange(len(xs)), buckets):
+        finite = part[np.isfinite(ys[part])]
+        if len(finite):
+            keep += sorted({int(finite[np.argmin(ys[finite])]), int(finite[np.argmax(ys[finite])])})
+    return xs[keep].tolist(), ys[keep].tolist()
+
+
+def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
+    """Shade every second span of the x axis and write its label above, in rows so that none overlap."""
+    fig = ax.figure
+    fig.draw_without_rendering()
+    renderer = fig.canvas.get_renderer() if hasattr(fig.canvas, "get_renderer") else None
+    low, high = ax.get_xlim()
+    width = ax.get_window_extent(renderer).width
+    ends: list[float] = []
+    for k, (start, end, label) in enumerate(spans):
+        if k % 2 == 0:
+            ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
+        text = ax.annotate(label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED)
+        size = text.get_window_extent(renderer).width
+        left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size
+        left = min(max(left, 0.0), max(width - size, 0.0))
+        row = next((r for r, e in enumerate(ends) if e + 6 < left), len(ends))
+        if row == len(ends):
+            ends.append(0.0)
+        ends[row] = left + size
+        text.xy = (left / width, 1.0)
+        text.set_position((left / width, 1.0))
+        text.xyann = (left / width, 1.02 + row * 12.0 / max(ax.get_window_extent(renderer).height * 72 / fig.dpi, 1))

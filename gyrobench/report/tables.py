@@ -1,0 +1,164 @@
+"""Tables of whatever a reduction or a record delivers: dictionaries, lists of rows, parameters, parts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .blocks import Cell, Column, Fold, Row, Table, Text, number_cell, text_cell
+from .document import look
+from .numbers import write_number
+
+# endings of names that tell the unit, longest first
+_UNITS = {
+    "_deg_per_h_per_g2": "°/h/g²",
+    "_deg_per_h_per_g": "°/h/g",
+    "_deg_per_sqrt_h": "°/√h",
+    "_deg_per_h": "°/h",
+    "_rad_per_s": "rad/s",
+    "_m_per_s2": "m/s²",
+    "_deg": "°",
+    "_rad": "rad",
+    "_mA": "mA",
+    "_Hz": "Hz",
+    "_min": "min",
+    "_s": "s",
+    "_h": "h",
+    "_m": "m",
+}
+
+
+def words(key: str) -> tuple[str, str]:
+    """A field name as words and its unit: ``sigma_deg_per_h`` is ("sigma", "°/h")."""
+    for ending, unit in _UNITS.items():
+        if key.endswith(ending) and len(key) > len(ending):
+            return key[: -len(ending)].replace("_", " "), unit
+    return key.replace("_", " "), ""
+
+
+def heading(text: str) -> Row:
+    return Row([], group=text)
+
+
+def limit_text(limit: Sequence[float | None] | None) -> str:
+    """ "−1.5 … 1.5", "≥ −1.5", "≤ 1.5", or a dash."""
+    low, high = limit if limit is not None else (None, None)
+    if low is None and high is None:
+        return "–"
+    if low is None:
+        return f"≤ {write_number(high, significant=6).text}"
+    if high is None:
+        return f"≥ {write_number(low, significant=6).text}"
+    return f"{write_number(low, significant=6).text} … {write_number(high, significant=6).text}"
+
+
+def generic(doc: Any, path: tuple[str | int, ...], caption: str) -> list[Any]:
+    """Blocks for any JSON value: rows of a table for a list of dictionaries, name and value for a dictionary."""
+    value = look(doc, *path)
+    if not value:
+        return []
+    if isinstance(value, str):
+        return [Text(value)]
+    if isinstance(value, Mapping):
+        nested = {k: v for k, v in value.items() if isinstance(v, Mapping) or _is_rows(v)}
+        flat = [k for k in value if k not in nested]
+        blocks: list[Any] = []
+        if flat:
+            rows = []
+            for k in flat:
+                name, unit = words(k)
+                rows.append(Row([text_cell(name), _cell(doc, (*path, k)), text_cell(unit)]))
+            blocks.append(Table([Column("quantity"), Column("value", wide=True), Column("unit")], rows, caption))
+        for k in nested:
+            blocks += generic(doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if flat or len(nested) > 1 else caption)
+        return blocks
+    if _is_rows(value):
+        keys = list(dict.fromkeys(k for row in value for k in row))
+        rows = [Row([_cell(doc, (*path, i, k)) for k in keys]) for i in range(len(value))]
+        return [Table([Column(*words(k)) for k in keys], rows, caption)]
+    return [Text(f"{caption.rstrip('.')}: {_compact(value)}.")]
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) for v in value)
+
+
+def _cell(doc: Any, path: tuple[str | int, ...]) -> Cell:
+    value = look(doc, *path)
+    if isinstance(value, bool):
+        return text_cell("yes" if value else "no")
+    if isinstance(value, int | float) or value is None:
+        return number_cell(doc, path)
+    return text_cell(value if isinstance(value, str) else _compact(value))
+
+
+def _compact(value: Any, length: int = 72) -> str:
+    text = json.dumps(value, ensure_ascii=False, separators=(", ", ": "))
+    if len(text) <= length:
+        return text
+    count = f" ({len(value)} entries, all in result.json)" if isinstance(value, list | dict) else ""
+    return f"{text[:length]}…{count}"
+
+
+def how_tables(doc: Any) -> list[Any]:
+    """Parts, parameters, run and versions."""
+    run = doc["provenance"]
+    blocks: list[Any] = []
+    if isinstance(run.get("parts"), Mapping) and run["parts"]:
+        rows = []
+        for slot, part in run["parts"].items():
+            part = part if isinstance(part, Mapping) else {"name": part}
+            rows.append(
+                Row(
+                    [
+                        text_cell(slot, "strong"),
+                        text_cell(part.get("name")),
+                        text_cell(part.get("version")),
+                        text_cell(" ".join(str(part[k]) for k in ("target",) if part.get(k))),
+                        text_cell(part.get("fmi")),
+                        number_cell(doc, ("provenance", "timing", slot), significant=3),
+                        Cell(str(part.get("sha256") or "–"), mark="hash"),
+                    ]
+                )
+            )
+        heads = (("slot", ""), ("part", ""), ("version", ""), ("target", ""), ("FMI", ""), ("time", "s"), ("SHA-256", ""))
+        columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
+        blocks.append(Table(columns, rows, "Parts in their slots, with the time spent in each.", small=True))
+    blocks += _parameters(doc)
+    facts = {k: run[k] for k in ("seed", "step", "engine", "complete", "stopped_at") if run.get(k) is not None}
+    if facts:
+        units = {"step": "s", "stopped_at": "s"}
+        rows = [Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k)), text_cell(units.get(k, ""))]) for k in facts]
+        for extra in run.get("options") or {}:
+            name, unit = words(str(extra))
+            rows.append(Row([text_cell(name), _cell(doc, ("provenance", "options", extra)), text_cell(unit)]))
+        blocks.append(Table([Column("run"), Column("value", wide=True), Column("unit")], rows, "How the run was made."))
+    if run.get("versions"):
+        rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
+        blocks.append(Fold("Package versions", [Table([Column("package"), Column("version", wide=True)], rows, "Package versions.", small=True)]))
+    return blocks
+
+
+def _parameters(doc: Any) -> list[Any]:
+    run = doc["provenance"]
+    parameters = run.get("parameters") or {}
+    if not isinstance(parameters, Mapping):
+        return []
+    changed = [str(c) for c in (run.get("changed") or [])]
+    columns = [Column("parameter"), Column("value (SI)", wide=True)]
+
+    def table(names: list[str], caption: str) -> Table:
+        rows = [Row([text_cell(n), _cell(doc, ("provenance", "parameters", n))]) for n in names]
+        return Table([Column(c.head, wide=c.wide) for c in columns], rows, caption, small=True)
+
+    mine = [n for n in changed if n in parameters]
+    others = [n for n in parameters if n not in changed]
+    blocks: list[Any] = []
+    if mine:
+        blocks.append(table(mine, "Parameters that were changed, in SI units."))
+    elif parameters:
+        blocks.append(Text("No parameter was changed: every part ran with its defaults."))
+    if others:
+        blocks.append(Fold(f"Defaults ({len(others)} parameters)", [table(others, "Parameters left at their defaults, in SI units.")]))
+    return blocks
