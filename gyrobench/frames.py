@@ -31,7 +31,7 @@ __all__ = [
     "earth_rate_local",
     "normal_gravity",
     "passive_z",
-    "polar_table",
+    "polar_base",
     "pole",
     "rotation",
     "to_face",
@@ -133,7 +133,7 @@ def check_rotation(matrix: ArrayLike, name: str, tolerance: float = 1e-9) -> Arr
     return c
 
 
-def polar_table(latitude: float) -> Array:
+def polar_base(latitude: float) -> Array:
     """Base matrix of a table with its axis on the pole: rows x_T = E, y_T = p x E, z_T = p at angle 0."""
     p = pole(check_latitude(latitude))
     return np.array([E, np.cross(p, E), p])
@@ -142,12 +142,12 @@ def polar_table(latitude: float) -> Array:
 def tumble_faces(latitude: float) -> dict[str, Array]:
     """The four attitudes of the single-axis tumble, rows I, O, S in table axes at angle 0.
 
-    ``mount1``, ``mount2``: output axis along +pole and -pole, input axis east.  ``static3``, ``static4``:
+    ``mount 1``, ``mount 2``: output axis along +pole and -pole, input axis east.  ``static 3``, ``static 4``:
     input axis east, output axis up and down (these two depend on latitude because the table axis does).
     """
-    base = polar_table(latitude)
+    base = polar_base(latitude)
     up, down = np.array([E, U, np.cross(E, U)]), np.array([E, -U, np.cross(E, -U)])
-    return {"mount1": MOUNTS[1], "mount2": MOUNTS[2], "static3": up @ base.T, "static4": down @ base.T}
+    return {"mount 1": MOUNTS[1], "mount 2": MOUNTS[2], "static 3": up @ base.T, "static 4": down @ base.T}
 
 
 def to_face(vector: ArrayLike, face: ArrayLike, base: ArrayLike, angle: float) -> Array:

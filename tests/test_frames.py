@@ -27,9 +27,7 @@ def test_gravity_at_height_keeps_its_stated_error() -> None:
             exact = float(boule.WGS84.normal_gravity((0.0, lat, h), si_units=True))
             assert abs(frames.normal_gravity(math.radians(lat), h) - exact) < 1.1e-10 * abs(h) + 1e-11
     # the quadratic term: second difference 6 g h2/a2
-    second = (
-        frames.normal_gravity(0.8, 1e4) + frames.normal_gravity(0.8, -1e4) - 2 * frames.normal_gravity(0.8)
-    )
+    second = frames.normal_gravity(0.8, 1e4) + frames.normal_gravity(0.8, -1e4) - 2 * frames.normal_gravity(0.8)
     assert second == pytest.approx(6 * 9.806 * (1e4 / 6378137.0) ** 2, rel=1e-3)
 
 
@@ -46,15 +44,13 @@ def test_pole_and_earth_rate() -> None:
 
 
 @pytest.mark.parametrize("lat", LATS)
-def test_polar_table(lat: float) -> None:
-    base = frames.check_rotation(frames.polar_table(lat), "base")
+def test_polar_base(lat: float) -> None:
+    base = frames.check_rotation(frames.polar_base(lat), "base")
     c, s = math.cos(lat), math.sin(lat)
     assert base[0] == pytest.approx(E)
     assert base[1] == pytest.approx([0.0, s, -c])  # p x E
     assert base[2] == pytest.approx([0.0, c, s])
-    assert frames.to_face(frames.earth_rate_local(lat), np.eye(3), base, 1.234) == pytest.approx(
-        [0, 0, 7.2921159e-5]
-    )
+    assert frames.to_face(frames.earth_rate_local(lat), np.eye(3), base, 1.234) == pytest.approx([0, 0, 7.2921159e-5])
 
 
 @pytest.mark.parametrize("lat", LATS)
@@ -62,16 +58,16 @@ def test_tumble_geometry(lat: float) -> None:
     """[TUM1-GEOM] gamma = (-c sin t, -s, -c cos t), (-c sin t, s, c cos t), (0, -1, 0), (0, 1, 0), t =
     -angle.
     """
-    base, c, s = frames.polar_table(lat), math.cos(lat), math.sin(lat)
+    base, c, s = frames.polar_base(lat), math.cos(lat), math.sin(lat)
     faces = frames.tumble_faces(lat)
     for name, face in faces.items():
         frames.check_rotation(face, name)
     for theta in np.linspace(0, 6, 7):
-        gamma = {n: frames.to_face(-U, faces[n], base, -theta) for n in ("mount1", "mount2")}
-        assert gamma["mount1"] == pytest.approx([-c * math.sin(theta), -s, -c * math.cos(theta)])
-        assert gamma["mount2"] == pytest.approx([-c * math.sin(theta), s, c * math.cos(theta)])
-    assert frames.to_face(-U, faces["static3"], base, 0.0) == pytest.approx([0, -1, 0])
-    assert frames.to_face(-U, faces["static4"], base, 0.0) == pytest.approx([0, 1, 0])
+        gamma = {n: frames.to_face(-U, faces[n], base, -theta) for n in ("mount 1", "mount 2")}
+        assert gamma["mount 1"] == pytest.approx([-c * math.sin(theta), -s, -c * math.cos(theta)])
+        assert gamma["mount 2"] == pytest.approx([-c * math.sin(theta), s, c * math.cos(theta)])
+    assert frames.to_face(-U, faces["static 3"], base, 0.0) == pytest.approx([0, -1, 0])
+    assert frames.to_face(-U, faces["static 4"], base, 0.0) == pytest.approx([0, 1, 0])
     for face in faces.values():  # input axis east: no Earth rate at angle 0
         assert frames.to_face(frames.earth_rate_local(lat), face, base, 0.0)[0] == pytest.approx(0, abs=1e-20)
 
