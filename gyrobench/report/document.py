@@ -41,7 +41,7 @@ def document(result: Result) -> dict[str, Any]:
     """The content of ``result.json``: the result, ``derived``, ``schema`` and ``report_id``."""
     content = plain(result.as_dict())
     content["derived"] = _derived(content)
-    return {"schema": SCHEMA, "report_id": _hash(content), **content}
+    return {"schema": SCHEMA, "report_id": content_hash(content), **content}
 
 
 def report_id(result: Result) -> str:
@@ -74,7 +74,8 @@ def look(doc: Any, *path: str | int) -> Any:
     return doc
 
 
-def _hash(content: dict[str, Any]) -> str:
+def content_hash(content: dict[str, Any]) -> str:
+    """Ten hexadecimal digits of the SHA-256 of JSON content."""
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:10]
 

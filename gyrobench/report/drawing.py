@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .plots import short
-from .style import BLUE, CYCLE, GREEN, INK, MM, MUTED, ORANGE, PURPLE, SKY, VERMILION, WIDE, axis_label, figure, svg
+from .style import BLUE, GREEN, INK, ORANGE, PAPER, PURPLE, SKY, VERMILION, WIDE, axis_label, figure, svg
 
 _HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo")
 
@@ -110,7 +110,7 @@ def system(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str
 
     A wire below the diagonal carries the value of the step before: it is drawn dashed.
     """
-    from matplotlib.patches import FancyBboxPatch
+    from matplotlib.patches import Rectangle
 
     wires = [w for w in wires_of(provenance) if w[0] in order and w[2] in order]
     n = len(order)
@@ -140,14 +140,9 @@ def system(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str
             j, middle[i], "\n".join(short(m, 17) for m in names), ha="center", va="center", fontsize=7.5,
             color=INK, linespacing=1.15, zorder=3,
         )  # fmt: skip
-        text.set_bbox({"facecolor": "#fdfdfd", "edgecolor": "none", "pad": 1.2})
+        text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 1.2})
     for row, name in enumerate(order):
-        ax.add_patch(
-            FancyBboxPatch(
-                (row - 0.42, middle[row] - 0.75), 0.84, 1.5, boxstyle="round,pad=0,rounding_size=0.12",
-                facecolor="#fdfdfd", edgecolor=INK, linewidth=1.0, zorder=4, mutation_aspect=4.0 / (WIDE / MM / n),
-            )  # fmt: skip
-        )
-        ax.text(row, middle[row] - 0.28, str(row + 1), ha="center", va="center", fontsize=7.5, color=MUTED, zorder=5)
-        ax.text(row, middle[row] + 0.3, short(name, 18), ha="center", va="center", color=INK, zorder=5)
+        box = Rectangle((row - 0.42, middle[row] - 0.7), 0.84, 1.4, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=4)
+        ax.add_patch(box)
+        ax.text(row, middle[row], f"{row + 1}  {short(name, 14)}", ha="center", va="center", color=INK, zorder=5)
     return svg(fig, key)

@@ -8,6 +8,7 @@ from typing import Any
 
 from .style import (
     BLUE,
+    CYCLE,
     GREEN,
     HALF,
     INK,
@@ -62,7 +63,7 @@ def fit(series: Sequence[Json], key: str, everything: Sequence[Json]) -> str:
     for k, s in enumerate(series):
         top, bottom = axes[0, k], axes[1, k]
         x, y = finite(s["x"], s["y"])
-        top.plot(x, y, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
+        top.plot(x, y, "o", color=BLUE, markersize=2.8, markeredgewidth=0, zorder=3)
         fx, fy = finite(*((s["shown_fit_x"], s["shown_fit_y"]) if s["shown_fit_x"] else (s["x"], s["fit"])))
         order = sorted(range(len(fx)), key=lambda i, fx=fx: fx[i])  # type: ignore[misc]
         top.plot([fx[i] for i in order], [fy[i] for i in order], "-", color=VERMILION)
@@ -105,7 +106,7 @@ def residuals_in_time(series: Sequence[Json], key: str) -> str:
     ax.set_ylabel(axis_label("residual", series[0]["y_unit"]))
     ax.margins(x=0.01)
     span_labels(ax, spans)
-    return svg(fig, key)
+    return svg(fig, key, zoom=ax)
 
 
 def channels(record: Json, name: str, label: str, unit: str, key: str) -> str:
@@ -120,7 +121,7 @@ def channels(record: Json, name: str, label: str, unit: str, key: str) -> str:
     axes[0, 0].set_xlabel(axis_label("time", time_unit))
     axes[0, 0].set_ylabel(axis_label(label, unit))
     axes[0, 0].margins(x=0.01)
-    return svg(fig, key)
+    return svg(fig, key, zoom=axes[0, 0])
 
 
 def acf(data: Json, key: str) -> str:
@@ -277,12 +278,17 @@ def scores(names: Sequence[str], z: Sequence[float], k: Sequence[float], key: st
     return svg(fig, key)
 
 
-def strip(ax: Any, names: Sequence[str], values: Sequence[tuple[float, float, float]], unit: str, title: str) -> None:
-    """Points with intervals, one row per run, on one axis (comparison reports)."""
+def strip(
+    ax: Any, names: Sequence[str], values: Sequence[tuple[float, float, float]], unit: str, title: str, baseline: float | None
+) -> None:
+    """Estimates with intervals, one row per run, on one axis; dashed the baseline (comparison reports)."""
+    if baseline is not None:
+        ax.axvline(baseline, color=MUTED, linestyle="--", linewidth=0.9)
     for i, (value, low, high) in enumerate(values):
-        ax.plot([low, high], [i, i], "-", color=BLUE, linewidth=1.0)
-        ax.plot([value], [i], MARKERS[i % len(MARKERS)], color=BLUE, markersize=4, markeredgewidth=0)
-    ax.axvline(values[0][0], color=MUTED, linestyle="--", linewidth=0.8)
-    ax.set_yticks(range(len(names)), [short(n, 22) for n in names])
-    ax.set_ylim(len(names) - 0.5, -0.5)
+        colour = CYCLE[i % len(CYCLE)]
+        ax.plot([low, high], [i, i], "-", color=colour, linewidth=1.4)
+        ax.plot([value], [i], MARKERS[i % len(MARKERS)], color=colour, markersize=4.5, markeredgewidth=0)
+    ax.set_yticks(range(len(names)), [short(n, 20) for n in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.locator_params(axis="x", nbins=5)
     ax.set_xlabel(axis_label(title, unit))

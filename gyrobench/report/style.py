@@ -26,6 +26,7 @@ PURPLE = "#cc79a7"
 ORANGE = "#e69f00"
 SKY = "#56b4e9"
 SHADE = "#eef1f4"
+PAPER = "#fdfdfd"  # behind labels that cross lines
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 MARKERS = "os^Dv<"
 
@@ -35,6 +36,7 @@ THEMED = {
     MUTED: "var(--muted)",
     GRID: "var(--grid)",
     SHADE: "var(--shade)",
+    PAPER: "var(--page)",
     BLUE: "var(--blue)",
     VERMILION: "var(--vermilion)",
     GREEN: "var(--green)",
@@ -103,11 +105,18 @@ def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
     return fig, axes
 
 
-def svg(fig: Any, key: str) -> str:
-    """The figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own."""
+def svg(fig: Any, key: str, zoom: Any = None) -> str:
+    """The figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own.
+
+    ``zoom`` is the axes whose x axis the page's script may zoom; its limits are written into the element.
+    """
     buffer = io.StringIO()
     fig.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return clean_svg(buffer.getvalue(), key)
+    text = clean_svg(buffer.getvalue(), key)
+    if zoom is not None:
+        low, high = (float(v) for v in zoom.get_xlim())
+        text = text.replace("<svg ", f'<svg data-x0="{low!r}" data-x1="{high!r}" ', 1)
+    return text
 
 
 def clean_svg(text: str, key: str) -> str:
@@ -189,7 +198,7 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
     for k, (start, end, label) in enumerate(spans):
         if k % 2 == 0:
             ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
-        text = ax.annotate(label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED)
+        text = ax.annotate(label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}")
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size
         left = min(max(left, 0.0), max(width - size, 0.0))

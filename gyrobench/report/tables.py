@@ -53,8 +53,12 @@ def limit_text(limit: Sequence[float | None] | None) -> str:
     return f"{write_number(low, significant=6).text} … {write_number(high, significant=6).text}"
 
 
-def generic(doc: Any, path: tuple[str | int, ...], caption: str) -> list[Any]:
-    """Blocks for any JSON value: rows of a table for a list of dictionaries, name and value for a dictionary."""
+def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = False) -> list[Any]:
+    """Blocks for any JSON value: rows of a table for a list of dictionaries, name and value for a dictionary.
+
+    With ``by_u`` the floats of a row are rounded to the standard uncertainty that stands in the row (``u``
+    or ``u_...``).
+    """
     value = look(doc, *path)
     if not value:
         return []
@@ -69,31 +73,33 @@ def generic(doc: Any, path: tuple[str | int, ...], caption: str) -> list[Any]:
             for k in flat:
                 name, unit = words(k)
                 rows.append(Row([text_cell(name), _cell(doc, (*path, k)), text_cell(unit)]))
-            blocks.append(Table([Column("quantity"), Column("value", wide=True), Column("unit")], rows, caption))
+            blocks.append(Table([Column("quantity"), Column("value"), Column("unit")], rows, caption))
         for k in nested:
-            blocks += generic(doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if flat or len(nested) > 1 else caption)
+            blocks += generic(doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption, by_u)
         return blocks
     if _is_rows(value):
         keys = list(dict.fromkeys(k for row in value for k in row))
-        rows = [Row([_cell(doc, (*path, i, k)) for k in keys]) for i in range(len(value))]
+        us = [next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value]
+        rows = [Row([_cell(doc, (*path, i, k), us[i]) for k in keys]) for i in range(len(value))]
         return [Table([Column(*words(k)) for k in keys], rows, caption)]
-    return [Text(f"{caption.rstrip('.')}: {_compact(value)}.")]
+    return [Text(f"{caption.rstrip('.')}: {compact(value)}.")]
 
 
 def _is_rows(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) for v in value)
 
 
-def _cell(doc: Any, path: tuple[str | int, ...]) -> Cell:
+def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None) -> Cell:
     value = look(doc, *path)
     if isinstance(value, bool):
         return text_cell("yes" if value else "no")
     if isinstance(value, int | float) or value is None:
-        return number_cell(doc, path)
-    return text_cell(value if isinstance(value, str) else _compact(value))
+        return number_cell(doc, path, u)
+    return text_cell(value if isinstance(value, str) else compact(value))
 
 
-def _compact(value: Any, length: int = 72) -> str:
+def compact(value: Any, length: int = 72) -> str:
+    """A list or dictionary in one line, cut where it gets long."""
     text = json.dumps(value, ensure_ascii=False, separators=(", ", ": "))
     if len(text) <= length:
         return text
@@ -133,10 +139,10 @@ def how_tables(doc: Any) -> list[Any]:
         for extra in run.get("options") or {}:
             name, unit = words(str(extra))
             rows.append(Row([text_cell(name), _cell(doc, ("provenance", "options", extra)), text_cell(unit)]))
-        blocks.append(Table([Column("run"), Column("value", wide=True), Column("unit")], rows, "How the run was made."))
+        blocks.append(Table([Column("run"), Column("value"), Column("unit")], rows, "How the run was made."))
     if run.get("versions"):
         rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
-        blocks.append(Fold("Package versions", [Table([Column("package"), Column("version", wide=True)], rows, "Package versions.", small=True)]))
+        blocks.append(Fold("Package versions", [Table([Column("package"), Column("version")], rows, "Package versions.", small=True)]))
     return blocks
 
 
@@ -146,7 +152,7 @@ def _parameters(doc: Any) -> list[Any]:
     if not isinstance(parameters, Mapping):
         return []
     changed = [str(c) for c in (run.get("changed") or [])]
-    columns = [Column("parameter"), Column("value (SI)", wide=True)]
+    columns = [Column("parameter"), Column("value (SI)")]
 
     def table(names: list[str], caption: str) -> Table:
         rows = [Row([text_cell(n), _cell(doc, ("provenance", "parameters", n))]) for n in names]

@@ -100,7 +100,7 @@ def _answer(doc: Json) -> Answer:
                 ]
             )
         )
-    columns = [Column("requirement"), Column("estimate"), Column("U (95 %)"), Column("unit"), Column("limit"), Column("verdict")]
+    columns = [Column("requirement"), Column("estimate"), Column("U (95\N{NO-BREAK SPACE}%)"), Column("unit"), Column("limit"), Column("verdict")]
     table = Table(columns, rows, "Verdict per requirement.") if rows else None
     rule = doc["decision_rule"] if rows or doc["verdict"] != "no specification given" else ""
     return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
@@ -109,7 +109,7 @@ def _answer(doc: Json) -> Answer:
 def _coefficients(doc: Json) -> list[Any]:
     limits = any(c["limit"] is not None for c in doc["coefficients"])
     truth = any(c["truth"] is not None for c in doc["coefficients"])
-    columns = [Column("name"), Column("meaning", wide=True), Column("estimate"), Column("u"), Column("95 % from"), Column("to")]
+    columns = [Column("name"), Column("meaning", wide=True), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
     columns += [Column("truth"), Column("z")] if truth else []
     columns += [Column("limit"), Column("verdict")] if limits else []
     rows: list[Row] = []
@@ -197,14 +197,14 @@ def _residuals(doc: Json) -> list[Any]:
         Picture(
             "acf",
             plots.acf(doc["acf"], "acf") if doc["acf"] else "",
-            "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it mean correlated noise.",
+            "Autocorrelation of the residuals. Band: 95\N{NO-BREAK SPACE}% bounds for white noise; bars outside it mean correlated noise.",
             "Autocorrelation of the residuals against lag, with bounds",
             half=True,
         ),
         Picture(
             "quantiles",
             plots.quantiles(residuals, "quantiles"),
-            "Residuals against normal quantiles. On the line and inside the 95 % band: normal; bent ends: outliers.",
+            "Residuals against normal quantiles. On the line and inside the 95\N{NO-BREAK SPACE}% band: normal; bent ends: outliers.",
             "Q-Q plot of the residuals against a normal distribution",
             half=True,
         ),
@@ -236,7 +236,7 @@ def _stability(doc: Json) -> list[Any]:
         Picture(
             "allan",
             plots.allan(doc["allan"], "allan") if doc["allan"].get("tau") else "",
-            "Allan deviation with its 95 % interval. Slope −½: white noise; flat: bias instability; +½: random walk.",
+            "Allan deviation with its 95\N{NO-BREAK SPACE}% interval. Slope −½: white noise; flat: bias instability; +½: random walk.",
             "Allan deviation against averaging time, logarithmic axes",
             half=True,
         ),
@@ -260,7 +260,7 @@ def _estimates(doc: Json) -> list[Any]:
             f"{condition}. Above 100 a small error of the model makes a large one in some combination."
         )
     ]
-    columns = [Column(h) for h in ("name", "u, type A", "dof", "k", "U (95 %)", "t", "p (t)", "closed formula", "difference")]
+    columns = [Column(h) for h in ("name", "u, type A", "dof", "k", "U (95\N{NO-BREAK SPACE}%)", "t", "p (t)", "closed formula", "difference")]
     rows: list[Row] = []
     for unit in dict.fromkeys(c["unit"] for c in doc["coefficients"]):
         rows.append(heading(f"u, U, closed formula and difference in {unit}"))
@@ -278,7 +278,7 @@ def _estimates(doc: Json) -> list[Any]:
                             number_cell(doc, (*path, "t"), significant=3, trim=False),
                             number_cell(doc, (*path, "p"), write=write_p),
                             number_cell(doc, (*path, "closed"), u),
-                            number_cell(doc, ("derived", "closed_minus_estimate", k), u),
+                            number_cell(doc, ("derived", "closed_minus_estimate", k), significant=2),
                         ]
                     )
                 )
@@ -296,12 +296,12 @@ def _estimates(doc: Json) -> list[Any]:
         Picture(
             "scores",
             plots.scores(names, z, [c["k"] for c in doc["coefficients"]], "scores"),
-            "Estimates against truth in units of u. Band: ±k; 95 % of the points should lie inside.",
+            "Estimates against truth in units of u. Band: ±k; 95\N{NO-BREAK SPACE}% of the points should lie inside.",
             "Estimate minus truth over standard uncertainty, one point per coefficient",
             half=True,
         ),
     )
-    return blocks + generic(doc, ("harmonics",), "Harmonics of the record. Those the model does not hold should be noise.")
+    return blocks + generic(doc, ("harmonics",), "Harmonics of the record. Those the model does not hold should be noise.", by_u=True)
 
 
 def _repeatability(doc: Json) -> list[Any]:
@@ -338,7 +338,7 @@ def _budget(doc: Json) -> list[Any]:
                         text_cell(b["size_unit"]),
                         number_cell(doc, ("budget", k, "sensitivity"), significant=3, trim=False),
                         text_cell(b["sensitivity_unit"]),
-                        number_cell(doc, ("budget", k, "contribution"), u.get(name)),
+                        number_cell(doc, ("budget", k, "contribution"), significant=2, trim=False),
                         text_cell(b["note"]),
                     ]
                 )
@@ -409,7 +409,7 @@ def _full_values(doc: Json) -> list[Any]:
         path = ("coefficients", k)
         cells = [number_cell(doc, (*path, *p)) for p in (("estimate",), ("u",), ("interval", 0), ("interval", 1))]
         rows.append(Row([text_cell(c["name"], "strong"), *(Cell(x.full or "–", pointer=x.pointer, full=x.full) for x in cells)]))
-    columns = [Column("name"), Column("estimate"), Column("u"), Column("95 % from"), Column("to")]
+    columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
     return [Fold("All digits, as in result.json", [Table(columns, rows, "Full values of the estimates, units as in the table of coefficients.", small=True)])]
 
 
