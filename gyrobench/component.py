@@ -2,8 +2,8 @@
 
 A part is one class of declarations and equations.  The class is the single source of the plain Python
 part, the Python FMU, the native FMU (its equations translated to C), the model description and the
-linearization.  This module and ``math.py`` are all that a part needs to run: a Python FMU carries
-copies of these two files and nothing else of gyrobench.
+linearization.  This module with ``declare``, ``numerics`` and ``math`` is all that a part needs to run: a
+Python FMU carries copies of these four files and nothing else of gyrobench.
 
 Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut into
 ``n = ceil(H / step)`` equal internal steps ``h = H / n`` with the inputs held.  In each one
@@ -20,117 +20,44 @@ After the last one ``outputs`` is evaluated and everything is checked to be fini
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from statistics import NormalDist
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
+from gyrobench.declare import (
+    Declaration,
+    Discrete,
+    Input,
+    Noise,
+    Output,
+    Parameter,
+    Scalar,
+    State,
+    floats,
+    full,
+    make_layout,
+    shape_of,
+)
 from gyrobench.math import Dual
+from gyrobench.numerics import normal, phi1
 
-Shape = tuple[int, ...]
-MASK = (1 << 64) - 1
-GAMMA = 0x9E3779B97F4A7C15
-TAYLOR = 18  # terms of phi1: the first left out is below 1e-17 for a norm of 1/2
-_normal = NormalDist().inv_cdf
+__all__ = [
+    "Component",
+    "Declaration",
+    "Discrete",
+    "Input",
+    "Noise",
+    "Output",
+    "Parameter",
+    "PartError",
+    "Scalar",
+    "State",
+    "sampled",
+]
 
 
 class PartError(Exception):
     """A part refuses its parameters, its inputs, or what became of its states."""
-
-
-# ---------------------------------------------------------------------------------- declarations
-def _shape(start: Any) -> Shape:
-    return (len(start), *_shape(start[0])) if isinstance(start, list | tuple) else ()
-
-
-def _full(value: Any, shape: Shape) -> Any:
-    return [_full(value, shape[1:]) for _ in range(shape[0])] if shape else value
-
-
-def _floats(x: Any) -> Any:
-    return [_floats(e) for e in x] if isinstance(x, list | tuple) else float(x)
-
-
-class Declaration:
-    """A named quantity of a part: ``unit`` is a unit string, or ``int`` or ``bool`` for those types."""
-
-    name = ""
-
-    def __init__(
-        self,
-        start: Any,
-        unit: str | type,
-        doc: str = "",
-        *,
-        min: float | None = None,
-        max: float | None = None,
-        above: float | None = None,
-        below: float | None = None,
-    ) -> None:
-        self.start = _floats(start)
-        self.shape = _shape(start)
-        self.type: type = unit if isinstance(unit, type) else float
-        self.unit = "1" if isinstance(unit, type) else unit
-        self.doc = doc
-        self.min, self.max, self.above, self.below = min, max, above, below
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    def bound_broken(self, x: float) -> str | None:
-        """The bound that x breaks, in words; NaN breaks every bound."""
-        if not math.isfinite(x):
-            return "finite"
-        for limit, word, ok in (
-            (self.min, ">=", operator.ge),
-            (self.max, "<=", operator.le),
-            (self.above, ">", operator.gt),
-            (self.below, "<", operator.lt),
-        ):
-            if limit is not None and not ok(x, limit):
-                return f"{word} {limit:g}"
-        return None
-
-
-class Parameter(Declaration):
-    """Fixed from initialization on.  ``min``/``max`` are inclusive bounds, ``above``/``below`` exclusive."""
-
-
-class Input(Declaration):
-    """Held over a communication step."""
-
-
-class State(Declaration):
-    """Continuous; ``flow`` writes its derivative to ``self.der.<name>``."""
-
-
-class Discrete(Declaration):
-    """Changed by ``start`` and by ``@sampled`` methods only."""
-
-
-class Output(Declaration):
-    """Written by ``outputs``."""
-
-    def __init__(self, unit: str | type, doc: str = "", shape: Shape = ()) -> None:
-        super().__init__(_full(0.0, shape), unit, doc)
-
-
-class Noise(Parameter):
-    """A noise port; its size is a parameter of the same name, its sample is ``self.noise.<name>``.
-
-    ``per="second"``: white, the size is the two-sided density (unit/sqrt(Hz)); a sample is
-    ``size * xi / sqrt(h)``, so the mean over a time T has variance ``size**2 / T`` whatever the step.
-    ``per="step"``: ``size * xi``, one for each internal step.  ``per="start"``: drawn once.
-    A port of size 0 draws nothing.
-    """
-
-    def __init__(self, start: float, unit: str, doc: str = "", *, per: str = "second") -> None:
-        if per not in ("second", "step", "start"):
-            raise ValueError(f'Noise(per="{per}"): one of "second", "step", "start"')
-        super().__init__(start, unit, doc, min=0.0)
-        self.per = per
 
 
 def sampled(every: int = 1) -> Callable[[Callable[[Any], None]], Callable[[Any], None]]:
@@ -141,46 +68,6 @@ def sampled(every: int = 1) -> Callable[[Callable[[Any], None]], Callable[[Any],
         return method
 
     return mark
-
-
-# ---------------------------------------------------------------------------------------- layout
-SECTIONS = ("parameter", "input", "output", "state", "derivative", "discrete")
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """One scalar of a part: its FMI name, its place, its value reference."""
-
-    name: str  # "omega[1]", "der(b)"
-    section: str  # one of SECTIONS
-    path: tuple[Any, ...]  # ("omega", 0) or ("der", "b")
-    decl: Declaration
-    reference: int
-    start: float
-
-
-def _flat(x: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], float]]:
-    if isinstance(x, list):
-        for i, e in enumerate(x):
-            yield from _flat(e, (*path, i))
-    else:
-        yield path, x
-
-
-def _layout(decls: dict[str, Declaration]) -> list[Scalar]:
-    kind = {"parameter": Parameter, "input": Input, "output": Output, "state": State, "discrete": Discrete}
-    out: list[Scalar] = []
-    for section in SECTIONS:
-        for d in decls.values():
-            if not isinstance(d, kind.get(section, State)):
-                continue
-            derivative = section == "derivative"
-            for p, start in _flat(d.start):
-                name = d.name + ("[" + ",".join(str(i + 1) for i in p) + "]" if p else "")
-                path = ("der", d.name, *p) if derivative else (d.name, *p)
-                name = f"der({name})" if derivative else name
-                out.append(Scalar(name, section, path, d, len(out), 0.0 if derivative else start))
-    return out
 
 
 class Component:
@@ -209,7 +96,7 @@ class Component:
         for n, d in found.items():
             d.name = n
         cls.declarations = found
-        cls.layout = _layout(found)
+        cls.layout = make_layout(found)
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in found.values() if isinstance(d, Noise)]
         cls.ticks = [(n, m._every) for n, m in methods.items()]
@@ -224,9 +111,9 @@ class Component:
             if not isinstance(self.declarations.get(key), Parameter):
                 known = ", ".join(n for n, d in self.declarations.items() if isinstance(d, Parameter))
                 raise PartError(f"{self.instance}: no parameter {key!r}; it has {known}")
-            if _shape(x) != self.declarations[key].shape:
+            if shape_of(x) != self.declarations[key].shape:
                 raise PartError(f"{self.instance}: {key} has shape {self.declarations[key].shape}")
-            setattr(self, key, _floats(x))
+            setattr(self, key, floats(x))
 
     # ------------------------------------------------------------------ equations of a part
     def start(self) -> None:
@@ -284,9 +171,9 @@ class Component:
         self.der = SimpleNamespace()
         self.noise = SimpleNamespace(**{n.name: 0.0 for n in self.noises})
         for d in self.declarations.values():
-            setattr(self, d.name, _floats(d.start))
+            setattr(self, d.name, floats(d.start))
             if isinstance(d, State):
-                setattr(self.der, d.name, _floats(_full(0.0, d.shape)))
+                setattr(self.der, d.name, floats(full(0.0, d.shape)))
         self.t = self.h = 0.0
         self._tick = 0
         self._running = False
@@ -468,7 +355,6 @@ class Component:
             move(sums, dt / 6.0)
 
 
-# ------------------------------------------------------------------------------------ numerics
 def _dig(x: Any, path: tuple[Any, ...]) -> Any:
     for i in path:
         x = x[i]
@@ -477,56 +363,3 @@ def _dig(x: Any, path: tuple[Any, ...]) -> Any:
 
 def _dual(x: Any) -> Any:
     return [_dual(e) for e in x] if isinstance(x, list) else Dual(float(x))
-
-
-def _mix(z: int) -> int:
-    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & MASK
-    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & MASK
-    return z ^ (z >> 31)
-
-
-def normal(seed: int, port: int, count: int) -> float:
-    """A standard normal number that depends on its three arguments alone.
-
-    Counter-based: the SplitMix64 output function over (key + count * gamma), where the key is itself a
-    hash of seed and port; then the inverse normal distribution function (Wichura's AS 241).
-    """
-    key = _mix((_mix((seed + 1) * GAMMA & MASK) + (port + 1) * GAMMA) & MASK)
-    z = _mix((key + count * GAMMA) & MASK)
-    return _normal(((z >> 11) + 0.5) * 2.0**-53)
-
-
-def _product(a: list[list[float]], b: list[list[float]]) -> list[list[float]]:
-    n = len(a)
-    out = [[0.0] * n for _ in range(n)]
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total = total + a[i][k] * b[k][j]
-            out[i][j] = total
-    return out
-
-
-def phi1(z: list[list[float]]) -> list[list[float]]:
-    """phi1(z) = sum z^k / (k+1)!  by Taylor on z / 2^s and doubling phi1(2z) = phi1(z) (I + z phi1(z) / 2)."""
-    n = len(z)
-    norm = max(sum(abs(a) for a in row) for row in z)
-    if not norm < 1e300:
-        norm = 0.0  # not finite: found by the check of the states
-    s = 0
-    while norm > 0.5:
-        norm = norm * 0.5
-        s += 1
-    scale = 0.5**s
-    z = [[a * scale for a in row] for row in z]
-    out = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-    for k in range(TAYLOR, 1, -1):  # Horner: I + z/2 (I + z/3 (I + ...))
-        out = _product(z, out)
-        out = [[out[i][j] / k + (1.0 if i == j else 0.0) for j in range(n)] for i in range(n)]
-    for _ in range(s):
-        g = _product(z, out)
-        g = [[0.5 * g[i][j] + (1.0 if i == j else 0.0) for j in range(n)] for i in range(n)]
-        out = _product(out, g)
-        z = [[2.0 * a for a in row] for row in z]
-    return out

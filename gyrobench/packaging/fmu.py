@@ -71,7 +71,7 @@ def _tool_text() -> str:
     """All files whose text decides what a build writes."""
     here = Path(__file__).parent
     files = sorted([*here.glob("*.py"), *here.glob("*.c"), *here.glob("*.h")])
-    files += [here.parent / "component.py", here.parent / "math.py", here.parent / "units.py"]
+    files += [here.parent / f"{n}.py" for n in (*python_target.RUNTIME, "units")]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 
 

@@ -1,4 +1,4 @@
-"""The Python target: the part's own class behind pythonfmu, with a runtime of two files.
+"""The Python target: the part's own class behind pythonfmu, with a runtime of four files.
 
 pythonfmu shares ``sys.modules`` between the FMUs of a process: every file in ``resources`` therefore
 carries a name that is unique to the part and its content.  Our modelDescription replaces pythonfmu's.
@@ -13,6 +13,7 @@ from pathlib import Path
 from gyrobench.component import Component
 
 PACKAGE = Path(__file__).parent.parent
+RUNTIME = ("component", "declare", "numerics", "math")
 
 SLAVE = '''\
 """Python FMU of {cls} {version}: the plain part behind the FMI calls."""
@@ -98,12 +99,12 @@ def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
     unique = f"gb_{cls.__name__.lower()}_{guid.replace('-', '')[:12]}"
     model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
     for module in re.findall(r"^(?:from|import) gyrobench\.([\w.]+)", model, flags=re.M):
-        if module not in ("component", "math"):
+        if module not in RUNTIME:
             raise ValueError(
                 f"{inspect.getfile(cls)} imports gyrobench.{module}: a part uses gyrobench.component and "
                 "gyrobench.math only, so that its Python FMU can carry them"
             )
-    runtime = {n: (PACKAGE / f"{n}.py").read_text(encoding="utf-8") for n in ("component", "math")}
+    runtime = {n: (PACKAGE / f"{n}.py").read_text(encoding="utf-8") for n in RUNTIME}
     files = {f"{unique}/{n}.py": renamed(t, unique) for n, t in {**runtime, "model": model}.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"

@@ -1,0 +1,142 @@
+"""Declarations of a part (parameters, inputs, states ...) and their layout as a list of scalars."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+Shape = tuple[int, ...]
+
+
+def shape_of(start: Any) -> Shape:
+    return (len(start), *shape_of(start[0])) if isinstance(start, list | tuple) else ()
+
+
+def full(value: Any, shape: Shape) -> Any:
+    return [full(value, shape[1:]) for _ in range(shape[0])] if shape else value
+
+
+def floats(x: Any) -> Any:
+    return [floats(e) for e in x] if isinstance(x, list | tuple) else float(x)
+
+
+class Declaration:
+    """A named quantity of a part: ``unit`` is a unit string, or ``int`` or ``bool`` for those types."""
+
+    name = ""
+
+    def __init__(
+        self,
+        start: Any,
+        unit: str | type,
+        doc: str = "",
+        *,
+        min: float | None = None,
+        max: float | None = None,
+        above: float | None = None,
+        below: float | None = None,
+    ) -> None:
+        self.start = floats(start)
+        self.shape = shape_of(start)
+        self.type: type = unit if isinstance(unit, type) else float
+        self.unit = "1" if isinstance(unit, type) else unit
+        self.doc = doc
+        self.min, self.max, self.above, self.below = min, max, above, below
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def bound_broken(self, x: float) -> str | None:
+        """The bound that x breaks, in words; NaN breaks every bound."""
+        if not math.isfinite(x):
+            return "finite"
+        for limit, word, ok in (
+            (self.min, ">=", operator.ge),
+            (self.max, "<=", operator.le),
+            (self.above, ">", operator.gt),
+            (self.below, "<", operator.lt),
+        ):
+            if limit is not None and not ok(x, limit):
+                return f"{word} {limit:g}"
+        return None
+
+
+class Parameter(Declaration):
+    """Fixed from initialization on.  ``min``/``max`` are inclusive bounds, ``above``/``below`` exclusive."""
+
+
+class Input(Declaration):
+    """Held over a communication step."""
+
+
+class State(Declaration):
+    """Continuous; ``flow`` writes its derivative to ``self.der.<name>``."""
+
+
+class Discrete(Declaration):
+    """Changed by ``start`` and by ``@sampled`` methods only."""
+
+
+class Output(Declaration):
+    """Written by ``outputs``."""
+
+    def __init__(self, unit: str | type, doc: str = "", shape: Shape = ()) -> None:
+        super().__init__(full(0.0, shape), unit, doc)
+
+
+class Noise(Parameter):
+    """A noise port; its size is a parameter of the same name, its sample is ``self.noise.<name>``.
+
+    ``per="second"``: white, the size is the two-sided density (unit/sqrt(Hz)); a sample is
+    ``size * xi / sqrt(h)``, so the mean over a time T has variance ``size**2 / T`` whatever the step.
+    ``per="step"``: ``size * xi``, one for each internal step.  ``per="start"``: drawn once.
+    A port of size 0 draws nothing.
+    """
+
+    def __init__(self, start: float, unit: str, doc: str = "", *, per: str = "second") -> None:
+        if per not in ("second", "step", "start"):
+            raise ValueError(f'Noise(per="{per}"): one of "second", "step", "start"')
+        super().__init__(start, unit, doc, min=0.0)
+        self.per = per
+
+
+SECTIONS = ("parameter", "input", "output", "state", "derivative", "discrete")
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One scalar of a part: its FMI name, its place, its value reference."""
+
+    name: str  # "omega[1]", "der(b)"
+    section: str  # one of SECTIONS
+    path: tuple[Any, ...]  # ("omega", 0) or ("der", "b")
+    decl: Declaration
+    reference: int
+    start: float
+
+
+def _flat(x: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], float]]:
+    if isinstance(x, list):
+        for i, e in enumerate(x):
+            yield from _flat(e, (*path, i))
+    else:
+        yield path, x
+
+
+def make_layout(decls: dict[str, Declaration]) -> list[Scalar]:
+    kind = {"parameter": Parameter, "input": Input, "output": Output, "state": State, "discrete": Discrete}
+    out: list[Scalar] = []
+    for section in SECTIONS:
+        for d in decls.values():
+            if not isinstance(d, kind.get(section, State)):
+                continue
+            derivative = section == "derivative"
+            for p, start in _flat(d.start):
+                name = d.name + ("[" + ",".join(str(i + 1) for i in p) + "]" if p else "")
+                path = ("der", d.name, *p) if derivative else (d.name, *p)
+                name = f"der({name})" if derivative else name
+                out.append(Scalar(name, section, path, d, len(out), 0.0 if derivative else start))
+    return out
