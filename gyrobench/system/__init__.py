@@ -1,0 +1,1 @@
+"""Systems of FMUs: sockets, wiring, order, engines, record, run, SSP."""

@@ -1,0 +1,169 @@
+"""Measured data: a laboratory's CSV file as columns in SI.
+
+    # latitude = 45.75deg
+    # instrument = gyro 17
+    phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA]
+    1,0,60,0,2.5,0.1432
+
+The first line that is no comment is the header: ``name [unit]`` for each column, no unit for pure numbers.  Lines
+``# key = value`` give circumstances.  Comma, semicolon or tab separates; the decimal sign is a point.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gyrobench import units
+
+SHOWN = 8  # problems of one kind listed before "and n more"
+
+
+class DataError(Exception):
+    """Data that cannot be reduced; ``problems`` says for each finding where it is and what would be right."""
+
+    def __init__(self, file: Path | str, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("\n".join([f"{file}: not usable:", *(f"  - {p}" for p in problems)]))
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that is expected: ``unit`` is the SI unit it is converted to ("1": a pure number)."""
+
+    name: str
+    unit: str
+    meaning: str = ""
+    required: bool = True
+    whole: bool = False
+
+
+WINDOW_COLUMNS = (
+    Column("phase", "1", "phase of the plan, from 1", whole=True),
+    Column("t_start", "s", "start of the window"),
+    Column("t_end", "s", "end of the window"),
+    Column("angle_start", "rad", "table angle at the start, cumulative"),
+    Column("angle_end", "rad", "table angle at the end, cumulative"),
+    Column("mean", "A", "mean torquer current"),
+    Column("std", "A", "standard deviation of the samples", required=False),
+    Column("n", "1", "number of samples", required=False, whole=True),
+    Column("flagged", "1", "suspect samples", required=False, whole=True),
+)
+
+
+def read_measured(
+    file: Path, columns: tuple[Column, ...] = WINDOW_COLUMNS, time: str | None = "t_start"
+) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
+    """Columns in SI and the comments of a CSV file.
+
+    time: the column that must increase strictly (None: none).  Raises DataError naming missing and doubled columns,
+    missing or wrong units, cells that are no finite number, doubled rows and times that do not increase, with the
+    row numbers as an editor counts them.
+    """
+    lines = Path(file).read_text("utf-8-sig").splitlines()
+    meta: dict[str, str] = {}
+    table: list[tuple[int, str]] = []
+    for number, line in enumerate(lines, 1):
+        if line.lstrip().startswith("#"):
+            key, sign, value = line.lstrip("# \t").partition("=")
+            if sign:
+                meta[key.strip()] = value.strip()
+        elif line.strip():
+            table.append((number, line))
+    if not table:
+        raise DataError(file, ["no header line"])
+    head = table[0][1]
+    delimiter = max(",;\t", key=head.count)
+    header = [h.strip() for h in next(csv.reader([head], delimiter=delimiter))]
+    rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
+    expected = {c.name: c for c in columns}
+    factors, problems = _header(header, expected)
+    problems += [f"row {n}: {len(r)} cells, the header has {len(header)}" for n, r in rows if len(r) != len(header)]
+    if not rows:
+        problems.append("no rows below the header")
+    if problems:
+        raise DataError(file, problems[: 4 * SHOWN])
+    found = {}
+    for name, (k, factor, offset) in factors.items():
+        values, bad = _numbers(name, [(n, r[k]) for n, r in rows], expected[name].whole)
+        found[name] = values if expected[name].whole else values * factor + offset if offset else values * factor
+        problems += bad
+    if not problems:
+        problems += _repeats(found, [n for n, _ in rows], time)
+    if problems:
+        raise DataError(file, problems)
+    return found, meta
+
+
+def _header(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str, tuple[int, float, float]], list[str]]:
+    """Place, factor and offset of each expected column, and what is wrong with the header."""
+    found: dict[str, tuple[int, float, float]] = {}
+    problems = []
+    for k, text in enumerate(header):
+        match = re.fullmatch(r"([^\[\]]+?)\s*(?:\[(.*)\])?", text)
+        name, unit = (match[1], match[2]) if match else (text, None)
+        column = expected.get(name)
+        if column is None:
+            continue  # further columns are the laboratory's own
+        if name in found:
+            problems.append(f"column '{name}': appears twice")
+        fits = ", ".join(units.fitting(column.unit)[:5])
+        if unit is None and column.unit != "1":
+            problems.append(f"column '{name}': no unit; write '{name} [{column.unit}]' (units that fit: {fits})")
+            continue
+        try:
+            u = units.unit(unit or "1")
+        except units.UnitError as error:
+            problems.append(f"column '{name}': {error}")
+            continue
+        if u.exponents != units.unit(column.unit).exponents:
+            problems.append(f"column '{name}': wrong unit [{unit}]: units that fit: {fits}")
+            continue
+        found[name] = (k, u.factor, u.offset)
+    known = {t.split("[")[0].strip() for t in header}
+    for c in expected.values():
+        if c.required and c.name not in known:
+            unit = f" [{c.unit}]" if c.unit != "1" else ""
+            problems.append(f"column '{c.name}{unit}' is missing ({c.meaning}); there are: {', '.join(header)}")
+    return found, problems
+
+
+def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.ndarray[Any, Any], list[str]]:
+    values, bad = [], []
+    for n, text in cells:
+        try:
+            x = float(text)
+        except ValueError:
+            x = math.nan
+        if not math.isfinite(x):
+            bad.append(f"row {n}, column '{name}': '{text}' is no finite number")
+        elif whole and x != math.floor(x):
+            bad.append(f"row {n}, column '{name}': {text} must be an integer")
+        values.append(x)
+    if len(bad) > SHOWN:
+        bad = [*bad[:SHOWN], f"column '{name}': and {len(bad) - SHOWN} more"]
+    array = np.array(values)
+    return (array.astype(np.int64) if whole and not bad else array), bad
+
+
+def _repeats(columns: Mapping[str, np.ndarray[Any, Any]], numbers: list[int], time: str | None) -> list[str]:
+    problems: list[str] = []
+    seen: dict[tuple[float, ...], int] = {}
+    for n, row in zip(numbers, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
+        if row in seen:
+            problems.append(f"row {n}: the same as row {seen[row]}")
+        seen.setdefault(row, n)
+    if time is not None and time in columns and not problems:
+        t = columns[time]
+        for k in np.flatnonzero(np.diff(t) <= 0.0)[:SHOWN]:
+            problems.append(
+                f"row {numbers[k + 1]}: {time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {numbers[k]})"
+            )
+    return problems

@@ -1,0 +1,115 @@
+"""Which value each parameter of each part has in a run, and how it reaches the FMU."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench import units
+from gyrobench.system.binding import Binding, Bound
+from gyrobench.system.system import System
+from gyrobench.system.values import ValueProblem, flatten, nest, parse
+from gyrobench.system.wiring import Assembly
+
+Starts = dict[str, list[tuple[Bound, Any]]]  # by slot, in the FMU's own units
+
+
+def slot_seed(seed: int, slot: str) -> int:
+    """A seed of its own for the noise of each slot: 31 bits of a hash of the run's seed and the slot's name."""
+    digest = hashlib.blake2s(f"{seed}:{slot}".encode(), digest_size=4).digest()
+    return int.from_bytes(digest, "big") & 0x7FFFFFFF
+
+
+def defaults(assembly: Assembly) -> dict[str, Any]:
+    """Start values of all parameters as the FMUs declare them: {"slot.name": SI value}, element by element."""
+    found: dict[str, Any] = {}
+    for slot, binding in assembly.bindings.items():
+        starts = {v.name: v.start for v in assembly.descriptions[slot].modelVariables}
+        for name, bound in binding.parameters.items():
+            text = starts.get(bound.variable)
+            if text is None:
+                continue
+            if bound.kind == "Real":
+                found[f"{slot}.{name}"] = float(text) if bound.gain == 1.0 else float(text) * bound.gain
+            elif bound.kind == "Integer":
+                found[f"{slot}.{name}"] = int(text)
+            elif bound.kind == "Boolean":
+                found[f"{slot}.{name}"] = text in ("true", "1")
+            else:
+                found[f"{slot}.{name}"] = text
+    return found
+
+
+def _si(name: str, value: Any, bound: Bound) -> Any:
+    """A given value as SI number of the parameter's type."""
+    kind = {"Real": float, "Integer": int, "Boolean": bool, "String": str}[bound.kind]
+    try:
+        unit = units.unit(bound.unit or "1").dimension
+    except units.UnitError:
+        unit = "1"
+    return parse(name, value, unit, kind)
+
+
+def _target(name: str, binding: Binding) -> Bound | None:
+    return binding.parameters.get(name) or binding.inputs.get(name)
+
+
+def _override(name: str, value: Any, binding: Binding) -> dict[str, Any]:
+    """Elements and SI values of one "slot.parameter" as given by the user.  Raises ValueProblem."""
+    slot, _, parameter = name.partition(".")
+    if isinstance(value, str) and value.strip().startswith("["):
+        value = parse(name, value)
+    found = {}
+    for element, v in flatten(parameter, value).items():
+        bound = _target(element, binding)
+        if bound is None:
+            names = list(binding.parameters)
+            if any(n.startswith(parameter + "[") for n in names) and element == parameter:
+                raise ValueProblem(f"{name}: is an array; give all of it as [a, b, ...] or one element {parameter}[1]")
+            near = difflib.get_close_matches(element, names, n=4, cutoff=0.3) or names[:12]
+            raise ValueProblem(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
+        found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
+    return found
+
+
+def resolve(
+    assembly: Assembly, system: System, seed: int, base: Mapping[str, Any]
+) -> tuple[Starts, dict[str, Any], list[str]]:
+    """What is set in each FMU, all parameters for run.json (SI, arrays nested), and notes.
+
+    In rising order of rank: the FMU's start value, the seed of the slot, what the system derives, what the user set.
+    base: :func:`defaults` of the assembly.  Raises ValueProblem.
+    """
+    chosen: dict[str, Any] = {}
+    notes = []
+    for slot, binding in assembly.bindings.items():
+        if "seed" in binding.parameters:
+            chosen[f"{slot}.seed"] = slot_seed(seed, slot)
+    for name, value in system.flat_parameters().items():
+        slot, _, parameter = name.partition(".")
+        if slot not in assembly.bindings:
+            raise ValueProblem(f"{name}: {system.name} has no slot '{slot}'")
+        bound = _target(parameter, assembly.bindings[slot])
+        if bound is None:
+            notes.append(f"{slot} has no parameter '{parameter}' (set by {system.name}); it stays as it is")
+        else:
+            chosen[name] = _si(name, value, bound)
+    for name, value in system.overrides.items():
+        chosen.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
+    starts: Starts = {slot: [] for slot in assembly.bindings}
+    for name, value in chosen.items():
+        slot, _, parameter = name.partition(".")
+        bound = _target(parameter, assembly.bindings[slot])
+        assert bound is not None
+        starts[slot].append((bound, value / bound.gain if bound.kind == "Real" and bound.gain != 1.0 else value))
+    return starts, _nested({**base, **chosen}), notes
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Array elements collected under the array's name."""
+    arrays: dict[str, dict[str, Any]] = {}
+    for name, value in flat.items():
+        arrays.setdefault(name.partition("[")[0], {})[name] = value
+    return {name: nest(cells, name) for name, cells in arrays.items()}

@@ -1,0 +1,52 @@
+"""From "slot: part name or path" to the FMU files of a system."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from gyrobench.system.system import RefusedError, System
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def resolve_parts(
+    system: System,
+    parts: Mapping[str, Path | str],
+    target: str,
+    bench: Path | None,
+    notes: list[str],
+) -> tuple[dict[str, Path], dict[str, str]]:
+    """Paths of the FMUs of all slots, and the target of those that were built (slot -> "native" | "python").
+
+    Something that ends in .fmu is a file; anything else is the name of a part of the bench, built if needed.
+    Without a compiler the Python target is built, with a note.  Raises RefusedError, BenchError, BuildError.
+    """
+    unknown = [s for s in parts if s not in system.slots]
+    if unknown:
+        raise RefusedError(system.name, [f"no slot '{s}'; slots: {', '.join(system.slots)}" for s in unknown])
+    paths: dict[str, Path] = {}
+    built: dict[str, str] = {}
+    for slot, declared in system.slots.items():
+        part = parts.get(slot, declared.part)
+        if str(part).endswith(".fmu"):
+            paths[slot] = Path(part)
+            if not paths[slot].is_file():
+                raise RefusedError(system.name, [f"{slot}: no such file {part}"])
+            continue
+        from gyrobench.packaging import CompilerError, build
+
+        try:
+            paths[slot] = build(str(part), target=target, bench=bench)
+            built[slot] = target
+        except CompilerError as error:
+            if target == "python":
+                raise
+            paths[slot] = build(str(part), target="python", bench=bench)
+            built[slot] = "python"
+            notes.append(f"{slot}: Python target (a thousand times slower): {error}")
+    return paths, built

@@ -1,0 +1,102 @@
+"""The plan of a test: a labelled list of phases, run inside the co-simulation by the sequencer part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+MODES = {"hold": 0, "index": 1, "rate": 2}
+LIMIT = 99  # phases
+FACES = 12  # different mounts
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One phase: the table goes to its target, settles, then windows are averaged until dwell or travel is reached.
+
+    mode "hold": stay where the table is; "index": go to the angle ``target`` (rad); "rate": turn at ``target`` (rad/s).
+    settle: s before the first window.  dwell: s of windows (hold, index).  travel: rad of windows (rate).
+    window: length of one window, s (hold, index) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
+    """
+
+    label: str
+    mode: str
+    face: str
+    target: float = 0.0
+    settle: float = 0.0
+    dwell: float = 0.0
+    travel: float = 0.0
+    window: float = 0.0
+
+    def duration(self) -> float:
+        """Time of the phase without the way to its target, s."""
+        if self.mode == "rate" and self.target:
+            return self.settle + self.travel / abs(self.target)
+        return self.settle + self.dwell
+
+
+@dataclass
+class Plan:
+    """Phases and the mounts they use (name -> 3x3 rotation, rows = gyro axes I, O, S in table axes)."""
+
+    phases: list[Phase] = field(default_factory=list)
+    faces: dict[str, Sequence[Sequence[float]]] = field(default_factory=dict)
+
+    def problems(self) -> list[str]:
+        """What is wrong with the plan, as sentences; the sequencer itself refuses what is left."""
+        found = []
+        if not 1 <= len(self.phases) <= LIMIT:
+            found.append(f"the plan has {len(self.phases)} phases: 1 to {LIMIT} are possible")
+        if len(self.faces) > FACES:
+            found.append(f"the plan has {len(self.faces)} faces: at most {FACES} are possible")
+        for k, p in enumerate(self.phases, 1):
+            where = f"phase {k} '{p.label}'"
+            if p.mode not in MODES:
+                found.append(f"{where}: mode '{p.mode}' is none of {', '.join(MODES)}")
+            if p.face not in self.faces:
+                found.append(f"{where}: face '{p.face}' is none of {', '.join(self.faces) or 'none'}")
+            length = p.travel if p.mode == "rate" else p.dwell
+            name = "travel" if p.mode == "rate" else "dwell"
+            if not length > 0.0:
+                found.append(f"{where}: {name} = {length:g}: must be > 0")
+            if not 0.0 < p.window <= length * (1.0 + 1e-12):
+                found.append(f"{where}: window = {p.window:g}: must be > 0 and at most the {name} {length:g}")
+            if p.mode == "rate" and not p.target:
+                found.append(f"{where}: target rate 0: the table would never turn; use mode hold")
+        return found
+
+    def parameters(self, slot: str = "sequencer") -> dict[str, Any]:
+        """The parameters of the sequencer in ``slot`` that carry this plan."""
+        names = list(self.faces)
+        columns: dict[str, Any] = {
+            "modes": [MODES[p.mode] for p in self.phases],
+            "targets": [float(p.target) for p in self.phases],
+            "windows": [float(p.window) for p in self.phases],
+            "face_of": [names.index(p.face) + 1 for p in self.phases],
+            "faces": [[float(x) for row in self.faces[n] for x in row] for n in names],
+        }
+        for key in ("settle", "dwell", "travel"):
+            columns[key] = [float(getattr(p, key)) for p in self.phases]
+        return {f"{slot}.phases": len(self.phases), **{f"{slot}.{k}": v for k, v in columns.items()}}
+
+    def duration(self) -> float:
+        """Sum of the phases, s; the ways to the targets come on top."""
+        return sum(p.duration() for p in self.phases)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """JSON-able rows, numbered from 1 as in the record."""
+        return [
+            {
+                "phase": k,
+                "label": p.label,
+                "mode": p.mode,
+                "face": p.face,
+                "target": p.target,
+                "settle": p.settle,
+                "dwell": p.dwell,
+                "travel": p.travel,
+                "window": p.window,
+            }
+            for k, p in enumerate(self.phases, 1)
+        ]

@@ -1,0 +1,211 @@
+"""What a system is: slots, wires, options, plan and reduction, declared in ``systems/<name>/system.py``.
+
+    class Tumble(System):
+        \"\"\"Single-axis tumble of a floated gyro.\"\"\"
+        title = "Single-axis tumble test"
+        spec = ("TEST-TUMBLE1-SDF",)
+        slots = {"site": Slot("Site", "site"), "gyro": Slot("SdfGyro", "floated_gyro"), ...}
+        wires = '''
+            site.f -> table.f_local
+            gyro.u -> rebalance.u
+        '''
+        step = 1e-3
+        options = {"latitude": Option("45.75deg", "rad", "geographic latitude")}
+        windows = Windows("sampler.count", {"mean": "sampler.mean", ...})
+        done = "sequencer.done"
+        channels = ["gyro.u", "rebalance.i"]
+
+        def plan(self): return Plan([...])
+        def parameters(self): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
+        def check(self): return [...]
+        def reduce(self, record): ...
+
+An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``system.set("gyro.H", 0.3)``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from gyrobench.bench import Bench
+from gyrobench.system.plan import Plan
+from gyrobench.system.values import ValueProblem, flatten, parse
+
+if TYPE_CHECKING:
+    from gyrobench.system.record import Record
+
+
+class RefusedError(Exception):
+    """The system refuses to run with these values; ``problems`` lists why."""
+
+    def __init__(self, name: str, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("\n".join([f"{name} refuses to run:", *(f"  - {p}" for p in problems)]))
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place in a system: its socket and the name of the part that is there unless another one is given."""
+
+    socket: str
+    part: str
+
+
+@dataclass(frozen=True)
+class Option:
+    """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type."""
+
+    default: Any
+    unit: str | type
+    doc: str = ""
+    min: float | None = None
+    max: float | None = None
+
+    @property
+    def kind(self) -> type:
+        return self.unit if isinstance(self.unit, type) else float
+
+    def parse(self, name: str, value: Any) -> Any:
+        """The SI value; raises ValueProblem for a wrong dimension or a broken bound."""
+        unit = "1" if isinstance(self.unit, type) else self.unit
+        number = parse(name, value, unit, self.kind)
+        if not isinstance(number, str | list):
+            if self.min is not None and not number >= self.min:
+                raise ValueProblem(f"{name} = {number:g}: must be >= {self.min:g} {unit}")
+            if self.max is not None and not number <= self.max:
+                raise ValueProblem(f"{name} = {number:g}: must be <= {self.max:g} {unit}")
+        return number
+
+
+@dataclass(frozen=True)
+class Windows:
+    """When ``watch`` changes, a row of the record is written: column name -> "slot.output"."""
+
+    watch: str
+    columns: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, slot: str = "sampler") -> Windows:
+        """The columns of the Sampler socket."""
+        names = ("t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged")
+        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}})
+
+
+class System:
+    """Base class of the systems; see the module for how to declare one."""
+
+    title: ClassVar[str] = ""
+    spec: ClassVar[tuple[str, ...]] = ()
+    slots: ClassVar[Mapping[str, Slot]] = {}
+    wires: ClassVar[str] = ""
+    options: ClassVar[Mapping[str, Option]] = {}
+    windows: ClassVar[Windows | None] = None
+    done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
+    channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
+    channel_period: ClassVar[float] = 1.0  # s
+    step: float = 1e-3  # s, communication step
+    stop: float | None = None  # s; None: only `done` ends the run
+    name: str = ""
+    folder: Path | None = None
+
+    def __init__(self) -> None:
+        self.name = self.name or type(self).__name__.lower()
+        self.values = {k: o.parse(k, o.default) for k, o in self.options.items()}
+        self.overrides: dict[str, Any] = {}  # "slot.parameter" -> value as given
+        self.given: list[str] = []  # names that were set
+
+    def __getitem__(self, option: str) -> Any:
+        """The SI value of an option."""
+        return self.values[option]
+
+    def set(self, name: str, value: Any) -> None:
+        """Sets an option or, as "slot.parameter", a parameter of a part.  Raises ValueProblem."""
+        if name in self.options:
+            self.values[name] = self.options[name].parse(name, value)
+        elif "." in name and name.split(".", 1)[0] in self.slots:
+            self.overrides[name] = value  # parsed when the part and so the unit is known
+        else:
+            import difflib
+
+            near = difflib.get_close_matches(name, list(self.options), n=3, cutoff=0.4) or list(self.options)
+            raise ValueProblem(
+                f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "
+                f"is written slot.parameter, slots: {', '.join(self.slots)}"
+            )
+        if name not in self.given:
+            self.given.append(name)
+
+    def with_values(self, values: Mapping[str, Any]) -> System:
+        """A copy with further values set."""
+        copy = type(self)()
+        copy.name, copy.folder, copy.step, copy.stop = self.name, self.folder, self.step, self.stop
+        copy.values, copy.overrides, copy.given = dict(self.values), dict(self.overrides), list(self.given)
+        for name, value in values.items():
+            copy.set(name, value)
+        return copy
+
+    # ------------------------------------------------------------ to be given by the system
+    def plan(self) -> Plan:
+        """The phases; a system without a sequencer has none."""
+        return Plan()
+
+    def parameters(self) -> dict[str, Any]:
+        """Parameters of the parts derived from plan and options: "slot.parameter" -> SI value or nested list."""
+        return {}
+
+    def check(self) -> list[str]:
+        """What makes a run with these values impossible or meaningless (the run is refused), as sentences."""
+        return []
+
+    def warnings(self) -> list[str]:
+        """What the user should know about these values, as sentences."""
+        return []
+
+    def reduce(self, record: Record) -> Any:
+        """record -> gyrobench.reduction.result.Result"""
+        raise NotImplementedError(f"{self.name} has no reduction")
+
+    # ------------------------------------------------------------ used by the bench
+    def refuse(self) -> None:
+        """Raises RefusedError when the plan or the values are impossible."""
+        plan = self.plan()
+        problems = (plan.problems() if plan.phases else []) + list(self.check())
+        if problems:
+            raise RefusedError(self.name, problems)
+
+    def flat_parameters(self) -> dict[str, Any]:
+        """:meth:`parameters` element by element: {"sequencer.mode[1]": 2, ...}."""
+        found: dict[str, Any] = {}
+        for name, value in self.parameters().items():
+            found.update(flatten(name, value))
+        return found
+
+
+def load_system(name: str, bench: Path | None = None) -> System:
+    """The system ``name`` of a bench (see :class:`gyrobench.bench.Bench`) with its default values.
+
+    Raises BenchError when there is no such system, RefusedError when its file does not define exactly one System.
+    """
+    folder = Bench.find(bench).system_folder(name)
+    file = folder / "system.py"
+    module_name = f"gyrobench_system_{name}"
+    spec = importlib.util.spec_from_file_location(module_name, file, submodule_search_locations=[str(folder)])
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    spec.loader.exec_module(module)
+    found = [
+        v
+        for v in vars(module).values()
+        if isinstance(v, type) and issubclass(v, System) and v.__module__ == module_name
+    ]
+    if len(found) != 1:
+        raise RefusedError(name, [f"{file}: defines {len(found)} subclasses of System, must define one"])
+    system = found[0]()
+    system.name, system.folder = name, folder
+    return system

@@ -1,0 +1,91 @@
+"""Values of options and parameters: numbers with units, arrays by element."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench import units
+
+
+class ValueProblem(ValueError):
+    """A value that cannot be used; the message says which, why and what would be right."""
+
+
+def flatten(name: str, value: Any) -> dict[str, Any]:
+    """``("faces", [[1, 0]])`` -> ``{"faces[1,1]": 1, "faces[1,2]": 0}``; a scalar keeps its name."""
+    found: dict[str, Any] = {}
+
+    def walk(v: Any, index: tuple[int, ...]) -> None:
+        if hasattr(v, "tolist"):
+            v = v.tolist()
+        if isinstance(v, list | tuple):
+            for k, e in enumerate(v, 1):
+                walk(e, (*index, k))
+        else:
+            found[f"{name}[{','.join(map(str, index))}]" if index else name] = v
+
+    walk(value, ())
+    return found
+
+
+def nest(values: Mapping[str, Any], name: str) -> Any:
+    """The inverse of :func:`flatten` for one name: nested lists of ``values["name[1]"]`` ...; KeyError if absent."""
+    if name in values:
+        return values[name]
+    cells: dict[tuple[int, ...], Any] = {}
+    for key, value in values.items():
+        if key.startswith(name + "[") and key.endswith("]"):
+            cells[tuple(int(i) for i in key[len(name) + 1 : -1].split(","))] = value
+    if not cells:
+        raise KeyError(name)
+
+    def build(head: tuple[int, ...]) -> Any:
+        if head in cells:
+            return cells[head]
+        items: list[Any] = []
+        while any(c[: len(head) + 1] == (*head, len(items) + 1) for c in cells):
+            items.append(build((*head, len(items) + 1)))
+        return items
+
+    return build(())
+
+
+def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
+    """A value as SI number(s): a number, a text with an optional unit, a list (or its JSON text) of these.
+
+    A coefficient per power of g may be given per g (``0.9deg/h/g``).  Raises :class:`ValueProblem` for text that is
+    no quantity, a wrong dimension, a value that is not finite, or a fraction where an integer is asked for.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, str):
+        text = value.strip()
+        if kind is str:
+            return text
+        if text.startswith("["):
+            try:
+                value = json.loads(text)
+            except json.JSONDecodeError as error:
+                raise ValueProblem(f"{name} = {text}: not a list: {error}") from None
+        elif kind is bool and text.lower() in ("true", "false"):
+            return text.lower() == "true"
+        else:
+            try:
+                value = units.parse_quantity(text, unit or "1", per_g0=True)
+            except units.UnitError as error:
+                raise ValueProblem(f"{name}: {error}") from None
+    if isinstance(value, list | tuple):
+        return [parse(f"{name}[{k}]", v, unit, kind) for k, v in enumerate(value, 1)]
+    if kind is str:
+        return str(value)
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueProblem(f"{name} = {number}: must be finite")
+    if kind in (int, bool):
+        if number != math.floor(number):
+            raise ValueProblem(f"{name} = {number:g}: must be an integer")
+        return kind(number)
+    return number

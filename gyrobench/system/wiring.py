@@ -1,0 +1,178 @@
+"""Wires of a system resolved to scalar connections between the variables of its FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gyrobench import units
+from gyrobench.system.binding import Binding, Bound, fit, load_mapping
+from gyrobench.system.order import Link, Order, execution_order, feedthrough
+from gyrobench.system.sockets import socket
+from gyrobench.system.system import System
+
+
+class WiringError(Exception):
+    """A wire that cannot be laid; ``problems`` lists each."""
+
+    def __init__(self, system: str, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("\n".join([f"wires of {system}:", *(f"  - {p}" for p in problems)]))
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One scalar connection: target variable = gain * source variable."""
+
+    source: str  # slot
+    output: Bound
+    target: str  # slot
+    input: Bound
+    gain: float
+    wire: str
+
+
+@dataclass
+class Assembly:
+    """A system with an FMU in every slot, bound, wired and ordered."""
+
+    system: System
+    paths: dict[str, Path]
+    descriptions: dict[str, Any]
+    bindings: dict[str, Binding]
+    connections: list[Connection]
+    order: Order
+    notes: list[str] = field(default_factory=list)
+
+    def output(self, name: str) -> tuple[str, Bound]:
+        """Slot and variable of "slot.output"; raises WiringError naming what the slot has."""
+        slot, _, element = name.partition(".")
+        if slot not in self.bindings:
+            raise WiringError(self.system.name, [f"{name}: no slot '{slot}'; slots: {', '.join(self.bindings)}"])
+        outputs = self.bindings[slot].outputs
+        if element not in outputs:
+            raise WiringError(self.system.name, [f"{name}: {slot} has no such output; outputs: {', '.join(outputs)}"])
+        return slot, outputs[element]
+
+
+def parse_wires(text: str) -> list[tuple[str, str, str, str]]:
+    """``"site.f -> table.f_local"`` lines -> (slot, connector, slot, connector); blank lines and # comments skipped."""
+    found, problems = [], []
+    for raw in text.splitlines():
+        line = raw.partition("#")[0].strip()
+        if not line:
+            continue
+        ends = [e.strip().partition(".") for e in line.split("->")]
+        if len(ends) != 2 or not all(a and b for a, _, b in ends):
+            problems.append(f"'{line}': must read 'slot.output -> slot.input'")
+            continue
+        found.append((ends[0][0], ends[0][2], ends[1][0], ends[1][2]))
+    if problems:
+        raise WiringError("the system", problems)
+    return found
+
+
+def _elements(ports: Mapping[str, Bound], name: str) -> dict[str, Bound]:
+    """Elements of a connector by their index text ("" for a scalar or a single element)."""
+    if name in ports:
+        return {"": ports[name]}
+    return {e[len(name) :]: b for e, b in ports.items() if e.startswith(name + "[")}
+
+
+class _Layer:
+    def __init__(self, system: System, bindings: Mapping[str, Binding]) -> None:
+        self.system, self.bindings = system, bindings
+        self.problems: list[str] = []
+        self.notes: list[str] = []
+        self.connections: list[Connection] = []
+        self.taken: dict[tuple[str, str], str] = {}
+
+    def end(self, wire: str, slot: str, name: str, causality: str) -> dict[str, Bound] | None:
+        """The elements at one end of a wire; None when the wire cannot be laid (noted)."""
+        if slot not in self.bindings:
+            self.problems.append(f"{wire}: no slot '{slot}'; slots: {', '.join(self.bindings)}")
+            return None
+        binding = self.bindings[slot]
+        ports = binding.inputs if causality == "input" else binding.outputs
+        found = _elements(ports, name)
+        if found:
+            return found
+        if name.split("[")[0] in binding.absent:
+            self.notes.append(f"{wire}: {slot} has no '{name}' (optional); not connected")
+        else:
+            names = dict.fromkeys(e.split("[")[0] for e in ports)
+            self.problems.append(f"{wire}: {slot} has no {causality} '{name}'; {causality}s: {', '.join(names)}")
+        return None
+
+    def dimension(self, slot: str, name: str) -> str:
+        connector = self.bindings[slot].socket.connector(name.split("[")[0])
+        return connector.unit if connector is not None else ""
+
+    def lay(self, a: str, x: str, b: str, y: str) -> None:
+        wire = f"{a}.{x} -> {b}.{y}"
+        outputs, inputs = self.end(wire, a, x, "output"), self.end(wire, b, y, "input")
+        if outputs is None or inputs is None:
+            return
+        if set(outputs) != set(inputs):
+            self.problems.append(f"{wire}: {len(outputs)} elements meet {len(inputs)}: the shapes must be equal")
+            return
+        ua, ub = self.dimension(a, x), self.dimension(b, y)
+        if ua not in ("", "1") and ub not in ("", "1") and not units.same_dimension(ua, ub):
+            self.problems.append(f"{wire}: {ua} into {ub}: the dimensions differ")
+            return
+        for index, out in outputs.items():
+            inp = inputs[index]
+            if inp.kind != "Real" and out.kind != inp.kind and out.gain != inp.gain:
+                self.problems.append(f"{wire}: a factor into the {inp.kind} input {inp.variable} is not possible")
+            other = self.taken.setdefault((b, inp.element), wire)
+            if other != wire:
+                self.problems.append(f"{wire}: {b}.{inp.element} is already fed by {other}")
+            gain = 1.0 if out.gain == inp.gain else out.gain / inp.gain
+            self.connections.append(Connection(a, out, b, inp, gain, wire))
+
+    def unfed(self) -> None:
+        for slot, binding in self.bindings.items():
+            free = [
+                c.name
+                for c in binding.socket.connectors
+                if c.causality == "input" and not c.optional and not any((slot, e) in self.taken for e in c.elements)
+            ]
+            if free:
+                self.notes.append(f"{slot}: not connected, at start values: {', '.join(free)}")
+
+
+def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path] | None = None) -> Assembly:
+    """Reads the model descriptions, fits each FMU into its slot, lays the wires and finds the order.
+
+    Raises MisfitError, WiringError, AlgebraicLoopError; nothing is loaded or run.
+    """
+    from fmpy import read_model_description
+
+    maps = maps or {}
+    for what, given in (("part", paths), ("mapping", maps)):
+        for slot in given:
+            if slot not in system.slots:
+                raise WiringError(system.name, [f"{what} for slot '{slot}': slots: {', '.join(system.slots)}"])
+    descriptions, bindings = {}, {}
+    for slot, declared in system.slots.items():
+        d = read_model_description(str(paths[slot]), validate=False)
+        if d.coSimulation is None or not d.fmiVersion.startswith("2."):
+            kind = "co-simulation" if d.coSimulation is None else f"FMI {d.fmiVersion}"
+            what = "has no co-simulation interface" if d.coSimulation is None else f"is {kind}"
+            raise WiringError(system.name, [f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 co-simulation"])
+        descriptions[slot] = d
+        bindings[slot] = fit(socket(declared.socket), d, load_mapping(maps.get(slot)), slot)
+    layer = _Layer(system, bindings)
+    for wire in parse_wires(system.wires):
+        layer.lay(*wire)
+    if layer.problems:
+        raise WiringError(system.name, layer.problems)
+    layer.unfed()
+    for slot, binding in bindings.items():
+        layer.notes += [f"{slot}: {w}" for w in binding.warnings]
+    links = [Link((c.source, c.output.variable), (c.target, c.input.variable), c.wire) for c in layer.connections]
+    through = {slot: feedthrough(d) for slot, d in descriptions.items()}
+    order = execution_order(list(system.slots), links, through)
+    return Assembly(system, dict(paths), descriptions, bindings, layer.connections, order, layer.notes)
