@@ -1,0 +1,73 @@
+"""What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rate along I.
+
+During a window the table turns evenly from angle_start to angle_end.  Averages are Gauss-Legendre sums over the angle,
+exact to rounding for windows up to a radian; no harmonic is damped by the averaging [AVG-SINC] because the regressors
+are averaged like the data.  Not modelled: change of the table rate inside a window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from gyrobench import drift
+from gyrobench.frames import G0, pole
+
+Array = NDArray[np.float64]
+_NODES, _WEIGHTS = leggauss(12)
+_WEIGHTS = _WEIGHTS / 2.0
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Windows of a record with the mount of each: angles (n,) in rad, times (n,) in s, face (n, 3, 3)."""
+
+    angle_start: Array
+    angle_end: Array
+    t_start: Array
+    t_end: Array
+    face: Array
+
+    def nodes(self) -> Array:
+        """Angles (n, 12) at which a window is averaged."""
+        half = (self.angle_end - self.angle_start) / 2.0
+        middle = (self.angle_end + self.angle_start) / 2.0
+        out: Array = middle[:, None] + half[:, None] * _NODES
+        return out
+
+
+def average(values: Array) -> Array:
+    """Mean over the nodes (axis 1)."""
+    out: Array = (
+        np.tensordot(values, _WEIGHTS, axes=([1], [0]))
+        if values.ndim == 2
+        else np.einsum("nk...,k->n...", values, _WEIGHTS)
+    )
+    return out
+
+
+def _in_face(local: Array, turning: Turning, base: Array) -> Array:
+    """A local vector (3,) in face axes at every node: (n, 12, 3)."""
+    x, y, z = base @ local
+    a = turning.nodes()
+    c, s = np.cos(a), np.sin(a)
+    table = np.stack([c * x + s * y, -s * x + c * y, np.full_like(a, z)], axis=-1)
+    out: Array = np.einsum("nij,nkj->nki", turning.face, table)
+    return out
+
+
+def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, ...]) -> Array:
+    """Window means (n, p) of the drift regressors ``names`` at local gravity ``gravity`` (m/s2)."""
+    xyz = _in_face(np.array([0.0, 0.0, -gravity / G0]), turning, base)
+    return average(drift.regressors(xyz, names))
+
+
+def input_rate(turning: Turning, base: Array, latitude: float, earth_rate: float) -> Array:
+    """Window means (n,) of the inertial rate along the input axis, rad/s: Earth rate and table rate."""
+    earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, 0])
+    table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
+    out: Array = earth + turning.face[:, 0, 2] * table
+    return out

@@ -1,0 +1,67 @@
+"""Refusals that all reductions of window records share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
+
+
+class ReductionError(ValueError):
+    """Data that cannot be reduced; ``problems`` says for each finding what is wrong, where, and what would be right."""
+
+    def __init__(self, problems: str | Sequence[str]) -> None:
+        self.problems = [problems] if isinstance(problems, str) else list(problems)
+        super().__init__("\n".join(["the data cannot be reduced:", *(f"  - {p}" for p in self.problems)]))
+
+
+def _list(rows: NDArray[np.intp], shown: int = 5) -> str:
+    text = ", ".join(str(int(r) + 1) for r in rows[:shown])
+    return text + (f" and {rows.size - shown} more" if rows.size > shown else "")
+
+
+def window_problems(windows: Mapping[str, Array]) -> list[str]:
+    """What is wrong with the rows of a record, as sentences; rows count from 1.
+
+    Columns phase, t_start, t_end, angle_start, angle_end, mean (flagged optional), in SI: all finite, times strictly
+    increasing, no window twice, none flagged (saturated torquer, lost lock).
+    """
+    missing = [c for c in REQUIRED if c not in windows]
+    if missing:
+        return [f"column {', '.join(missing)} is missing; a record has {', '.join(REQUIRED)}"]
+    sizes = {c: len(windows[c]) for c in REQUIRED}
+    if len(set(sizes.values())) > 1:
+        return [f"columns of different length: {sizes}"]
+    if sizes["mean"] == 0:
+        return ["the record holds no windows"]
+    found = []
+    for c in REQUIRED:
+        bad = np.flatnonzero(~np.isfinite(np.asarray(windows[c], dtype=float)))
+        if bad.size:
+            found.append(f"column {c}: non-finite number in row {_list(bad)}")
+    if found:
+        return found
+    t0, t1 = np.asarray(windows["t_start"], dtype=float), np.asarray(windows["t_end"], dtype=float)
+    length = t1 - t0
+    bad = np.flatnonzero(length <= 0.0)
+    if bad.size:
+        found.append(f"windows without length (t_end <= t_start) in row {_list(bad)}")
+    slack = 1e-6 * max(float(np.median(length)), 0.0)
+    twice = np.flatnonzero(np.abs(np.diff(t0)) <= slack) + 1
+    if twice.size:
+        found.append(f"duplicate windows: row {_list(twice)} starts when the row before it starts")
+    back = np.flatnonzero((np.diff(t0) < -slack) | ((t0[1:] < t1[:-1] - slack) & (np.diff(t0) > slack))) + 1
+    if back.size:
+        found.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
+    if "flagged" in windows:
+        bad = np.flatnonzero(np.asarray(windows["flagged"]) > 0)
+        if bad.size:
+            found.append(
+                f"flagged windows (saturated torquer or lost lock) in row {_list(bad)}; a flagged mean is no "
+                "measurement: repeat the phase or leave these rows out"
+            )
+    return found

@@ -1,0 +1,179 @@
+"""Least squares whose noise - white, Gauss-Markov or both - is estimated from the same data, with honest intervals.
+
+Each candidate noise model (:func:`gyrobench.reduction.noise.cells`) gives a generalized least squares estimate, its
+covariance and a restricted likelihood (REML, the scale integrated out):
+
+    log L = -1/2 [ log|R| + log|X' R^-1 X| + (n - p) log(v' R^-1 v) ]
+
+Estimates and intervals are the mixture over the candidates, weighted by likelihood times prior: the spread between
+noise models that the data cannot tell apart goes into u.  A single "best" model would be too sure of itself: the
+regressors swallow a good part of the slow noise they are to be judged by.  Deterministic; no iteration.
+
+Standard uncertainty u: standard deviation of the mixture, or the 95 % half width over 1.96 where heavy tails make
+that smaller.  [RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.reduction import noise
+from gyrobench.reduction.regression import Design, check_data
+
+Array = NDArray[np.float64]
+NORMAL = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fit under an estimated noise model; arrays follow ``names``."""
+
+    names: tuple[str, ...]
+    beta: Array
+    covariance: Array  # of the mixture, scaled to ``u``
+    u: Array
+    half_width: Array  # of the 95 % interval, symmetric about beta
+    p: Array  # two-sided probability of a true zero
+    dof: Array  # of the t distribution with the same u and half width; infinite for a normal one
+    residual: Array
+    whitened: Array  # residuals under the most likely model, decorrelated, unit variance
+    gain: Array  # (p, n): beta = gain y under the most likely model
+    design: Design
+    white: float  # share of the noise models without correlation, 0..1
+    tau: tuple[float, float, float]  # correlation time: likeliest, 5 % and 95 % point, s
+    sigma: tuple[float, float, float]  # rms of the Gauss-Markov part: likeliest, 5 % and 95 % point
+    density: tuple[float, float, float]  # density N of the white part (unit sqrt(s)): likeliest, 5 % and 95 % point
+    best: tuple[float, float]  # tau and share of the most likely model
+    warnings: tuple[str, ...]
+
+
+def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3) -> Estimate:
+    """Coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
+
+    Raises RegressionError (a ValueError) for data that cannot carry the model and for windows without length or out
+    of order.  u, half width and interval are in the unit of the coefficients.
+    """
+    design = check_data(X, y, names, limit)
+    check_windows(t0, t1)
+    n, p = X.shape
+    grid = noise.cells(t0, t1)
+    scale = np.linalg.norm(X, axis=0)
+    Q, R = np.linalg.qr(X / scale)
+    start = Q.T @ y
+    rest = y - Q @ start
+    Z, logdet = noise.whiten(t0, t1, np.column_stack([Q, rest]), grid.tau, grid.share)
+    Z = Z.transpose(1, 0, 2)
+    zx, zy = Z[:, :, :p], Z[:, :, p]
+    M = zx.transpose(0, 2, 1) @ zx
+    xy = np.einsum("gnp,gn->gp", zx, zy)
+    Mi = np.linalg.inv(M)
+    b = np.einsum("gpq,gq->gp", Mi, xy)
+    rss = np.maximum(np.einsum("gn,gn->g", zy, zy) - np.einsum("gp,gp->g", xy, b), 0.0)
+    ll = -0.5 * (logdet + np.linalg.slogdet(M)[1] + (n - p) * np.log(np.maximum(rss, 1e-300)))
+    ll += np.log(grid.prior)
+    if np.linalg.norm(rest) <= 1e-12 * np.linalg.norm(y):  # ideal data: what is left is rounding, no noise
+        ll = np.where(grid.share == 0.0, 0.0, -np.inf)
+    w = np.exp(ll - ll.max())
+    w /= w.sum()
+
+    T = np.linalg.inv(R) / scale[:, None]  # back from orthonormal columns
+    each = (start + b) @ T.T
+    beta = T @ (start + w @ b)
+    s2 = rss / (n - p)
+    cov_each = s2[:, None, None] * (T @ Mi @ T.T)
+    off = each - beta
+    covariance = np.einsum("g,gpq->pq", w, cov_each) + np.einsum("g,gp,gq->pq", w, off, off)
+    sd_each = np.sqrt(np.diagonal(cov_each, axis1=1, axis2=2))
+    half = _half_width(w, off, sd_each, n - p)
+    sd = np.sqrt(np.diag(covariance))
+    sd = np.maximum(sd, 1e-300)
+    u = np.minimum(sd, half / NORMAL)
+    covariance = covariance * np.outer(u / sd, u / sd)
+    probability = _tails(w, off, sd_each, n - p, np.abs(beta))
+
+    k = int(np.argmax(ll))
+    Lk = zx[k] @ Mi[k]
+    scatter = zy[k] - zx[k] @ b[k]
+    gain = T @ _gain(Lk, t0, t1, grid.tau[k], grid.share[k])
+    window = float(np.median(t1 - t0))
+    v = noise.mean_variance(window / grid.tau)
+    white = float(w[grid.share == 0.0].sum())
+    tau = _spread(w, grid.tau, k, grid.share > 0.0)
+    sigma = _spread(w, np.sqrt(s2 * grid.share / v), k)
+    density = _spread(w, np.sqrt(s2 * (1.0 - grid.share) * window), k)
+    record = float(t1[-1] - t0[0])
+    warnings = []
+    if white < 0.5 and tau[2] > 0.15 * record:
+        warnings.append(
+            f"The correlation time of the drift is not bounded by this record (95 % point {tau[2]:.3g} s, record "
+            f"{record:.4g} s): slower drift looks like the constant term, whose interval then holds for this record only."
+        )
+    return Estimate(
+        tuple(names), beta, covariance, u, half, probability, _dof(half / u), y - X @ beta,
+        scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
+        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings),
+    )  # fmt: skip
+
+
+def check_windows(t0: Array, t1: Array) -> None:
+    """RegressionError unless every window has a length and starts where or after the one before has ended."""
+    from gyrobench.reduction.regression import RegressionError
+
+    length = t1 - t0
+    if np.any(~np.isfinite(length)) or np.any(length <= 0.0):
+        raise RegressionError("every window needs a finite positive length")
+    if np.any(t0[1:] - t1[:-1] < -1e-6 * length.min()):
+        raise RegressionError("windows overlap or are out of order")
+
+
+def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
+    """Probability of the mixture outside +-distance from its mean, per coefficient."""
+    upper = special.stdtr(dof, -(distance - off) / sd)
+    lower = special.stdtr(dof, -(distance + off) / sd)
+    out: Array = w @ (upper + lower)
+    return np.clip(out, 0.0, 1.0)
+
+
+def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) -> Array:
+    heavy = w > 1e-9
+    w, off, sd = w[heavy], off[heavy], sd[heavy]
+    high = np.max(np.abs(off) + special.stdtrit(dof, 0.5 + level / 2) * sd, axis=0)
+    low = np.zeros_like(high)
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        outside = _tails(w, off, sd, dof, middle) > 1.0 - level
+        low, high = np.where(outside, middle, low), np.where(outside, high, middle)
+    return high
+
+
+def _dof(ratio: Array) -> Array:
+    """Degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
+    table = np.concatenate([np.arange(1.0, 30.0, 0.25), np.geomspace(30.0, 1e4, 60)])
+    quantile = special.stdtrit(table, 0.975)
+    out = np.interp(ratio, quantile[::-1], table[::-1])
+    result: Array = np.where(ratio <= quantile[-1], np.inf, out)
+    return result
+
+
+def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = None) -> tuple[float, float, float]:
+    """Value of the likeliest model with the 5 % and 95 % points over all (``where``) models."""
+    if where is not None:
+        w = np.where(where, w, 0.0)
+        k = k if where[k] else int(np.argmax(w))
+    order = np.argsort(values)
+    total = np.cumsum(w[order]) / w.sum()
+    low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.05, 0.95))
+    return float(values[k]), low, high
+
+
+def _gain(projector: Array, t0: Array, t1: Array, tau: float, share: float) -> Array:
+    """(p, n): projector' times the whitening matrix of one model."""
+    eye, _ = noise.whiten(t0, t1, np.eye(t0.size), np.array([tau]), np.array([share]))
+    out: Array = projector.T @ eye[:, 0, :]
+    return out

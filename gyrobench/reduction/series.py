@@ -1,0 +1,131 @@
+"""Residuals as a time series: autocorrelation, whiteness tests, Allan deviation, spectrum.
+
+Residuals come as stretches: runs of windows of equal length without a gap.  Nothing is computed across a gap.
+[RED-ACF; 000_791234d3afc34a0c.txt eq. 4-23..4-63, 3-91..3-93; IEEE 952 for the Allan deviation]
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+Array = NDArray[np.float64]
+
+
+def stretches(t0: Array, t1: Array, x: Array, tolerance: float = 0.01) -> list[tuple[float, Array]]:
+    """(window length, values) of every run of equally long windows that follow one another, gaps <= tolerance."""
+    length = t1 - t0
+    scale = tolerance * float(np.median(length))
+    new = (np.abs(t0[1:] - t1[:-1]) > scale) | (np.abs(np.diff(length)) > scale)
+    edges = [0, *(np.flatnonzero(new) + 1).tolist(), x.size]
+    return [(float(np.mean(length[a:b])), x[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
+    """Autocorrelation about zero (residuals have no mean left), lag 0..lags in windows, with the 95 % white bound.
+
+    Biased low by the coefficients that were fitted; that is normal.  Pairs across gaps are left out.
+    """
+    power = sum(float(p @ p) for p in parts)
+    count = sum(p.size for p in parts)
+    rho, bound = [], []
+    for k in range(lags + 1):
+        pairs = sum(max(p.size - k, 0) for p in parts)
+        product = sum(float(p[k:] @ p[: p.size - k]) for p in parts if p.size > k)
+        rho.append(product / power * (count / pairs) if pairs and power > 0 else 0.0)
+        bound.append(NORMAL / math.sqrt(pairs) if pairs else 0.0)
+    return {"lag": [float(k) for k in range(lags + 1)], "rho": rho, "bound": bound}
+
+
+NORMAL = 1.959963984540054
+
+
+def ljung_box(acf: dict[str, list[float]], n: int, lags: int, fitted: int = 0) -> tuple[float, float]:
+    """Q = n (n + 2) sum rho_k^2/(n - k) over ``lags`` and its chi-squared probability, ``fitted`` noise parameters."""
+    rho = acf["rho"][1 : lags + 1]
+    q = n * (n + 2) * sum(r * r / (n - k) for k, r in enumerate(rho, 1))
+    return q, float(special.chdtrc(max(lags - fitted, 1), q))
+
+
+def runs_test(x: Array) -> tuple[float, float]:
+    """Wald-Wolfowitz runs about the median: z (negative: too few runs, slow drift) and its two-sided probability."""
+    sign = x[x != np.median(x)] > np.median(x)
+    n1, n2 = int(sign.sum()), int((~sign).sum())
+    if min(n1, n2) < 2:
+        return 0.0, 1.0
+    runs = 1 + int(np.sum(sign[1:] != sign[:-1]))
+    n = n1 + n2
+    mean = 2.0 * n1 * n2 / n + 1.0
+    variance = (mean - 1.0) * (mean - 2.0) / (n - 1.0)
+    z = (runs - mean) / math.sqrt(variance)
+    return z, float(2.0 * special.ndtr(-abs(z)))
+
+
+def normality(x: Array) -> tuple[float, float]:
+    """Shapiro-Wilk statistic and probability (up to 5000 values)."""
+    w, p = stats.shapiro(x[:5000])
+    return float(w), float(p)
+
+
+def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
+    """Overlapping Allan deviation of rate means, pooled over stretches of the most frequent window length.
+
+    tau [s], dev, lo, hi (95 %, unit of the data) by allantools (oadev, edf_greenhall for white noise, chi-squared);
+    slopes: local log-log slopes.  Empty when no stretch has ``minimum`` windows.
+    """
+    import allantools
+
+    chosen, window = _alike(parts, minimum)
+    if not chosen:
+        return {}
+    longest = max(p.size for p in chosen)
+    steps = [2**k for k in range(20) if 2**k <= longest // 3]
+    tau, dev, low, high = [], [], [], []
+    for m in steps:
+        square = freedom = 0.0
+        for p in (p for p in chosen if p.size >= 3 * m):
+            _, d, _, count = allantools.oadev(p, rate=1.0 / window, data_type="freq", taus=[m * window])
+            if len(d) == 0 or count[0] < 1:
+                continue
+            edf = allantools.edf_greenhall(alpha=0, d=2, m=m, N=p.size + 1, overlapping=True, modified=False)
+            square += float(d[0]) ** 2 * edf
+            freedom += edf
+        if freedom > 0.0 and square > 0.0:
+            value = math.sqrt(square / freedom)
+            tau.append(m * window)
+            dev.append(value)
+            low.append(value * math.sqrt(freedom / float(special.chdtri(freedom, 0.025))))
+            high.append(value * math.sqrt(freedom / float(special.chdtri(freedom, 0.975))))
+    slopes = [
+        {"from": a, "to": b, "slope": math.log(y / x) / math.log(b / a)}
+        for a, b, x, y in zip(tau, tau[1:], dev, dev[1:], strict=False)
+    ]
+    return {"tau": tau, "dev": dev, "lo": low, "hi": high, "slopes": slopes, "tau_unit": "s"}
+
+
+def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> dict[str, Any]:
+    """One-sided power spectral density (Welch, Hann), averaged over the stretches of the most frequent window length.
+
+    f [Hz], S [unit of the data squared per Hz].  The averaging windows act as a filter sinc^2(f T), not divided out.
+    """
+    from scipy import signal
+
+    chosen, window = _alike(parts, minimum)
+    if not chosen:
+        return {}
+    n = min(p.size for p in chosen)
+    both = [signal.welch(p, 1.0 / window, nperseg=n, detrend=False) for p in chosen]
+    mean = np.mean([s for _, s in both], axis=0)
+    return {"f": both[0][0][1:].tolist(), "S": mean[1:].tolist(), "f_unit": "Hz"}
+
+
+def _alike(parts: list[tuple[float, Array]], minimum: int) -> tuple[list[Array], float]:
+    long = [(w, p) for w, p in parts if p.size >= minimum]
+    if not long:
+        return [], 0.0
+    window = max(long, key=lambda item: item[1].size)[0]
+    return [p for w, p in long if abs(w - window) <= 0.02 * window], window

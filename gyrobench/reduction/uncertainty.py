@@ -1,0 +1,43 @@
+"""Uncertainty of type A and B together, and the verdict against a specification."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+NORMAL = 1.959963984540054
+DECISION_RULE = (
+    "Guard band equal to the expanded uncertainty U (95 %): pass when estimate ± U lies inside the limits, fail when it "
+    "lies outside, inconclusive when it holds a limit."
+)
+
+
+def combine(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
+    """Standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
+
+    u^2 = u_a^2 + sum of squares; U^2 = half_a^2 + 1.96^2 times the same sum (type B known with many degrees of freedom).
+    """
+    b2 = sum(c * c for c in contributions)
+    return math.sqrt(u_a * u_a + b2), math.sqrt(half_a * half_a + NORMAL**2 * b2)
+
+
+def verdict(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:
+    """pass, fail, inconclusive or "no specification given" by :data:`DECISION_RULE`; None is an open side."""
+    if limit is None or limit == (None, None):
+        return "no specification given"
+    low = -math.inf if limit[0] is None else limit[0]
+    high = math.inf if limit[1] is None else limit[1]
+    if not math.isfinite(estimate) or not math.isfinite(U):
+        return "inconclusive"
+    if low + U <= estimate <= high - U:
+        return "pass"
+    return "fail" if estimate + U < low or estimate - U > high else "inconclusive"
+
+
+def overall(verdicts: Iterable[str]) -> str:
+    """fail before inconclusive before pass; "no specification given" when none was."""
+    given = set(verdicts)
+    for word in ("fail", "inconclusive", "pass"):
+        if word in given:
+            return word
+    return "no specification given"
