@@ -31,7 +31,7 @@ class FloatedGyro(Component):
     `terms` says which model is meant: 3 = F, I, S; 4 = 3 + IS; 5 = 4 + II; 8 = 5 + SS, IO, OS; 9 = 8 + O;
     10 = 9 + OO.  A coefficient outside it must be 0.  Gauss-Markov: g+ = e^(-h/tau) g + sqrt(1 - e^(-2 h/tau))
     rms xi, stationary from the start, held over each internal step; white drift and pickoff noise by density.
-    With the default sizes a 60 s mean scatters by 0.0030 deg/h (white 0.0023, Gauss-Markov 0.0019, pickoff 0.0003).
+    With the default sizes a 60 s mean scatters by 0.0030 deg/h (white 0.0023, Gauss-Markov 0.0019, pickoff 0.0002).
 
     Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
     vibration, hysteresis and warm-up, float stops (b goes on where the pickoff saturates), torquer axis error.
