@@ -160,6 +160,28 @@ class Component:
             self._refresh()
         return self._at(s)
 
+    def read(self, references: Iterable[int]) -> list[float]:
+        """Values by value reference, as an FMU's get calls want them."""
+        found = [self._referenced(r) for r in references]
+        if any(s.section == "output" for s in found):
+            self._refresh()
+        return [self._at(s) for s in found]
+
+    def write(self, references: Iterable[int], values: Iterable[float]) -> None:
+        """Sets values by value reference.  A parameter is fixed once initialization has ended."""
+        for r, x in zip(references, values, strict=True):
+            s = self._referenced(r)
+            if self._running and s.section == "parameter":
+                raise PartError(
+                    f"{self.instance}: parameter {s.name} is fixed once initialization has ended: reset first"
+                )
+            self._put(s, x)
+
+    def _referenced(self, reference: int) -> Scalar:
+        if not 0 <= reference < len(self.layout):
+            raise PartError(f"{self.instance}: no variable has the value reference {reference}")
+        return self.layout[reference]
+
     def _find(self, name: str) -> Scalar:
         s = self._by_name.get(name)
         if s is None:
@@ -236,6 +258,8 @@ class Component:
 
     def do_step(self, t: float, step: float) -> None:
         """Advances from t to t + step with the inputs held.  Raises PartError."""
+        if not self._running:
+            raise PartError(f"{self.instance}: a step before initialization has succeeded")
         if not (math.isfinite(t) and math.isfinite(step) and step > 0.0):
             raise PartError(f"{self.instance}: a step must be positive and finite, not {step:g} s")
         for s in self.layout:

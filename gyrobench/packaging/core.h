@@ -39,15 +39,19 @@ static double *value(Part *p) { return (double *)&p->n.v; }
 /* ------------------------------------------------------------------------------------- refusals */
 static double plain(double x) { return x != x ? (double)NAN : x; } /* prints "nan", never "-nan" */
 
-static void fail(Part *p, const char *format, ...) {
+static void vfail(Part *p, const char *format, va_list a) {
     char text[512];
-    va_list a;
     if (p->failed) return; /* the first reason is the reason */
-    va_start(a, format);
     vsnprintf(text, sizeof text, format, a);
-    va_end(a);
     snprintf(p->message, sizeof p->message, "%s: %s", p->name, text);
     p->failed = 1;
+}
+
+static void fail(Part *p, const char *format, ...) {
+    va_list a;
+    va_start(a, format);
+    vfail(p, format, a);
+    va_end(a);
 }
 
 /* -------------------------------------------------------------------------------------- functions */

@@ -14,15 +14,31 @@ typedef struct {
 } Instance;
 
 static fmi2Status told(Instance *m) { /* the reason of a failure goes to the caller's log, once */
+    char format[2 * sizeof m->part.message];
+    size_t i = 0;
+    const char *c;
     if (!m->part.failed) return fmi2OK;
+    for (c = m->part.message; *c; c++) { /* the logger takes a printf format */
+        if (*c == '%') format[i++] = '%';
+        format[i++] = *c;
+    }
+    format[i] = 0;
     if (m->part.failed == 1 && m->logger)
-        m->logger(m->environment, m->part.name, fmi2Error, "logStatusError", "%s", m->part.message);
+        m->logger(m->environment, m->part.name, fmi2Error, "logStatusError", format);
     m->part.failed = 2;
     return fmi2Error;
 }
 
-static fmi2Status bad(Instance *m, const char *call, const char *why) {
-    if (m->logger) m->logger(m->environment, m->part.name, fmi2Error, "logStatusError", "%s: %s: %s", m->part.name, call, why);
+/* A wrong call: it is told, and leaves the instance as it was. */
+static fmi2Status wrong(Instance *m, const char *format, ...) {
+    const int before = m->part.failed;
+    va_list a;
+    va_start(a, format);
+    m->part.failed = 0;
+    vfail(&m->part, format, a);
+    va_end(a);
+    told(m);
+    m->part.failed = before;
     return fmi2Error;
 }
 
@@ -90,29 +106,31 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 /* ------------------------------------------------------------------------------------ variables */
-static int readable(Instance *m, const fmi2ValueReference vr[], size_t n) {
+static const char *const no_such = "no variable has the value reference %u";
+#define HAS(k) ((k) >= 0 && (k) < N_REFERENCES)
+
+static int has(Instance *m, const fmi2ValueReference vr[], size_t n) {
     size_t i;
-    for (i = 0; i < n; i++) {
-        if (vr[i] >= N_REFERENCES) return 0;
-        if (vr[i] >= Y0 && vr[i] < Y0 + N_Y) refresh(&m->part);
-    }
+    for (i = 0; i < n; i++)
+        if (!HAS((int)vr[i])) {
+            wrong(m, no_such, vr[i]);
+            return 0;
+        }
     return 1;
 }
-
-static int writable(Instance *m, fmi2ValueReference vr) {
-    if (vr >= N_REFERENCES) return 0;
-    return m->part.n.running == 0.0 || vr >= U0;
-}
-
-static const char *const no_such = "a value reference that this FMU does not have";
-static const char *const fixed = "a parameter is fixed once initialization has ended: reset first";
 
 #define GETTER(Name, Type, expression)                                                                   \
     fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, Type out[]) {      \
         Instance *m = (Instance *)c;                                                                     \
         size_t i;                                                                                        \
-        if (!readable(m, vr, n)) return bad(m, "fmi2Get" #Name, no_such);                                \
-        for (i = 0; i < n; i++) { const double x = value(&m->part)[vr[i]]; out[i] = expression; }        \
+        for (i = 0; i < n; i++) {                                                                        \
+            const int k = (int)vr[i];                                                                    \
+            double x;                                                                                    \
+            if (!HAS(k)) return wrong(m, no_such, vr[i]);                                                \
+            if (k >= Y0 && k < Y0 + N_Y) refresh(&m->part);                                              \
+            x = value(&m->part)[k];                                                                      \
+            out[i] = expression;                                                                         \
+        }                                                                                                \
         return told(m);                                                                                  \
     }
 #define SETTER(Name, Type)                                                                               \
@@ -120,8 +138,11 @@ static const char *const fixed = "a parameter is fixed once initialization has e
         Instance *m = (Instance *)c;                                                                     \
         size_t i;                                                                                        \
         for (i = 0; i < n; i++) {                                                                        \
-            if (!writable(m, vr[i])) return bad(m, "fmi2Set" #Name, vr[i] >= N_REFERENCES ? no_such : fixed); \
-            value(&m->part)[vr[i]] = (double)in[i];                                                      \
+            const int k = (int)vr[i];                                                                    \
+            if (!HAS(k)) return wrong(m, no_such, vr[i]);                                                \
+            if (k < U0 && m->part.n.running != 0.0)                                                      \
+                return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[k]); \
+            value(&m->part)[k] = (double)in[i];                                                          \
         }                                                                                                \
         m->part.n.dirty = 1.0;                                                                           \
         return fmi2OK;                                                                                   \
@@ -136,34 +157,34 @@ SETTER(Boolean, fmi2Boolean)
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String out[]) {
     (void)vr; (void)out;
-    return n == 0 ? fmi2OK : bad((Instance *)c, "fmi2GetString", "this FMU has no string variables");
+    return n == 0 ? fmi2OK : wrong((Instance *)c, "this FMU has no string variables");
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String in[]) {
     (void)vr; (void)in;
-    return n == 0 ? fmi2OK : bad((Instance *)c, "fmi2SetString", "this FMU has no string variables");
+    return n == 0 ? fmi2OK : wrong((Instance *)c, "this FMU has no string variables");
 }
 
 /* --------------------------------------------------------------------------------------- stepping */
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real step, fmi2Boolean noSetPrior) {
     Instance *m = (Instance *)c;
     (void)noSetPrior;
-    if (m->part.n.running == 0.0) return bad(m, "fmi2DoStep", "initialization has not succeeded");
+    if (m->part.n.running == 0.0) return wrong(m, "a step before initialization has succeeded");
     if (m->part.failed) return fmi2Error;
     do_step(&m->part, t, step);
     return told(m);
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) { return bad((Instance *)c, "fmi2CancelStep", "no step is asynchronous"); }
+fmi2Status fmi2CancelStep(fmi2Component c) { return wrong((Instance *)c, "fmi2CancelStep: no step is asynchronous"); }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
                                        const fmi2Real in[]) {
     (void)vr; (void)n; (void)order; (void)in;
-    return bad((Instance *)c, "fmi2SetRealInputDerivatives", "inputs are held, not interpolated");
+    return wrong((Instance *)c, "fmi2SetRealInputDerivatives: inputs are held, not interpolated");
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
                                         fmi2Real out[]) {
     (void)vr; (void)n; (void)order; (void)out;
-    return bad((Instance *)c, "fmi2GetRealOutputDerivatives", "not offered");
+    return wrong((Instance *)c, "fmi2GetRealOutputDerivatives: not offered");
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *s) { (void)c; (void)k; (void)s; return fmi2Discard; }
@@ -179,12 +200,12 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind k, fmi2Stri
 /* ------------------------------------------------------------------------------------------ state */
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     if (!*state) *state = malloc(sizeof(Numbers));
-    if (!*state) return bad((Instance *)c, "fmi2GetFMUstate", "out of memory");
+    if (!*state) return wrong((Instance *)c, "fmi2GetFMUstate: out of memory");
     memcpy(*state, &((Instance *)c)->part.n, sizeof(Numbers));
     return fmi2OK;
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-    if (!state) return bad((Instance *)c, "fmi2SetFMUstate", "no state given");
+    if (!state) return wrong((Instance *)c, "fmi2SetFMUstate: no state given");
     memcpy(&((Instance *)c)->part.n, state, sizeof(Numbers));
     ((Instance *)c)->part.failed = 0;
     return fmi2OK;
@@ -201,14 +222,14 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
     return fmi2OK;
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-    if (size < sizeof(Numbers)) return bad((Instance *)c, "fmi2SerializeFMUstate", "the buffer is too small");
+    if (size < sizeof(Numbers)) return wrong((Instance *)c, "fmi2SerializeFMUstate: the buffer is too small");
     memcpy(bytes, state, sizeof(Numbers));
     return fmi2OK;
 }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
-    if (size < sizeof(Numbers)) return bad((Instance *)c, "fmi2DeSerializeFMUstate", "too few bytes");
+    if (size < sizeof(Numbers)) return wrong((Instance *)c, "fmi2DeSerializeFMUstate: too few bytes");
     if (!*state) *state = malloc(sizeof(Numbers));
-    if (!*state) return bad((Instance *)c, "fmi2DeSerializeFMUstate", "out of memory");
+    if (!*state) return wrong((Instance *)c, "fmi2DeSerializeFMUstate: out of memory");
     memcpy(*state, bytes, sizeof(Numbers));
     return fmi2OK;
 }
@@ -220,8 +241,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     Vars seed;
     size_t i;
     memset(&seed, 0, sizeof seed);
-    if (!readable(m, unknown, n_unknown) || !readable(m, known, n_known))
-        return bad(m, "fmi2GetDirectionalDerivative", no_such);
+    if (!has(m, unknown, n_unknown) || !has(m, known, n_known)) return fmi2Error;
     for (i = 0; i < n_known; i++) ((double *)&seed)[known[i]] = dv[i];
     flow_d(&m->part, &seed);
     outputs_d(&m->part, &seed);

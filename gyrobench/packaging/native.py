@@ -68,7 +68,7 @@ def c_source(cls: type[Component], guid: str) -> str:
     ports = [f"{{{param[n.name]}, {samples + i}, {PER[n.per]}}}" for i, n in enumerate(cls.noises)]
     defines = {
         "MODEL_GUID": f'"{guid}"',
-        "N_REFERENCES": f"{len(layout)}u",
+        "N_REFERENCES": len(layout),
         "U0": first_of(cls, "input"),
         "Y0": first_of(cls, "output"),
         "X0": first_of(cls, "state"),

@@ -17,72 +17,89 @@ RUNTIME = ("component", "declare", "numerics", "math")
 
 SLAVE = '''\
 """Python FMU of {cls} {version}: the plain part behind the FMI calls."""
+import ctypes
+import functools
 import traceback
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
+from {unique}.component import PartError
 from {unique}.model import {cls} as Part
+
+
+def told(call):
+    """The refusal of a call, or the traceback of a fault, goes to the FMI log, even if logging is off.
+
+    pythonfmu 0.7.0 answers an exception with fmi2Fatal and drops its references to instance, class and log,
+    but uses them again when the instance is reset or freed: each is given one reference more.
+    """
+
+    @functools.wraps(call)
+    def guarded(self, *args):
+        try:
+            return call(self, *args)
+        except Exception as e:
+            text = str(e) if isinstance(e, PartError) else f"{{self.instance_name}}: {{traceback.format_exc()}}"
+            if self.logger:  # the C++ object: a pointer to its methods, then the bool "logging is on"
+                ctypes.c_bool.from_address(self.logger + ctypes.sizeof(ctypes.c_void_p)).value = True
+            self.log(text.replace("%", "%%"), Fmi2Status.error)  # the logger takes a printf format
+            for held in (self, type(self), self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
+            raise
+
+    return guarded
 
 
 class {cls}(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
+        self.logger = kwargs.get("logger", 0)
         self.part = Part(self.instance_name)
         self.t0 = 0.0
-
-    def told(self, action, *args):
-        """Runs an action; its refusal, or the traceback of a fault, goes to the log."""
-        try:
-            return action(*args)
-        except Exception as e:
-            text = str(e) if type(e).__name__ == "PartError" else traceback.format_exc()
-            self.log(text, Fmi2Status.error)
-            raise
 
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
         self.t0 = start_time
 
+    @told
     def exit_initialization_mode(self):
-        self.told(self.part.initialize, self.t0)
+        self.part.initialize(self.t0)
 
+    @told
     def do_step(self, current_time, step_size):
-        try:
-            self.told(self.part.do_step, current_time, step_size)
-        except Exception:
-            return False
-        return True
+        self.part.do_step(current_time, step_size)
+        return True  # False would be fmi2Discard, which a master may take for the planned end of the run
 
-    def read(self, vrs):
-        part, layout = self.part, self.part.layout
-        if any(layout[v].section == "output" for v in vrs):
-            self.told(part._refresh)
-        return [part._at(layout[v]) for v in vrs]
+    @told
+    def get_real(self, vrs):
+        return self.part.read(vrs)
 
-    def write(self, vrs, values):
-        part, layout = self.part, self.part.layout
-        for v, x in zip(vrs, values):
-            if part._running and layout[v].section == "parameter":
-                self.log(f"{{part.instance}}: {{layout[v].name}}: a parameter is fixed once initialization "
-                         "has ended: reset first", Fmi2Status.error)
-                raise ValueError(layout[v].name)
-            part._put(layout[v], x)
-
-    get_real = read
-    set_real = set_integer = set_boolean = write
-
+    @told
     def get_integer(self, vrs):
-        return [round(x) for x in self.read(vrs)]
+        return [round(x) for x in self.part.read(vrs)]
 
+    @told
     def get_boolean(self, vrs):
-        return [x != 0.0 for x in self.read(vrs)]
+        return [x != 0.0 for x in self.part.read(vrs)]
 
-    def reset(self):
-        self.part.reset()
+    @told
+    def set_real(self, vrs, values):
+        self.part.write(vrs, values)
 
+    set_integer = set_boolean = set_real
+
+    @told
+    def get_string(self, vrs):
+        raise PartError(f"{{self.instance_name}}: this FMU has no string variables")
+
+    def set_string(self, vrs, values):
+        self.get_string(vrs)
+
+    @told
     def _get_fmu_state(self):
         return self.part.get_state()
 
+    @told
     def _set_fmu_state(self, state):
         self.part.set_state(state)
 '''
