@@ -38,7 +38,7 @@ from gyrobench.declare import (
     make_layout,
     shape_of,
 )
-from gyrobench.math import Dual
+from gyrobench.math import Dual, lift
 from gyrobench.numerics import normal, phi1
 
 __all__ = [
@@ -338,9 +338,9 @@ class Component:
             _dig(getattr(twin, s.path[0]), s.path[1:]).d = weight
         twin._guard(twin.flow)
         twin._guard(twin.outputs)
-        der = [_dig(getattr(twin.der, s.path[0]), s.path[1:]).d for s in self.states]
+        der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
         out = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in self.layout if s.section == "output"]
-        return der, [y.d if isinstance(y, Dual) else 0.0 for y in out]
+        return der, [lift(y).d for y in out]
 
     def _advance(self, h: float) -> None:
         if self.integrator == "rk4":

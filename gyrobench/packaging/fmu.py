@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import importlib.util
 import inspect
 import os
@@ -70,7 +71,8 @@ def _guid(digest: str) -> str:
 def _tool_text() -> str:
     """All files whose text decides what a build writes."""
     here = Path(__file__).parent
-    files = sorted([*here.glob("*.py"), *here.glob("*.c"), *here.glob("*.h")])
+    names = ("compiler", "description", "description3", "fmu", "native", "python_target", "translate")
+    files = [*(here / f"{n}.py" for n in names), *sorted(here.glob("*.[ch]"))]
     files += [here.parent / f"{n}.py" for n in (*python_target.RUNTIME, "units")]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 
@@ -115,15 +117,15 @@ def _python_entries(cls: type[Component], guid: str, name: str) -> dict[str, byt
     module, files = python_target.resources(cls, guid)
     entries = {f"resources/{n}": t.encode() for n, t in files.items()}
     entries["resources/slavemodule.txt"] = module.encode()
-    spec = importlib.util.find_spec("pythonfmu")
-    assert spec is not None and spec.origin is not None
-    root = Path(spec.origin).parent
+    # not by import: a Python FMU that ran in this process has put its own copy first on the path
+    root = Path(str(importlib.metadata.distribution("pythonfmu").locate_file("pythonfmu")))
     for f in root.glob("*.py"):
         entries[f"resources/pythonfmu/{f.name}"] = f.read_bytes()
-    binaries = root / "resources" / "binaries"
-    for f in binaries.rglob("*"):
-        if f.suffix in (".so", ".dll", ".dylib"):
-            entries[f"binaries/{f.parent.name}/{name}{f.suffix}"] = f.read_bytes()
+    libraries = [f for f in (root / "resources" / "binaries").rglob("*") if f.suffix in (".so", ".dll", ".dylib")]
+    if not libraries:
+        raise BuildError(f"{root} holds no libraries: install pythonfmu again")
+    for f in libraries:
+        entries[f"binaries/{f.parent.name}/{name}{f.suffix}"] = f.read_bytes()
     return entries
 
 
@@ -150,11 +152,16 @@ def build(
     identifier = name
     model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
     what = _hash(model, _tool_text(), target, str(fmi), name)
-    how = "".join(p + compiler.identity(p) for p in platforms) if target == "native" else ""
+    readme = Path(inspect.getfile(cls)).parent / "README.md"
+    documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
+    if target == "native":
+        how = "".join(p + compiler.identity(p) for p in platforms)
+    else:
+        how = importlib.metadata.version("pythonfmu")
     guid = _guid(what)
     home = Bench.find(bench)
     suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
-    cached = home.cache / f"{name}{suffix}-{_hash(what, how)[:20]}.fmu"
+    cached = home.cache / f"{name}{suffix}-{_hash(what, how, documentation)[:20]}.fmu"
     if not cached.exists():
         if target == "native":
             entries = _native_entries(cls, guid, identifier, platforms, fmi)
@@ -166,9 +173,8 @@ def build(
             entries["modelDescription.xml"] = model_description3(cls, guid, identifier).encode()
         else:
             entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()
-        readme = Path(inspect.getfile(cls)).parent / "README.md"
-        if readme.exists():
-            entries["documentation/README.md"] = readme.read_bytes()
+        if documentation:
+            entries["documentation/README.md"] = documentation.encode()
         _zip(cached, entries)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,246 @@
+"""One instance of a part, driven by FMI names, whatever it is: the plain class or an FMU under FMPy.
+
+Tests, reference runs and validation use it.  Values are SI floats; an Integer or Boolean is given and returned
+as a float too.  Every failure raises :class:`InstanceError`, whose text is what the part said.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+from gyrobench.component import Component, PartError
+from gyrobench.packaging.fmu import build, load_part
+
+
+class InstanceError(Exception):
+    """A call failed: ``messages`` is what the part logged, ``status`` the FMI status (3 error, 4 fatal)."""
+
+    def __init__(self, call: str, status: int | None, messages: Sequence[str]) -> None:
+        self.call, self.status, self.messages = call, status, list(messages)
+        super().__init__("; ".join(messages) or f"{call}: status {status}, and no message")
+
+
+class Instance(Protocol):
+    """From instantiation on: set parameters and inputs, initialize, then set / step / get."""
+
+    def set(self, values: dict[str, float]) -> None: ...
+    def get(self, names: Sequence[str]) -> list[float]: ...
+    def initialize(self, t0: float = 0.0) -> None: ...
+    def step(self, t: float, h: float) -> None: ...
+    def get_state(self) -> Any: ...
+    def set_state(self, state: Any) -> None: ...
+    def save(self, state: Any) -> bytes: ...
+    def load(self, data: bytes) -> Any: ...
+    def reset(self) -> None: ...
+    def free(self) -> None: ...
+
+
+class Plain:
+    """The class itself."""
+
+    messages: ClassVar[list[str]] = []
+
+    def __init__(self, cls: type[Component], name: str = "part") -> None:
+        self.part = cls(name)
+
+    def _call(self, name: str, function: Callable[..., Any], *args: Any) -> Any:
+        try:
+            return function(*args)
+        except PartError as e:
+            raise InstanceError(name, None, [str(e)]) from e
+
+    def set(self, values: dict[str, float]) -> None:
+        references = [self.part._find(n).reference for n in values]
+        self._call("set", self.part.write, references, list(values.values()))
+
+    def get(self, names: Sequence[str]) -> list[float]:
+        values: list[float] = self._call("get", self.part.read, [self.part._find(n).reference for n in names])
+        return values
+
+    def initialize(self, t0: float = 0.0) -> None:
+        self._call("initialize", self.part.initialize, t0)
+
+    def step(self, t: float, h: float) -> None:
+        self._call("step", self.part.do_step, t, h)
+
+    def get_state(self) -> Any:
+        return self.part.get_state()
+
+    def set_state(self, state: Any) -> None:
+        self.part.set_state(state)
+
+    def save(self, state: Any) -> bytes:
+        return json.dumps(state).encode()
+
+    def load(self, data: bytes) -> Any:
+        return json.loads(data)
+
+    def reset(self) -> None:
+        self.part.reset()
+
+    def free(self) -> None:
+        pass
+
+
+_logs: dict[int, list[str]] = {}
+_ids = itertools.count(1)
+_logger: dict[str, Any] = {}
+
+
+def _log2(environment: int | None, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+    if status > 1 and not message.startswith(b"Fatal py exception"):  # pythonfmu's second, emptier message
+        _logs.setdefault(environment or 0, []).append(message.decode("utf-8", "replace").replace("%%", "%"))
+
+
+def _log3(environment: int | None, status: int, _category: bytes, message: bytes) -> None:
+    if status > 1:
+        _logs.setdefault(environment or 0, []).append(message.decode("utf-8", "replace"))
+
+
+class Fmu:
+    """An FMU of either FMI version, by FMPy.
+
+    ``like`` is an instance of the same FMU, whose unzipped files are used too (it must live longer).
+    """
+
+    def __init__(self, path: Path, name: str = "part", like: Fmu | None = None, logging: bool = True) -> None:
+        import fmpy
+
+        self._own = like is None
+        if like is None:
+            self.description = fmpy.read_model_description(str(path), validate=False)
+            self.folder = Path(fmpy.extract(str(path), tempfile.mkdtemp(prefix="gyrobench-")))
+        else:
+            self.description, self.folder = like.description, like.folder
+        self.three = self.description.fmiVersion.startswith("3")
+        self.identity = next(_ids)
+        self.messages = _logs.setdefault(self.identity, [])
+        self.variables = {v.name: v for v in self.description.modelVariables}
+        self.t0 = 0.0
+        arguments = {
+            "guid": self.description.guid,
+            "unzipDirectory": str(self.folder),
+            "modelIdentifier": self.description.coSimulation.modelIdentifier,
+            "instanceName": name,
+        }
+        if self.three:
+            self._instantiate3(arguments, logging)
+        else:
+            self._instantiate2(arguments, logging)
+
+    def _instantiate2(self, arguments: dict[str, str], logging: bool) -> None:
+        from fmpy import calloc, fmi2, free
+
+        if "2" not in _logger:
+            _logger["2"] = fmi2.fmi2CallbackLoggerTYPE(_log2)
+        self.callbacks = fmi2.fmi2CallbackFunctions()
+        self.callbacks.logger = _logger["2"]
+        self.callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+        self.callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+        self.callbacks.componentEnvironment = self.identity
+        self.fmu = fmi2.FMU2Slave(**arguments)
+        self._call("instantiate", self.fmu.instantiate, callbacks=self.callbacks, loggingOn=logging)
+
+    def _instantiate3(self, arguments: dict[str, str], logging: bool) -> None:
+        from fmpy import fmi3
+
+        def log(_environment: Any, status: int, category: bytes, message: bytes) -> None:
+            _log3(self.identity, status, category, message)
+
+        self.fmu = fmi3.FMU3Slave(**arguments)
+        self._call("instantiate", self.fmu.instantiate, loggingOn=logging, logMessage=log)
+
+    def _call(self, name: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        from fmpy.fmi1 import FMICallException
+
+        self.messages.clear()
+        try:
+            return function(*args, **kwargs)
+        except FMICallException as e:
+            raise InstanceError(name, e.status, self.messages) from None
+        except Exception as e:  # FMPy's own words when instantiation gives no instance
+            if name != "instantiate":
+                raise
+            raise InstanceError(name, None, self.messages or [str(e)]) from None
+
+    def _groups(self, names: Iterable[str]) -> dict[str, list[str]]:
+        groups: dict[str, list[str]] = {}
+        for n in names:
+            groups.setdefault(self.variables[n].type, []).append(n)
+        return groups
+
+    def set(self, values: dict[str, float]) -> None:
+        for kind, names in self._groups(values).items():
+            whole = {"Real": float, "Float64": float, "Boolean": bool}.get(kind, int)
+            given = [whole(values[n]) for n in names]
+            references = [self.variables[n].valueReference for n in names]
+            self._call("set", getattr(self.fmu, f"set{kind}"), references, given)
+
+    def get(self, names: Sequence[str]) -> list[float]:
+        found: dict[str, float] = {}
+        for kind, group in self._groups(names).items():
+            references = [self.variables[n].valueReference for n in group]
+            values = self._call("get", getattr(self.fmu, f"get{kind}"), references)
+            found.update(zip(group, map(float, values), strict=True))
+        return [found[n] for n in names]
+
+    def initialize(self, t0: float = 0.0) -> None:
+        if self.three:
+            self._call("initialize", self.fmu.enterInitializationMode, startTime=t0)
+        else:
+            self._call("initialize", self.fmu.setupExperiment, startTime=t0)
+            self._call("initialize", self.fmu.enterInitializationMode)
+        self._call("initialize", self.fmu.exitInitializationMode)
+
+    def step(self, t: float, h: float) -> None:
+        self._call("step", self.fmu.doStep, t, h)
+
+    def derivative(self, unknown: Sequence[str], known: dict[str, float]) -> list[float]:
+        """Directional derivative of the unknowns along ``known``."""
+        z = [self.variables[n].valueReference for n in unknown]
+        v = [self.variables[n].valueReference for n in known]
+        return list(self._call("derivative", self.fmu.getDirectionalDerivative, z, v, list(known.values())))
+
+    def get_state(self) -> Any:
+        return self._call("state", self.fmu.getFMUState if self.three else self.fmu.getFMUstate)
+
+    def set_state(self, state: Any) -> None:
+        self._call("state", self.fmu.setFMUState if self.three else self.fmu.setFMUstate, state)
+
+    def save(self, state: Any) -> bytes:
+        serialize = self.fmu.serializeFMUState if self.three else self.fmu.serializeFMUstate
+        return bytes(self._call("state", serialize, state))
+
+    def load(self, data: bytes) -> Any:
+        deserialize = self.fmu.deserializeFMUState if self.three else self.fmu.deSerializeFMUstate
+        return self._call("state", deserialize, data)
+
+    def reset(self) -> None:
+        self._call("reset", self.fmu.reset)
+
+    def free(self) -> None:
+        """Frees the instance, and the unzipped folder if it was made for it."""
+        self.fmu.freeInstance()
+        _logs.pop(self.identity, None)
+        if self._own:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
+TARGETS = ("plain", "python", "native", "native-fmi3")
+
+
+def make(part: str | type[Component], target: str, name: str = "part", bench: Path | None = None) -> Instance:
+    """A fresh instance of a part for one of :data:`TARGETS`; FMUs are built (or taken from the cache)."""
+    if target == "plain":
+        return Plain(load_part(part, bench) if isinstance(part, str) else part, name)
+    if target not in TARGETS:
+        raise ValueError(f"target {target!r}: one of {', '.join(TARGETS)}")
+    with tempfile.TemporaryDirectory(prefix="gyrobench-") as out:
+        kind, fmi = target.removesuffix("-fmi3"), 3 if target.endswith("-fmi3") else 2
+        return Fmu(build(part, kind, fmi=fmi, out=Path(out), bench=bench), name)
