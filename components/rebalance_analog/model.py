@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Input, Noise, Output, Parameter, State
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
 from gyrobench.math import clip, floor
 
 
@@ -9,7 +9,12 @@ class RebalanceAnalog(Component):
 
         wish = K_p u + K_i q,   q' = u            i = wish limited to +-i_max
         q' = 0 while the limit is reached and u pushes further (conditional integration: no wind-up)
-        i_read = i + noise, rounded to the resolution
+        i_read = i_flowed + noise, rounded to the resolution
+
+    i is what flows from now on, i_flowed what flowed during the step that ends now: that is what an integrating
+    meter reads, and what balanced the gyro up to now.  Read so, the exchange of u and i once a step does not
+    shift the reading against the table angle (read as i it is one step early).  One internal step is one
+    communication step (`step` is large for that reason); q is exact for a held u.
 
     The pickoff gives u = K_sg b and the torquer gives -H k i on the float, so the loop of the spec,
     M = -20 b - 200 (integral of b) in N.m, is K_p = 20 / (K_sg H k), K_i = 200 / (K_sg H k).  With
@@ -24,6 +29,7 @@ class RebalanceAnalog(Component):
 
     version = "1.0.0"
 
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     K_p = Parameter(119.92139898087, "A/V", "proportional gain", min=0.0)
     K_i = Parameter(1199.2139898087, "A/(V.s)", "integral gain", min=0.0)
     i_max = Parameter(0.05, "A", "current limit", above=0.0)
@@ -38,16 +44,28 @@ class RebalanceAnalog(Component):
 
     q = State(0.0, "V.s", "integral of the pickoff voltage")
 
+    present = Discrete(0.0, "A", "current from now on")
+    flowed = Discrete(0.0, "A", "current during the last step")
+
+    def start(self) -> None:
+        self.present = clip(self.K_p * self.u + self.K_i * self.q, -self.i_max, self.i_max)
+        self.flowed = self.present
+
     def flow(self) -> None:
         wish = self.K_p * self.u + self.K_i * self.q
         self.der.q = self.u
         if (wish > self.i_max and self.u > 0.0) or (wish < -self.i_max and self.u < 0.0):
             self.der.q = 0.0
 
+    @sampled(every=1)
+    def tick(self) -> None:
+        self.flowed = self.present
+        self.present = clip(self.K_p * self.u + self.K_i * self.q, -self.i_max, self.i_max)
+
     def outputs(self) -> None:
         wish = self.K_p * self.u + self.K_i * self.q
         self.i = clip(wish, -self.i_max, self.i_max)
-        read = self.i + self.noise.meter
+        read = self.flowed + self.noise.meter
         if self.resolution > 0.0:
             read = self.resolution * floor(read / self.resolution + 0.5)
         self.i_read = read

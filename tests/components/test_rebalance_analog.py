@@ -71,7 +71,16 @@ def test_resolution():
     out = feed(started(resolution=1e-6, K_i=0.0, K_p=1.0), lambda k: 1.37e-7 * k - 5e-6, 100)
     steps = out[:, 1] / 1e-6
     assert steps == pytest.approx(np.round(steps), abs=1e-9)
-    assert abs(out[:, 1] - out[:, 0]).max() <= 0.5e-6 + 1e-15
+    assert abs(out[1:, 1] - out[:-1, 0]).max() <= 0.5e-6 + 1e-15
+
+
+def test_the_meter_reads_the_current_of_the_step_that_ends():
+    out = feed(started(), lambda k: 1e-5 * k, 50)
+    assert (out[1:, 1] == out[:-1, 0]).all()
+    part = started()
+    part.u = 1e-5
+    part.initialize()
+    assert part.i == part.i_read == pytest.approx(part.K_p * 1e-5)
 
 
 @pytest.mark.parametrize("h", [1e-3, 4e-3])
