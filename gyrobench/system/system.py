@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -193,7 +194,7 @@ def load_system(name: str, bench: Path | None = None) -> System:
     """
     folder = Bench.find(bench).system_folder(name)
     file = folder / "system.py"
-    module_name = f"gyrobench_system_{name}"
+    module_name = f"gyrobench_system_{name}_{zlib.crc32(str(folder.resolve()).encode()):08x}"
     spec = importlib.util.spec_from_file_location(module_name, file, submodule_search_locations=[str(folder)])
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

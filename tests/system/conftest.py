@@ -1,10 +1,12 @@
-"""A small system for the tests: the standard parts on a short plan, and FMUs built from the C files of tests/foreign."""
+"""A small system for the tests (the standard parts on a short plan) and the foreign FMUs."""
 
 from __future__ import annotations
 
+import importlib.util
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -19,7 +21,7 @@ class SmallTumble(System):
 
     title = "small tumble"
     spec = ("TEST",)
-    slots = {
+    slots: ClassVar = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
         "table": Slot("Table", "table_rate"),
@@ -47,7 +49,7 @@ class SmallTumble(System):
         rebalance.i_read -> sampler.x
         rebalance.saturated -> sampler.flag
     """
-    options = {
+    options: ClassVar = {
         "latitude": Option("45.75deg", "rad", "geographic latitude", min=-math.pi / 2, max=math.pi / 2),
         "dwell": Option(0.4, "s", "dwell of the fixed phases"),
         "turns": Option(0.05, "1", "turns at the rate"),
@@ -74,12 +76,25 @@ class SmallTumble(System):
         return ["latitude 0: nothing to see"] if self["latitude"] == 0.0 else []
 
 
-
 @pytest.fixture
 def small() -> SmallTumble:
     return SmallTumble()
 
 
-@pytest.fixture
-def foreign() -> Path:
-    return Path(__file__).parents[1] / "foreign"
+@pytest.fixture(scope="session")
+def make(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Builds a foreign FMU of tests/foreign once."""
+    file = Path(__file__).parents[1] / "foreign" / "make.py"
+    spec = importlib.util.spec_from_file_location("foreign_make", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("foreign")
+    done: dict[str, Path] = {}
+
+    def make_once(name: str) -> Path:
+        if name not in done:
+            done[name] = module.make(name, folder)
+        return done[name]
+
+    return make_once
