@@ -58,7 +58,7 @@ class Table:
     def __post_init__(self) -> None:
         for k, column in enumerate(self.columns):
             cells = [row.cells[k] for row in self.rows if not row.group]
-            column.number = column.number or bool(cells) and any(c.number for c in cells)
+            column.number = column.number or any(c.number for c in cells)
             column.width = max((len(c.rest) for c in cells), default=0)
 
 
@@ -177,6 +177,12 @@ def walk(blocks: list[Any]) -> list[Any]:
     return out
 
 
+def pictures(*items: Picture) -> list[Any]:
+    """The pictures that have something to show, as one block; no block when none has."""
+    shown = [p for p in items if p.svg]
+    return [Pictures(shown)] if shown else []
+
+
 def text_cell(value: Any, mark: str = "") -> Cell:
     return Cell(text="" if value is None else str(value), mark=mark)
 
@@ -194,10 +200,7 @@ def number_cell(
     value = look(doc, *path)
     if isinstance(value, str | list | dict):
         return text_cell(value, mark)
-    if write is write_number:
-        written = write_number(value, u, significant, trim)
-    else:
-        written = write(value)
+    written = write_number(value, u, significant, trim) if write is write_number else write(value)
     return Cell(
         written.text, written.whole, written.rest, written.full, pointer(*path) if written.full else "", mark, True
     )

@@ -38,7 +38,7 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
     docs = [document(result) for _, result in results]
     facts = [_facts(doc) for doc in docs]
     keys = list(dict.fromkeys(k for f in facts for k in f))
-    rows = [{"what": key, "values": [f.get(key) for f in facts]} for key in keys]
+    rows = [row for key in keys for row in _spread(key, [f.get(key) for f in facts])]
     content = {
         "baseline": baseline,
         "runs": [
@@ -46,8 +46,12 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
             for name, doc in zip(names, docs, strict=True)
         ],
         "differing": [r for r in rows if any(v != r["values"][0] for v in r["values"])],
-        "equal": [{"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])],
-        "measures": [_measure(docs, key, baseline) for key in dict.fromkeys(_key(c) for d in docs for c in d["coefficients"])],
+        "equal": [
+            {"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])
+        ],
+        "measures": [
+            _measure(docs, key, baseline) for key in dict.fromkeys(_key(c) for d in docs for c in d["coefficients"])
+        ],
     }
     return {"schema": SCHEMA, "report_id": content_hash(content), **content}
 
@@ -87,8 +91,23 @@ def _facts(doc: Json) -> dict[str, Any]:
     facts |= {f"parameter {k}": v for k, v in (run.get("parameters") or {}).items()}
     facts |= {f"option {k}": v for k, v in (run.get("options") or {}).items()}
     facts |= {f"version {k}": v for k, v in (run.get("versions") or {}).items()}
-    facts |= {"plan": run.get("plan"), "noise model": doc["noise"]}
+    facts |= {f"plan phase {k + 1}": phase for k, phase in enumerate(run.get("plan") or [])}
+    facts["noise model"] = doc["noise"].get("model")
     return facts
+
+
+def _spread(what: str, values: list[Any]) -> list[Json]:
+    """A fact as rows: lists and dictionaries that differ are taken apart, so that only what differs is shown."""
+    differs = any(v != values[0] for v in values)
+    if differs and all(isinstance(v, dict) for v in values):
+        keys = list(dict.fromkeys(k for v in values for k in v))
+        return [row for k in keys for row in _spread(f"{what}, {k}", [v.get(k) for v in values])]
+    if differs and all(isinstance(v, list) and len(v) == len(values[0]) for v in values):
+        parts = [(k, [v[k] for v in values]) for k in range(len(values[0]))]
+        return [
+            row for k, part in parts if any(p != part[0] for p in part) for row in _spread(f"{what}[{k + 1}]", part)
+        ]
+    return [{"what": what, "values": values}]
 
 
 def page(doc: Json) -> Page:
@@ -117,7 +136,13 @@ def _letter(k: int) -> str:
 
 def _runs(doc: Json) -> Table:
     rows = [
-        Row([text_cell(_letter(k), "strong"), *(text_cell(run[c]) for c in ("name", "system", "report_id")), text_cell(run["verdict"], run["verdict"])])
+        Row(
+            [
+                text_cell(_letter(k), "strong"),
+                *(text_cell(run[c]) for c in ("name", "system", "report_id")),
+                text_cell(run["verdict"], run["verdict"]),
+            ]
+        )
         for k, run in enumerate(doc["runs"])
     ]
     columns = [Column(""), Column("run", wide=True), Column("system"), Column("report"), Column("verdict")]
@@ -136,7 +161,9 @@ def _differing(doc: Json) -> list[Any]:
             for i, row in enumerate(doc["differing"])
         ]
         columns = [Column("what"), *(Column(_letter(k), wide=True) for k in part)]
-        blocks.append(Table(columns, rows, "Parts, parameters and settings that differ; parameters in SI units.", small=True))
+        blocks.append(
+            Table(columns, rows, "Parts, parameters and settings that differ; parameters in SI units.", small=True)
+        )
     return blocks
 
 
@@ -197,8 +224,10 @@ def _differences(doc: Json) -> list[Any]:
         columns = [Column("name"), Column("unit")]
         for k in part:
             name = f"{_letter(k)} − {_letter(base)}"
-            columns += [Column(name), Column("U (95\N{NO-BREAK SPACE}%)"), Column("")]
-        caption = f"Differences to the baseline {_letter(base)} with their expanded uncertainty, the runs taken as independent."
+            columns += [Column(name), Column("U (95 %)"), Column("")]
+        caption = (
+            f"Differences to baseline {_letter(base)} with their expanded uncertainty, the runs taken as independent."
+        )
         blocks.append(Table(columns, rows, caption))
     blocks.append(
         Text(
@@ -222,9 +251,11 @@ def _figures(doc: Json) -> list[Any]:
             continue
         fig, axes = figure(HALF, 15 + 5.5 * len(shown))
         base = m["runs"][doc["baseline"]]
-        plots.strip(axes[0, 0], [n for n, _ in shown], [v for _, v in shown], m["unit"], m["name"], base and base["estimate"])
+        plots.strip(
+            axes[0, 0], [n for n, _ in shown], [v for _, v in shown], m["unit"], m["name"], base and base["estimate"]
+        )
         key = f"measure-{i + 1}"
-        caption = f"{m['name']}, {m['meaning']}: estimates with 95\N{NO-BREAK SPACE}% intervals; dashed: the baseline."
+        caption = f"{m['name']}, {m['meaning']}: estimates with 95 % intervals; dashed: the baseline."
         alt = f"{m['name']} of all runs with intervals on one scale"
         pictures.append(Picture(key, svg(fig, key), caption, alt, half=True))
     return [Pictures(pictures)] if pictures else []
@@ -234,6 +265,7 @@ def _equal(doc: Json) -> list[Any]:
     if not doc["equal"]:
         return []
     rows = [Row([text_cell(row["what"]), _value(doc, ("equal", i, "value"))]) for i, row in enumerate(doc["equal"])]
-    table = Table([Column("what"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True)
+    table = Table(
+        [Column("what"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
+    )
     return [Fold(f"{len(rows)} entries", [table])]
-

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+from gyrobench.bench import standard_folder
 
 
-def content_dir(bench: Path | None = None, name: str = "report.html.j2") -> Path:
-    """Folder that holds the content file ``name``.
+def content_dir(bench: Path | None = None, name: str = "templates/report.html.j2") -> Path:
+    """The ``reports`` folder that holds the content file ``name``: the bench's own before the standard one.
 
-    ``<bench>/reports`` where it has that file, otherwise the standard bench: ``gyrobench/_bench/reports``
-    of an installed wheel, or ``reports/`` of a checkout.  Raises FileNotFoundError when none has it.
+    Raises FileNotFoundError when neither has it.
     """
-    candidates = [_PACKAGE / "_bench" / "reports", _PACKAGE.parent / "reports"]
+    candidates = [standard_folder() / "reports"]
     if bench is not None:
         candidates.insert(0, Path(bench) / "reports")
     for folder in candidates:

@@ -67,7 +67,8 @@ def _shares(lines: Sequence[Mapping[str, Any]], names: Sequence[str], u: Mapping
                 pieces[b["coefficient"]] += (b["contribution"] / float(u[b["coefficient"]] or 1.0)) ** 2
         ax.barh(
             range(len(names)), [pieces[n] for n in names], left=[left[n] for n in names], height=0.66,
-            color=colours.get(source, SKY), hatch=_HATCHES[k], edgecolor="#fefefe", linewidth=0.4, label=short(source, 46),
+            color=colours.get(source, SKY), hatch=_HATCHES[k], edgecolor="#fefefe", linewidth=0.4,
+            label=short(source, 46),
         )  # fmt: skip
         for n in names:
             left[n] += pieces[n]
@@ -128,13 +129,17 @@ def system(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str
     ax.set_xlim(-0.5, n - 0.5)
     ax.set_ylim(tops[-1], 0)
     middle = [0.5 * (tops[row] + tops[row + 1]) for row in range(n)]
-    for (i, j), names in cells.items():
+    for i, j in cells:
         forward = j > i
         colour, dash = (BLUE, "-") if forward else (VERMILION, (0, (4, 2)))
         edge = 0.42 if forward else -0.42
-        ax.plot([i + edge, j, j], [middle[i], middle[i], middle[j]], linestyle=dash, color=colour, linewidth=1.0, zorder=1)
+        ax.plot(
+            [i + edge, j, j], [middle[i], middle[i], middle[j]], linestyle=dash, color=colour, linewidth=1.0, zorder=1
+        )
         tip = middle[j] - 0.75 if forward else middle[j] + 0.75
-        ax.plot([j], [tip - (0.12 if forward else -0.12)], "v" if forward else "^", color=colour, markersize=4, zorder=2)
+        ax.plot(
+            [j], [tip - (0.12 if forward else -0.12)], "v" if forward else "^", color=colour, markersize=4, zorder=2
+        )
     for (i, j), names in cells.items():
         text = ax.text(
             j, middle[i], "\n".join(short(m, 17) for m in names), ha="center", va="center", fontsize=7.5,
@@ -142,7 +147,9 @@ def system(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str
         )  # fmt: skip
         text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 1.2})
     for row, name in enumerate(order):
-        box = Rectangle((row - 0.42, middle[row] - 0.7), 0.84, 1.4, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=4)
+        box = Rectangle(
+            (row - 0.42, middle[row] - 0.7), 0.84, 1.4, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=4
+        )
         ax.add_patch(box)
         ax.text(row, middle[row], f"{row + 1}  {short(name, 14)}", ha="center", va="center", color=INK, zorder=5)
     return svg(fig, key)

@@ -58,7 +58,13 @@ def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | 
 def fit(series: Sequence[Json], key: str, everything: Sequence[Json]) -> str:
     """Points, fit and, beneath on the same axis, residuals; scales shared with all other series."""
     fig, axes = figure(
-        WIDE if len(series) > 1 else WIDE * 0.75, 84, nrows=2, ncols=len(series), sharex="col", sharey="row", height_ratios=[2.2, 1]
+        WIDE if len(series) > 1 else WIDE * 0.75,
+        84,
+        nrows=2,
+        ncols=len(series),
+        sharex="col",
+        sharey="row",
+        height_ratios=[2.2, 1],
     )
     for k, s in enumerate(series):
         top, bottom = axes[0, k], axes[1, k]
@@ -149,7 +155,7 @@ def acf(data: Json, key: str) -> str:
 
 
 def quantiles(residuals: Sequence[float], key: str) -> str:
-    """Residuals, standardized, against normal quantiles, with the pointwise 95 % band of normal samples."""
+    """Residuals, standardized, against normal quantiles, with the pointwise 95 % band of normal samples."""
     import numpy as np
     from scipy.special import betaincinv, ndtri
 
@@ -175,7 +181,7 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
 
 
 def allan(data: Json, key: str) -> str:
-    """Allan deviation against averaging time with 95 % intervals, both axes logarithmic."""
+    """Allan deviation against averaging time with 95 % intervals, both axes logarithmic."""
     tau, dev, low, high = finite(data["tau"], data["dev"], data.get("lo") or data["dev"], data.get("hi") or data["dev"])
     rows = [r for r in zip(tau, dev, low, high, strict=True) if r[0] > 0 and r[1] > 0]
     if len(rows) < 2:
@@ -259,7 +265,7 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
 
 
 def scores(names: Sequence[str], z: Sequence[float], k: Sequence[float], key: str) -> str:
-    """(estimate - truth) / u of each coefficient with the band in which 95 % should lie."""
+    """(estimate - truth) / u of each coefficient with the band in which 95 % should lie."""
     rows = [(n, v, w) for n, v, w in zip(names, z, k, strict=True) if v is not None and w is not None]
     if not rows:
         return ""
@@ -279,7 +285,12 @@ def scores(names: Sequence[str], z: Sequence[float], k: Sequence[float], key: st
 
 
 def strip(
-    ax: Any, names: Sequence[str], values: Sequence[tuple[float, float, float]], unit: str, title: str, baseline: float | None
+    ax: Any,
+    names: Sequence[str],
+    values: Sequence[tuple[float, float, float]],
+    unit: str,
+    title: str,
+    baseline: float | None,
 ) -> None:
     """Estimates with intervals, one row per run, on one axis; dashed the baseline (comparison reports)."""
     if baseline is not None:

@@ -20,6 +20,14 @@ def equations(page: Page) -> None:
             block.svg = equation_svg(block.source, f"equation-{section.slug}-{k}")
 
 
+def _typst(files: dict[str, bytes], **options: Any) -> Any:
+    """Compile in memory; the files are named as in the source, "main.typ" first."""
+    import typst
+
+    compile_: Any = typst.compile  # its type stub leaves out the dictionary of files
+    return compile_(files, ignore_system_fonts=True, **options)
+
+
 def equation_svg(source: str, key: str) -> str:
     """Typst math as an SVG in the colour of the text; "" when it cannot be read."""
     import typst
@@ -30,7 +38,7 @@ def equation_svg(source: str, key: str) -> str:
         '#math.equation(block: true, eval(json("data.json").equation, mode: "math"))'
     )
     try:
-        drawn = typst.compile({"main.typ": main.encode(), "data.json": data}, format="svg", ignore_system_fonts=True)
+        drawn = _typst({"main.typ": main.encode(), "data.json": data}, format="svg")
     except (RuntimeError, typst.TypstError):
         return ""
     text = drawn[0] if isinstance(drawn, list) else drawn
@@ -40,25 +48,27 @@ def equation_svg(source: str, key: str) -> str:
 def html(page: Page, bench: Path | None = None) -> str:
     """The page as one self-contained HTML file."""
     import jinja2
+    import markupsafe
 
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(read_content("report.html.j2", bench))
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    template = environment.from_string(read_content("templates/report.html.j2", bench))
     data = asdict(page)
     for section in data["sections"]:
         for block in section["blocks"]:
             _theme(block)
-    css = jinja2.utils.markupsafe.Markup(read_content("report.css", bench))
-    script = jinja2.utils.markupsafe.Markup(read_content("zoom.js", bench))
+    css = markupsafe.Markup(read_content("templates/report.css", bench))
+    script = markupsafe.Markup(read_content("templates/zoom.js", bench))
     return template.render(page=_Attributes.of(data), css=css, script=script)
 
 
 def pdf(page: Page, bench: Path | None = None) -> bytes:
     """The page as a PDF (A4, searchable text, vector figures)."""
     import matplotlib
-    import typst
 
     data = asdict(page)
-    files: dict[str, bytes] = {"main.typ": read_content("report.typ", bench).encode()}
+    files: dict[str, bytes] = {"main.typ": read_content("templates/report.typ", bench).encode()}
     for picture in page.pictures:
         files[f"figures/{picture.key}.svg"] = picture.svg.encode()
     data.pop("pictures")
@@ -67,7 +77,7 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
             _strip(block)
     files["data.json"] = json.dumps(data, ensure_ascii=False).encode()
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    made: bytes = typst.compile(files, ignore_system_fonts=True, font_paths=[str(fonts)])
+    made: bytes = _typst(files, font_paths=[str(fonts)])
     return made
 
 

@@ -1,11 +1,11 @@
 """Acceptance specifications: TOML files with a limit per coefficient, in the unit of the report.
 
-    title = "Acceptance of the standard floated gyro"
+title = "Acceptance of the standard floated gyro"
 
-    [coefficients.D_I]
-    unit = "°/h/g"
-    min = -1.5
-    max = 1.5
+[coefficients.D_I]
+unit = "°/h/g"
+min = -1.5
+max = 1.5
 """
 
 from __future__ import annotations
@@ -77,10 +77,12 @@ def _check(path: Path, name: str, entry: Any) -> None:
     if unknown:
         raise SpecificationError(f"{where}: unknown key {sorted(unknown)[0]!r}; allowed are unit, min, max, note")
     if not isinstance(entry.get("unit"), str) or not entry["unit"]:
-        raise SpecificationError(f"{where}: unit is missing, for example unit = \"°/h\"")
+        raise SpecificationError(f'{where}: unit is missing, for example unit = "°/h"')
     for side in ("min", "max"):
         value = entry.get(side)
-        if side in entry and (isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value)):
+        if side in entry and (
+            isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value)
+        ):
             raise SpecificationError(f"{where}: {side} must be a finite number, not {value!r}")
         if side in entry:
             entry[side] = float(entry[side])

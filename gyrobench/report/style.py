@@ -43,7 +43,7 @@ THEMED = {
     PURPLE: "var(--purple)",
 }
 
-_RC = {
+_RC: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -95,9 +95,9 @@ def styled() -> Iterator[None]:
 def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
     """A figure without a window, and its axes (an array of two dimensions)."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    fig = Figure(figsize=(width, height_mm * MM), layout="constrained")
-    fig.get_layout_engine().set(w_pad=0.02, h_pad=0.02)
+    fig = Figure(figsize=(width, height_mm * MM), layout=ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02))
     fig.patch.set_visible(False)
     axes = fig.subplots(squeeze=False, **grid)
     for ax in axes.flat:
@@ -141,7 +141,7 @@ def themed(svg_text: str) -> str:
 
 
 def axis_label(name: str, unit: str) -> str:
-    """"drift rate / (°/h)", "table angle / °", "share / 1"."""
+    """ "drift rate / (°/h)", "table angle / °", "share / 1"."""
     unit = unit or "1"
     return f"{name} / ({unit})" if "/" in unit else f"{name} / {unit}"
 
@@ -198,7 +198,9 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
     for k, (start, end, label) in enumerate(spans):
         if k % 2 == 0:
             ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
-        text = ax.annotate(label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}")
+        text = ax.annotate(
+            label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
+        )
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size
         left = min(max(left, 0.0), max(width - size, 0.0))

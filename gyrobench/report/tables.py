@@ -34,7 +34,7 @@ def words(key: str) -> tuple[str, str]:
     for ending, unit in _UNITS.items():
         if key.endswith(ending) and len(key) > len(ending):
             return key[: -len(ending)].replace("_", " "), unit
-    return key.replace("_", " "), ""
+    return key.replace("_", " "), {"step": "s"}.get(key, "")
 
 
 def heading(text: str) -> Row:
@@ -75,11 +75,15 @@ def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = Fa
                 rows.append(Row([text_cell(name), _cell(doc, (*path, k)), text_cell(unit)]))
             blocks.append(Table([Column("quantity"), Column("value"), Column("unit")], rows, caption))
         for k in nested:
-            blocks += generic(doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption, by_u)
+            blocks += generic(
+                doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption, by_u
+            )
         return blocks
     if _is_rows(value):
         keys = list(dict.fromkeys(k for row in value for k in row))
-        us = [next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value]
+        us = [
+            next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value
+        ]
         rows = [Row([_cell(doc, (*path, i, k), us[i]) for k in keys]) for i in range(len(value))]
         return [Table([Column(*words(k)) for k in keys], rows, caption)]
     return [Text(f"{caption.rstrip('.')}: {compact(value)}.")]
@@ -103,7 +107,7 @@ def compact(value: Any, length: int = 72) -> str:
     text = json.dumps(value, ensure_ascii=False, separators=(", ", ": "))
     if len(text) <= length:
         return text
-    count = f" ({len(value)} entries, all in result.json)" if isinstance(value, list | dict) else ""
+    count = f" ({len(value)} entries)" if isinstance(value, list | dict) else ""
     return f"{text[:length]}…{count}"
 
 
@@ -128,21 +132,36 @@ def how_tables(doc: Any) -> list[Any]:
                     ]
                 )
             )
-        heads = (("slot", ""), ("part", ""), ("version", ""), ("target", ""), ("FMI", ""), ("time", "s"), ("SHA-256", ""))
+        heads = (
+            ("slot", ""),
+            ("part", ""),
+            ("version", ""),
+            ("target", ""),
+            ("FMI", ""),
+            ("time", "s"),
+            ("SHA-256", ""),
+        )
         columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
         blocks.append(Table(columns, rows, "Parts in their slots, with the time spent in each.", small=True))
     blocks += _parameters(doc)
     facts = {k: run[k] for k in ("seed", "step", "engine", "complete", "stopped_at") if run.get(k) is not None}
     if facts:
         units = {"step": "s", "stopped_at": "s"}
-        rows = [Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k)), text_cell(units.get(k, ""))]) for k in facts]
+        rows = [
+            Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k)), text_cell(units.get(k, ""))]) for k in facts
+        ]
         for extra in run.get("options") or {}:
             name, unit = words(str(extra))
             rows.append(Row([text_cell(name), _cell(doc, ("provenance", "options", extra)), text_cell(unit)]))
         blocks.append(Table([Column("run"), Column("value"), Column("unit")], rows, "How the run was made."))
     if run.get("versions"):
         rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
-        blocks.append(Fold("Package versions", [Table([Column("package"), Column("version")], rows, "Package versions.", small=True)]))
+        blocks.append(
+            Fold(
+                "Package versions",
+                [Table([Column("package"), Column("version")], rows, "Package versions.", small=True)],
+            )
+        )
     return blocks
 
 
@@ -166,5 +185,10 @@ def _parameters(doc: Any) -> list[Any]:
     elif parameters:
         blocks.append(Text("No parameter was changed: every part ran with its defaults."))
     if others:
-        blocks.append(Fold(f"Defaults ({len(others)} parameters)", [table(others, "Parameters left at their defaults, in SI units.")]))
+        blocks.append(
+            Fold(
+                f"Defaults ({len(others)} parameters)",
+                [table(others, "Parameters left at their defaults, in SI units.")],
+            )
+        )
     return blocks

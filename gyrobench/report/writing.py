@@ -26,7 +26,9 @@ def write_all(
 
         return page(doc, record)
 
-    return _write(doc, view, folder, formats, {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}, bench)
+    return _write(
+        doc, view, folder, formats, {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}, bench
+    )
 
 
 def compare_all(

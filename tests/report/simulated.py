@@ -68,9 +68,19 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
         clock = float(t[-1]) + 0.5 * width
         series.append(
             Series(
-                label, np.degrees(theta).tolist(), "table angle", "°", y.tolist(), [], [], "drift rate", "°/h",
-                t.tolist(), np.degrees(dense).tolist(), (row(*gravity(mount, dense))).tolist(),
-            )  # fmt: skip
+                label,
+                np.degrees(theta).tolist(),
+                "table angle",
+                "°",
+                y.tolist(),
+                [],
+                [],
+                "drift rate",
+                "°/h",
+                t.tolist(),
+                np.degrees(dense).tolist(),
+                (row(*gravity(mount, dense))).tolist(),
+            )
         )
     design, y = np.vstack(designs), np.concatenate(values)
     estimate, *_ = np.linalg.lstsq(design, y, rcond=None)
@@ -88,26 +98,47 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
         s.fit, s.residual = (d @ estimate).tolist(), residual[part].tolist()
         s.shown_fit_y = (np.array(s.shown_fit_y) @ estimate).tolist() if s.shown_fit_y else []
         start += len(d)
-    specification = [(-0.6, 0.6), (-1.5, 1.5), (None, 0.801), (-1.5, 1.5), (-0.3, 0.3), (-0.3, 0.3), (-0.3, 0.3), (-0.1, 0.1), None]
+    specification = [
+        (-0.6, 0.6),
+        (-1.5, 1.5),
+        (None, 0.801),
+        (-1.5, 1.5),
+        (-0.3, 0.3),
+        (-0.3, 0.3),
+        (-0.3, 0.3),
+        (-0.1, 0.1),
+        None,
+    ]
     coefficients = []
     for i, name in enumerate(NAMES):
         low, high = float(estimate[i] - k * u[i]), float(estimate[i] + k * u[i])
         limit = specification[i] if limits else None
         coefficients.append(
             Coefficient(
-                name, MEANINGS[i], UNITS[i], float(estimate[i]), float(u[i]), k, (low, high),
-                t=float(estimate[i] / ua[i]), p=float(2 * stats.t.sf(abs(estimate[i] / ua[i]), dof)),
-                u_a=float(ua[i]), dof=float(dof), closed=float(estimate[i] + 0.05 * u[i] * random.standard_normal()),
-                truth=float(truth[i]), z=float((estimate[i] - truth[i]) / u[i]), limit=limit,
+                name,
+                MEANINGS[i],
+                UNITS[i],
+                float(estimate[i]),
+                float(u[i]),
+                k,
+                (low, high),
+                t=float(estimate[i] / ua[i]),
+                p=float(2 * stats.t.sf(abs(estimate[i] / ua[i]), dof)),
+                u_a=float(ua[i]),
+                dof=float(dof),
+                closed=float(estimate[i] + 0.05 * u[i] * random.standard_normal()),
+                truth=float(truth[i]),
+                z=float((estimate[i] - truth[i]) / u[i]),
+                limit=limit,
                 verdict=judge(limit, low, high),
-            )  # fmt: skip
+            )
         )
     verdicts = [c.verdict for c in coefficients]
     verdict = next((v for v in ("fail", "inconclusive", "pass") if v in verdicts), "no specification given")
     centred = residual - residual.mean()
     lags = np.arange(0, 25)
     rho = [float(centred[: len(centred) - m] @ centred[m:] / (centred @ centred)) for m in lags]
-    taus = width * np.array([1, 2, 4, 8, 16, 32])
+    taus = width * np.array([m for m in (1, 2, 4, 8, 16, 32) if m < len(residual) / 4])
     dev = [allan(residual, int(m / width)) for m in taus]
     edf = np.maximum(len(residual) * width / taus - 1, 1.0)
     frequency = np.fft.rfftfreq(len(residual), width)[1:]
@@ -115,17 +146,43 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
     budget = []
     for i, name in enumerate(NAMES):
         size = float(ua[i] / sigma)
-        budget.append(BudgetLine("random drift and current noise", sigma, "°/h", size, "1", float(ua[i]), UNITS[i], name, "type A"))
-        budget.append(BudgetLine("table axis off the pole", 5.0, "″", systematic[i] / 5.0, "°/h/″", float(systematic[i]), UNITS[i], name))
-        budget.append(BudgetLine("torquer scale factor", 1e-4, "1", abs(estimate[i]), UNITS[i], float(1e-4 * abs(estimate[i])), UNITS[i], name))
+        budget.append(
+            BudgetLine(
+                "random drift and current noise", sigma, "°/h", size, "1", float(ua[i]), UNITS[i], name, "type A"
+            )
+        )
+        budget.append(
+            BudgetLine(
+                "table axis off the pole", 5.0, "″", systematic[i] / 5.0, "°/h/″", float(systematic[i]), UNITS[i], name
+            )
+        )
+        budget.append(
+            BudgetLine(
+                "torquer scale factor",
+                1e-4,
+                "1",
+                abs(estimate[i]),
+                UNITS[i],
+                float(1e-4 * abs(estimate[i])),
+                UNITS[i],
+                name,
+            )
+        )
+    halved = [{"name": n, "change": 1e-7 * i, "u": float(u[i]), "ratio": 1e-7 * i / u[i]} for i, n in enumerate(NAMES)]
     correlation = covariance / np.outer(ua, ua)
     runs = float(random.normal())
     return Result(
         system="tumble_single_axis",
         title="Single-axis tumble of a floated gyro",
-        method="Torque-rebalance tumble about the pole at ten times Earth rate, two mounts, two dwells (TEST-TUMBLE1-SDF, eq. 3-12 to 3-21)",
+        method=(
+            "Torque-rebalance tumble about the pole at ten times Earth rate, two mounts, two dwells "
+            "(TEST-TUMBLE1-SDF, eq. 3-12 to 3-21)"
+        ),
         sources=["TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21"],
-        equation='k i = omega_"IA" - omega_d, quad omega_d = D_F + D_I X + D_O Y + D_S Z + D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + D_"IS" X Z + D_"OS" Y Z',
+        equation=(
+            'k i = omega_"IA" - omega_d, quad omega_d = D_F + D_I X + D_O Y + D_S Z '
+            '+ D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + D_"IS" X Z + D_"OS" Y Z'
+        ),
         conventions=[
             "X, Y, Z are −f/g₀ along the input, output and spin reference axis (f: specific force; g₀ = 9.80665 m/s²).",
             "Drift is the precession rate ω_d of the float; k i = ω_IA − ω_d.",
@@ -139,42 +196,56 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
         noise={"model": "white", "sigma_deg_per_h": float(np.sqrt(variance))},
         tests=[
             Test("Ljung-Box", 11.2, 0.51, "correlation of the residuals up to lag 12", "no correlation seen"),
-            Test("runs", runs, float(2 * stats.norm.sf(abs(runs))), "too few or too many changes of sign", "signs change as in white noise"),
-            Test("turn to turn", 0.94, 0.62, "scatter between turns against scatter within", "no larger than within a turn"),
+            Test(
+                "runs",
+                runs,
+                float(2 * stats.norm.sf(abs(runs))),
+                "too few or too many changes of sign",
+                "as in white noise",
+            ),
+            Test("turn to turn", 0.94, 0.62, "scatter between turns against within", "no larger than within"),
         ],
         residual_std=float(np.sqrt(variance)),
         residual_unit="°/h",
         acf={"lag": lags.tolist(), "rho": rho, "bound": [float(1.96 / np.sqrt(len(residual)))] * len(lags)},
         allan={
-            "tau": taus.tolist(), "dev": dev, "unit": "°/h",
+            "tau": taus.tolist(),
+            "dev": dev,
+            "unit": "°/h",
             "lo": [float(d * np.sqrt(e / stats.chi2.ppf(0.975, e))) for d, e in zip(dev, edf, strict=True)],
             "hi": [float(d * np.sqrt(e / stats.chi2.ppf(0.025, e))) for d, e in zip(dev, edf, strict=True)],
             "slopes": [
-                {"process": "white (slope −½)", "value": dev[0] * np.sqrt(width / 3600.0), "unit": "°/√h", "resolved": "yes"},
+                {
+                    "process": "white (slope −½)",
+                    "value": dev[0] * (width / 3600) ** 0.5,
+                    "unit": "°/√h",
+                    "resolved": "yes",
+                },
                 {"process": "bias instability (flat)", "value": None, "unit": "°/h", "resolved": "not resolved"},
                 {"process": "random walk (slope +½)", "value": None, "unit": "°/h/√h", "resolved": "not resolved"},
             ],
-        },  # fmt: skip
+        },
         psd={"f": frequency.tolist(), "S": density.tolist(), "unit": "(°/h)²/Hz"},
         harmonics=[
-            {"series": f"mount {m}", "n": n, "a_deg_per_h": float(random.normal(0, sigma / 6)), "b_deg_per_h": float(random.normal(0, sigma / 6)), "u_deg_per_h": sigma / 6}
-            for m in (1, 2) for n in (3, 4, 5)
+            {"series": f"mount {m}", "n": n, "a_deg_per_h": a, "b_deg_per_h": b, "u_deg_per_h": sigma / 6}
+            for m in (1, 2)
+            for n, (a, b) in enumerate(random.normal(0.0, sigma / 6, (3, 2)).tolist(), start=3)
         ],
         budget=budget,
-        repeatability={"turns": 2, "spread_between_deg_per_h": 0.0021, "spread_within_deg_per_h": 0.0022, "F": 0.94, "p": 0.62},
-        step_check={"step": 0.0005, "rows": [{"name": n, "change": 1e-7 * i, "u": float(u[i]), "ratio": 1e-7 * i / float(u[i])} for i, n in enumerate(NAMES)], "worst": 1e-4},
-        warnings=["D_OO cannot be had from this test; it folds into D_F, D_O, D_II and D_SS as the method's page says."],
+        repeatability={"turns": 2, "between_deg_per_h": 0.0021, "within_deg_per_h": 0.0022, "F": 0.94, "p": 0.62},
+        step_check={"step": 0.0005, "rows": halved, "worst": 1e-4},
+        warnings=["D_OO cannot be had from this test; it folds into D_F, D_II and D_SS."],
         summary=[
             f"Constant drift D_F = {estimate[0]:.4f} °/h, U = {k * u[0]:.4f} °/h.",
             f"Largest unbalance D_I = {estimate[1]:.4f} °/h/g, U = {k * u[1]:.4f} °/h/g.",
             f"Residual standard deviation {np.sqrt(variance):.4f} °/h over {len(y)} windows.",
         ],
-        decision_rule="pass when the whole 95 % interval is inside the limit; fail when it is outside; inconclusive otherwise.",
+        decision_rule="pass when the whole 95 % interval is inside the limit, fail when it is outside.",
         verdict=verdict,
         site={"latitude_deg": 45.75, "height_m": 300.0, "gravity_m_per_s2": 9.80665},
         instrument="floated_gyro 1.0.0, serial no. SIM-1",
         provenance=provenance(seed, width),
-    )  # fmt: skip
+    )
 
 
 def judge(limit, low, high):
@@ -197,27 +268,96 @@ def provenance(seed: int, width: float) -> dict:
     slots = ["site", "sequencer", "table", "gyro", "rebalance", "sampler"]
     parts = ["site", "sequencer", "table_rate", "floated_gyro", "rebalance_analog", "sampler"]
     wires = [
-        "site.f -> table.f_local", "site.omega -> table.omega_local", "sequencer.mode -> table.mode",
-        "sequencer.target -> table.target", "sequencer.face -> table.face", "table.omega -> gyro.omega",
-        "table.alpha -> gyro.alpha", "table.f -> gyro.f", "gyro.u -> rebalance.u", "rebalance.i -> gyro.i",
-        "table.angle_read -> sequencer.angle", "table.angle_read -> sampler.angle",
-        "table.in_position -> sequencer.in_position", "sequencer.gate -> sampler.gate",
-        "sequencer.window -> sampler.window", "sequencer.phase -> sampler.phase",
-        "rebalance.i_read -> sampler.x", "rebalance.saturated -> sampler.flag",
-    ]  # fmt: skip
+        "site.f -> table.f_local",
+        "site.omega -> table.omega_local",
+        "sequencer.mode -> table.mode",
+        "sequencer.target -> table.target",
+        "sequencer.face -> table.face",
+        "table.omega -> gyro.omega",
+        "table.alpha -> gyro.alpha",
+        "table.f -> gyro.f",
+        "gyro.u -> rebalance.u",
+        "rebalance.i -> gyro.i",
+        "table.angle_read -> sequencer.angle",
+        "table.angle_read -> sampler.angle",
+        "table.in_position -> sequencer.in_position",
+        "sequencer.gate -> sampler.gate",
+        "sequencer.window -> sampler.window",
+        "sequencer.phase -> sampler.phase",
+        "rebalance.i_read -> sampler.x",
+        "rebalance.saturated -> sampler.flag",
+    ]
     turn = 2 * np.pi
     plan = [
-        {"phase": 1, "label": "mount 1", "mode": 2, "face": 1, "target": -7.2921159e-4, "settle": 60.0, "dwell": 0.0, "travel": turn, "window": turn / 72},
-        {"phase": 2, "label": "mount 2", "mode": 2, "face": 2, "target": -7.2921159e-4, "settle": 60.0, "dwell": 0.0, "travel": turn, "window": turn / 72},
-        {"phase": 3, "label": "output axis up", "mode": 0, "face": 3, "target": 0.0, "settle": 60.0, "dwell": 1200.0, "travel": 0.0, "window": width},
-        {"phase": 4, "label": "output axis down", "mode": 0, "face": 4, "target": 0.0, "settle": 60.0, "dwell": 1200.0, "travel": 0.0, "window": width},
+        {
+            "phase": 1,
+            "label": "mount 1",
+            "mode": 2,
+            "face": 1,
+            "target": -7.2921159e-4,
+            "settle": 60.0,
+            "dwell": 0.0,
+            "travel": turn,
+            "window": turn / 72,
+        },
+        {
+            "phase": 2,
+            "label": "mount 2",
+            "mode": 2,
+            "face": 2,
+            "target": -7.2921159e-4,
+            "settle": 60.0,
+            "dwell": 0.0,
+            "travel": turn,
+            "window": turn / 72,
+        },
+        {
+            "phase": 3,
+            "label": "output axis up",
+            "mode": 0,
+            "face": 3,
+            "target": 0.0,
+            "settle": 60.0,
+            "dwell": 1200.0,
+            "travel": 0.0,
+            "window": width,
+        },
+        {
+            "phase": 4,
+            "label": "output axis down",
+            "mode": 0,
+            "face": 4,
+            "target": 0.0,
+            "settle": 60.0,
+            "dwell": 1200.0,
+            "travel": 0.0,
+            "window": width,
+        },
     ]
     return {
-        "date": "2026-03-14T09:30:00Z", "operator": "A. Tester", "seed": seed, "step": 0.001, "engine": "native",
-        "order": slots, "wires": wires, "cuts": ["rebalance.i -> gyro.i"],
-        "delays": ["table.angle_read -> sequencer.angle", "table.in_position -> sequencer.in_position", "rebalance.i -> gyro.i"],
-        "parts": {s: {"name": p, "version": "1.0.0", "target": "native", "fmi": "2.0", "sha256": f"{i + 1:02x}" * 32} for i, (s, p) in enumerate(zip(slots, parts, strict=True))},
-        "parameters": {"gyro.H": 0.2, "gyro.J": 2e-4, "gyro.C": 0.2, "gyro.K_sg": 10.0, "rebalance.K_p": 1.2, "site.latitude": 0.7984881, "sequencer.target": [0.0] * 99},
-        "changed": ["gyro.H"], "plan": plan, "complete": True,
-        "timing": dict.fromkeys(slots, 0.41), "versions": {"gyrobench": "0.1.0", "fmpy": "0.3.26", "numpy": "2.4.6"},
-    }  # fmt: skip
+        "date": "2026-03-14T09:30:00Z",
+        "operator": "A. Tester",
+        "seed": seed,
+        "step": 0.001,
+        "engine": "native",
+        "order": slots,
+        "wires": wires,
+        "cuts": ["rebalance.i -> gyro.i"],
+        "delays": [*wires[9:11], wires[12]],
+        "parts": {
+            slot: {"name": part, "version": "1.0.0", "target": "native", "fmi": "2.0", "sha256": f"{i + 1:02x}" * 32}
+            for i, (slot, part) in enumerate(zip(slots, parts, strict=True))
+        },
+        "parameters": {
+            "gyro.H": 0.2,
+            "gyro.J": 2e-4,
+            "gyro.K_sg": 10.0,
+            "site.latitude": 0.7985,
+            "sequencer.target": [0.0] * 99,
+        },
+        "changed": ["gyro.H"],
+        "plan": plan,
+        "complete": True,
+        "timing": dict.fromkeys(slots, 0.41),
+        "versions": {"gyrobench": "0.1.0", "fmpy": "0.3.26", "numpy": "2.4.6"},
+    }

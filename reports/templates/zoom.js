@@ -86,7 +86,7 @@
     function middle() { return (view[0] + view[1]) / 2; }
     var bar = document.createElement("div");
     bar.className = "zoombar";
-    bar.append("Drag over the figure to zoom");
+    if (window.matchMedia("(pointer: fine)").matches) { bar.append("Drag over the figure to zoom"); }
     [["+", "Zoom in", function () { by(middle(), 0.5); }], ["−", "Zoom out", function () { by(middle(), 2); }],
       ["◀", "Earlier", function () { var s = (view[1] - view[0]) / 2; set(view[0] - s, view[1] - s); }],
       ["▶", "Later", function () { var s = (view[1] - view[0]) / 2; set(view[0] + s, view[1] + s); }],

@@ -1,0 +1,217 @@
+"""Why a result can be believed: residuals, stability, the estimates themselves, repeatability, error budget."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import drawing, plots
+from .blocks import Column, Fold, Picture, Row, Table, Text, number_cell, pictures, text_cell
+from .numbers import write_number, write_p
+from .tables import generic, heading
+
+Json = dict[str, Any]
+
+
+def residuals(doc: Json) -> list[Any]:
+    left = [r for s in doc["series"] for r in s["residual"]]
+    blocks = pictures(
+        Picture(
+            "residuals-time",
+            plots.residuals_in_time(doc["series"], "residuals-time"),
+            "Residuals against time, mounts or phases shaded and named. A drift or a jump would show here.",
+            "Residuals of all windows against time",
+            zoom=True,
+        )
+    )
+    blocks += pictures(
+        Picture(
+            "acf",
+            plots.acf(doc["acf"], "acf") if doc["acf"] else "",
+            "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside: correlated noise.",
+            "Autocorrelation of the residuals against lag, with bounds",
+            half=True,
+        ),
+        Picture(
+            "quantiles",
+            plots.quantiles(left, "quantiles"),
+            "Residuals against normal quantiles. On the line and inside the 95 % band: normal; bent ends: outliers.",
+            "Q-Q plot of the residuals against a normal distribution",
+            half=True,
+        ),
+    )
+    rows = []
+    for k, test in enumerate(doc["tests"]):
+        mark = "warn" if test["p"] is not None and test["p"] < 0.01 else ""
+        rows.append(
+            Row(
+                [
+                    text_cell(test["name"], "strong"),
+                    text_cell(test["what"]),
+                    number_cell(doc, ("tests", k, "statistic"), significant=3, trim=False),
+                    number_cell(doc, ("tests", k, "p"), write=write_p, mark=mark),
+                    text_cell(test["finding"]),
+                ]
+            )
+        )
+    columns = [
+        Column("test"),
+        Column("looks for", wide=True),
+        Column("statistic"),
+        Column("p"),
+        Column("finding", wide=True),
+    ]
+    if rows:
+        blocks.append(Table(columns, rows, "Tests of the residuals. A small p speaks against what the model assumes."))
+    spread = number_cell(doc, ("residual_std",))
+    dof = write_number(doc["dof"], significant=5).text
+    sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
+    return [Text(sentence), *blocks, *generic(doc, ("noise",), "Noise model of the estimation.")]
+
+
+def stability(doc: Json) -> list[Any]:
+    blocks = pictures(
+        Picture(
+            "allan",
+            plots.allan(doc["allan"], "allan") if doc["allan"].get("tau") else "",
+            "Allan deviation with its 95 % interval. Slope −½: white noise; flat: bias instability; +½: random walk.",
+            "Allan deviation against averaging time, logarithmic axes",
+            half=True,
+        ),
+        Picture(
+            "psd",
+            plots.psd(doc["psd"], "psd") if doc["psd"].get("f") else "",
+            "Power spectral density of the residuals. Flat: white; a line above it: a periodic disturbance.",
+            "Power spectral density of the residuals, logarithmic axes",
+            half=True,
+        ),
+    )
+    return blocks + generic(doc, ("allan", "slopes"), "Slopes of the Allan deviation.")
+
+
+def estimates(doc: Json) -> list[Any]:
+    names = [c["name"] for c in doc["coefficients"]]
+    condition = number_cell(doc, ("condition",), significant=3).text
+    blocks: list[Any] = [
+        Text(
+            f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "
+            f"{condition}. Above 100 a small error of the model makes a large one in some combination."
+        )
+    ]
+    columns = [
+        Column(h)
+        for h in (
+            "name",
+            "u, type A",
+            "dof",
+            "k",
+            "U (95 %)",
+            "t",
+            "p (t)",
+            "closed formula",
+            "difference",
+        )
+    ]
+    rows: list[Row] = []
+    for unit in dict.fromkeys(c["unit"] for c in doc["coefficients"]):
+        rows.append(heading(f"u, U, closed formula and difference in {unit}"))
+        for k, c in enumerate(doc["coefficients"]):
+            if c["unit"] == unit:
+                path, u = ("coefficients", k), c["u"]
+                rows.append(
+                    Row(
+                        [
+                            text_cell(c["name"], "strong"),
+                            number_cell(doc, (*path, "u_a"), u),
+                            number_cell(doc, (*path, "dof")),
+                            number_cell(doc, (*path, "k"), 0.1),
+                            number_cell(doc, ("derived", "U", k), u),
+                            number_cell(doc, (*path, "t"), significant=3, trim=False),
+                            number_cell(doc, (*path, "p"), write=write_p),
+                            number_cell(doc, (*path, "closed"), u),
+                            number_cell(doc, ("derived", "closed_minus_estimate", k), significant=2),
+                        ]
+                    )
+                )
+    caption = "Uncertainty of each estimate, and the book's closed formula against the reported estimate."
+    blocks.append(Table(columns, rows, caption, small=True))
+    z = [c["z"] for c in doc["coefficients"]]
+    blocks += pictures(
+        Picture(
+            "correlation",
+            plots.correlation(doc["correlation"], names, "correlation"),
+            "Correlation of the estimates. Near ±1 two coefficients are known only in combination.",
+            "Correlation matrix of the estimates, lower triangle, as coloured cells with numbers",
+            half=len(names) < 11,
+        ),
+        Picture(
+            "scores",
+            plots.scores(names, z, [c["k"] for c in doc["coefficients"]], "scores"),
+            "Estimates against truth in units of u. Band: ±k; 95 % of the points should lie inside.",
+            "Estimate minus truth over standard uncertainty, one point per coefficient",
+            half=True,
+        ),
+    )
+    return blocks + generic(
+        doc, ("harmonics",), "Harmonics of the record. Those the model does not hold should be noise.", by_u=True
+    )
+
+
+def repeatability(doc: Json) -> list[Any]:
+    blocks = generic(doc, ("repeatability",), "Repeatability.")
+    blocks += generic(
+        doc, ("step_check",), "Step check: the same run with half the step; change of each coefficient against u."
+    )
+    for k, table in enumerate(doc["tables"]):
+        columns = [Column(str(h)) for h in table.get("columns", [])]
+        rows = [
+            Row([number_cell(doc, ("tables", k, "rows", i, j)) for j in range(len(columns))])
+            for i in range(len(table.get("rows", [])))
+        ]
+        caption = ". ".join(t.rstrip(".") for t in (table.get("title", ""), table.get("caption", "")) if t)
+        blocks.append(Table(columns, rows, f"{caption}."))
+    return blocks
+
+
+def budget(doc: Json) -> list[Any]:
+    lines = doc["budget"]
+    if not lines:
+        return []
+    u = {c["name"]: c["u"] for c in doc["coefficients"]}
+    rows = []
+    for name in dict.fromkeys(b["coefficient"] for b in lines):
+        mine = [k for k, b in enumerate(lines) if b["coefficient"] == name]
+        unit = lines[mine[0]]["unit"]
+        rows.append(heading(f"{name}, contribution in {unit}"))
+        for k in sorted(mine, key=lambda k: -(lines[k]["contribution"] or 0.0)):
+            b = lines[k]
+            rows.append(
+                Row(
+                    [
+                        text_cell(b["source"]),
+                        number_cell(doc, ("budget", k, "size"), significant=3, trim=False),
+                        text_cell(b["size_unit"]),
+                        number_cell(doc, ("budget", k, "sensitivity"), significant=3, trim=False),
+                        text_cell(b["sensitivity_unit"]),
+                        number_cell(doc, ("budget", k, "contribution"), significant=2, trim=False),
+                        text_cell(b["note"]),
+                    ]
+                )
+            )
+        total = number_cell(doc, ("derived", "budget_sum", name), u.get(name))
+        blank = [text_cell("")] * 4
+        rows.append(Row([text_cell("sum (root of squares)", "strong"), *blank, total, text_cell("")]))
+        index = next((k for k, c in enumerate(doc["coefficients"]) if c["name"] == name), None)
+        if index is not None:
+            stated = number_cell(doc, ("coefficients", index, "u"), u.get(name))
+            rows.append(Row([text_cell("u stated", "strong"), *blank, stated, text_cell("")]))
+    heads = ("source", "size", "unit", "sensitivity", "unit", "contribution", "note")
+    columns = [Column(h, wide=h in ("source", "note")) for h in heads]
+    alt = "Error budget as bars: contribution of each source to the uncertainty of the coefficients"
+    caption = "Error budget. Which source makes the uncertainty, and whether the known sources explain the stated u."
+    table = Table(
+        columns, rows, "Error budget: size times sensitivity of each source, as standard uncertainties.", small=True
+    )
+    return [
+        *pictures(Picture("budget", drawing.budget(lines, u, "budget"), caption, alt)),
+        Fold("Every line of the budget", [table]),
+    ]

@@ -1,0 +1,102 @@
+"""How it was done: model, conventions, system, plan, and every digit of the estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from . import drawing
+from .blocks import Cell, Column, Equation, Fold, Items, Picture, Row, Table, Text, number_cell, pictures, text_cell
+from .document import look
+
+Json = dict[str, Any]
+
+
+def model(doc: Json) -> list[Any]:
+    blocks: list[Any] = [Equation(doc["equation"])] if doc["equation"] else []
+    blocks += [Items(doc["conventions"])] if doc["conventions"] else []
+    blocks += [Text("Sources: " + "; ".join(doc["sources"]) + ".", quiet=True)] if doc["sources"] else []
+    return blocks
+
+
+def system(doc: Json) -> list[Any]:
+    run = doc["provenance"]
+    order = [str(s) for s in run.get("order") or []]
+    blocks: list[Any] = []
+    if order:
+        caption = (
+            "The system as it ran: parts on the diagonal in execution order. Above it (solid) values of this step go "
+            "forward; below it (dashed) values of the step before go back."
+        )
+        svg = drawing.system(order, run, "system")
+        blocks += pictures(
+            Picture("system", svg, caption, "Parts in execution order with their wires: " + ", ".join(order))
+        )
+        cuts, delays = run.get("cuts") or [], run.get("delays") or []
+        blocks.append(
+            Items([f"Order: {', '.join(order)}.", f"Cut at: {_ends(cuts)}.", f"Delayed by one step: {_ends(delays)}."])
+        )
+    rows = []
+    keys = (
+        "phase",
+        "label",
+        "mode",
+        "face",
+        "angle_deg",
+        "rate_deg_per_h",
+        "settle_s",
+        "dwell_s",
+        "travel_deg",
+        "window_s",
+        "window_deg",
+    )
+    heads = [
+        ("phase", ""),
+        ("label", ""),
+        ("mode", ""),
+        ("face", ""),
+        ("angle", "°"),
+        ("rate", "°/h"),
+        ("settle", "s"),
+        ("dwell", "s"),
+    ]
+    heads += [("travel", "°"), ("window", "s"), ("window", "°")]
+    plan = doc["derived"]["plan"]
+    for k in range(len(plan)):
+        rows.append(Row([number_cell(doc, ("derived", "plan", k, key), significant=7) for key in keys]))
+    if rows:
+        empty = [all(look(plan, k, key) in (None, "") for k in range(len(plan))) for key in keys]
+        for row in rows:
+            row.cells = [c for c, e in zip(row.cells, empty, strict=True) if not e]
+        columns = [Column(h, unit) for (h, unit), e in zip(heads, empty, strict=True) if not e]
+        blocks.append(Table(columns, rows, "Plan of the test.", small=True))
+    return blocks
+
+
+def _ends(wires: Any) -> str:
+    """Cut or delayed wires in words."""
+    if isinstance(wires, Mapping):
+        return ", ".join(f"{k} ({v})" for k, v in wires.items()) or "nothing"
+    parts = [
+        w if isinstance(w, str) else " → ".join(str(e) for e in (w.values() if isinstance(w, Mapping) else w))
+        for w in wires
+    ]
+    return ", ".join(parts) or "nothing"
+
+
+def full_values(doc: Json) -> list[Any]:
+    """All digits of the estimates: the proof that page and result.json hold the same numbers."""
+    rows = []
+    for k, c in enumerate(doc["coefficients"]):
+        path = ("coefficients", k)
+        cells = [number_cell(doc, (*path, *p)) for p in (("estimate",), ("u",), ("interval", 0), ("interval", 1))]
+        rows.append(
+            Row([text_cell(c["name"], "strong"), *(Cell(x.full or "–", pointer=x.pointer, full=x.full) for x in cells)])
+        )
+    columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
+    return [
+        Fold(
+            "All digits, as in result.json",
+            [Table(columns, rows, "Full values of the estimates, units as in the table of coefficients.", small=True)],
+        )
+    ]
