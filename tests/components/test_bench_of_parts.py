@@ -5,8 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from gyrobench.drift import STANDARD, drift
-from gyrobench.frames import earth_rate_local, polar_base, to_face, tumble_faces
 from wired import (
     DEG_H,
     QUIET,
@@ -19,6 +17,9 @@ from wired import (
     Wired,
     plan,
 )
+
+from gyrobench.drift import STANDARD, drift
+from gyrobench.frames import earth_rate_local, polar_base, to_face, tumble_faces
 
 LATITUDE = math.radians(45.75)
 G = 9.80665

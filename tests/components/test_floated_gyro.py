@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from gyrobench.component import PartError
-from gyrobench.drift import NAMES, STANDARD, drift
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, RebalanceAnalog, Wired
+
+from gyrobench.component import PartError
+from gyrobench.drift import NAMES, STANDARD, drift
 
 H = 1e-3
 G0 = 9.80665
@@ -137,7 +138,8 @@ def reference(part, omega, i, until):
 
 
 @pytest.mark.parametrize(
-    "omega, until, bound", [([7e-4, 0.0, 7e-4], 0.5, 1e-10), ([0.02, 0.0, 0.05], 0.5, 1e-7), ([0.2, 0.0, 0.5], 0.5, 1e-5)]
+    "omega, until, bound",
+    [([7e-4, 0.0, 7e-4], 0.5, 1e-10), ([0.02, 0.0, 0.05], 0.5, 1e-7), ([0.2, 0.0, 0.5], 0.5, 1e-5)],
 )
 def test_cross_coupling_against_a_tight_reference(omega, until, bound):
     """The README's numbers: error of the free float, relative to its angle, with the nonlinear coupling."""
@@ -198,7 +200,9 @@ def test_ageing_and_temperature_in_torque_sign():
     )
     assert part.drift == pytest.approx(-torque_sign, rel=1e-14)
     part.do_step(0.0, 10.0)
-    assert part.drift == pytest.approx(-torque_sign - 10.0 * (d_k * 1e-3 + u_z * 2e-3 * x + u_y * 3e-3 * y - u_x * 4e-3 * z))
+    assert part.drift == pytest.approx(
+        -torque_sign - 10.0 * (d_k * 1e-3 + u_z * 2e-3 * x + u_y * 3e-3 * y - u_x * 4e-3 * z)
+    )
 
 
 # --------------------------------------------------------------------------------------- random drift

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from gyrobench.component import PartError
 from scipy.integrate import solve_ivp
 from scipy.signal import welch
 from wired import DEG_H, RebalanceAnalog
+
+from gyrobench.component import PartError
 
 H = 1e-3
 

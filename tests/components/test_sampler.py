@@ -1,11 +1,13 @@
 """Means, deviations and boundaries of the sampler."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from gyrobench.component import PartError
 from wired import ROW, Sampler
+
+from gyrobench.component import PartError
 
 H = 0.01
 
@@ -83,13 +85,13 @@ def test_windows_by_angle(rate):
         assert -1e-9 <= late < abs(rate) * H
         assert r["angle_end"] == pytest.approx(angle(r["t_end"]), abs=1e-14)
         assert r["mean"] == pytest.approx((r["t_start"] + r["t_end"]) / 2, abs=1e-9)
-    assert all(a["t_end"] == b["t_start"] for a, b in zip(rows, rows[1:], strict=False))
+    assert all(a["t_end"] == b["t_start"] for a, b in itertools.pairwise(rows))
 
 
 def test_last_bit_of_the_angle_does_not_lose_a_window():
     # marks that fall exactly on samples: k 0.1 rad, each rounded differently
     for offset in (0.0, 0.1, 1e3, 123.456):
-        rows = sample(lambda t: 0.0, lambda t: 2.0, lambda t: offset + t, 0.1, steps=1001)
+        rows = sample(lambda t: 0.0, lambda t: 2.0, lambda t, offset=offset: offset + t, 0.1, steps=1001)
         assert len(rows) == 100
         assert {r["n"] for r in rows} == {10.0}
 

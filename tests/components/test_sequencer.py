@@ -1,8 +1,11 @@
 """The timeline of phases, and every refusal."""
 
+import itertools
+
 import pytest
-from gyrobench.component import PartError
 from wired import Sequencer, plan
+
+from gyrobench.component import PartError
 
 EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURNED = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
@@ -27,7 +30,7 @@ def play(part, steps, angle=lambda t: 0.0, in_position=lambda t: 1.0):
 
 def changes(track):
     """(sample number, phase, gate, done) wherever something changes."""
-    return [b for a, b in zip(track, track[1:], strict=False) if a[1:] != b[1:]]
+    return [b for a, b in itertools.pairwise(track) if a[1:] != b[1:]]
 
 
 def test_hold_phase():

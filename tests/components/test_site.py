@@ -3,9 +3,10 @@
 import math
 
 import pytest
+from wired import Site
+
 from gyrobench.component import PartError
 from gyrobench.frames import normal_gravity
-from wired import Site
 
 
 def at(**parameters):

@@ -1,13 +1,15 @@
 """Kinematics of the table: moves by hand, frames against scipy, the derivative of the rate."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from gyrobench.component import PartError
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from wired import TableRate
+
+from gyrobench.component import PartError
 
 RNG = np.random.default_rng(5)
 H = 0.01
@@ -114,7 +116,7 @@ def test_moves_against_a_tight_reference():
         y = [0.0, 0.0]
         edges = [corners[0], *corners[1:], 25.0]
         reference = {}
-        for a, (t0, t1) in zip([*part.a_s[1:]], zip(edges, edges[1:], strict=False), strict=True):
+        for a, (t0, t1) in zip([*part.a_s[1:]], itertools.pairwise(edges), strict=True):
             if t1 <= t0:
                 continue
             inside = track[(track[:, 0] > t0) & (track[:, 0] <= t1), 0]

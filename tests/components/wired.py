@@ -42,7 +42,7 @@ WIRES = [
     ("rebalance.i_read", "sampler.x"),
     ("rebalance.saturated", "sampler.flag"),
 ]
-ROW = "window_phase mean std n angle_start angle_end t_start t_end flagged".split()
+ROW = ["window_phase", "mean", "std", "n", "angle_start", "angle_end", "t_start", "t_end", "flagged"]
 
 
 def plan(phases: list[dict[str, Any]], faces: list[Any]) -> dict[str, Any]:
