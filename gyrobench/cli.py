@@ -83,7 +83,7 @@ def list_command(as_json: Json = False) -> None:
 def show(
     system: Annotated[str, typer.Argument(help="Name of a system.")],
     values: Set = None,
-    picture: Annotated[Path | None, typer.Option(help="Write the wiring as a picture (.svg or .png).")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write the wiring as a picture (.svg).")] = None,
     as_json: Json = False,
 ) -> None:
     """Slots, wiring, execution order, cuts and delays, plan.  Example: gyrobench show tumble_single_axis"""

@@ -94,7 +94,7 @@ class TumbleSingleAxis(System):
         return Plan(phases, self.faces())
 
     def parameters(self) -> dict[str, Any]:
-        base = frames.polar_table(self["latitude"])
+        base = frames.polar_base(self["latitude"])
         return {
             **self.plan().parameters(),
             "site.latitude": self["latitude"],
