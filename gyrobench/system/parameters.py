@@ -104,12 +104,4 @@ def resolve(
         bound = _target(parameter, assembly.bindings[slot])
         assert bound is not None
         starts[slot].append((bound, value / bound.gain if bound.kind == "Real" and bound.gain != 1.0 else value))
-    return starts, _nested({**base, **chosen}), notes
-
-
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Array elements collected under the array's name."""
-    arrays: dict[str, dict[str, Any]] = {}
-    for name, value in flat.items():
-        arrays.setdefault(name.partition("[")[0], {})[name] = value
-    return {name: nest(cells, name) for name, cells in arrays.items()}
+    return starts, nest({**base, **chosen}), notes

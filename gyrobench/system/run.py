@@ -8,6 +8,7 @@ A :class:`Session` prepares once (unzip, load, bind, order) and runs many times 
 from __future__ import annotations
 
 import datetime
+import functools
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
@@ -227,7 +228,7 @@ class Session:
             "changed": [*(f"{s}: part" for s in self.swapped), *system.given],
             "options": dict(system.values),
             "plan": system.plan().rows(),
-            "versions": _versions(),
+            "versions": dict(_versions()),
             "notes": [*self.notes, *notes, *system.warnings()],
         }
 
@@ -261,6 +262,7 @@ def run(
         return session.run(values, seed, step, out, progress)
 
 
+@functools.cache
 def _versions() -> dict[str, str]:
     import platform
     from importlib.metadata import PackageNotFoundError, version

@@ -31,26 +31,23 @@ def flatten(name: str, value: Any) -> dict[str, Any]:
     return found
 
 
-def nest(values: Mapping[str, Any], name: str) -> Any:
-    """The inverse of :func:`flatten` for one name: nested lists of ``values["name[1]"]`` ...; KeyError if absent."""
-    if name in values:
-        return values[name]
-    cells: dict[tuple[int, ...], Any] = {}
+def nest(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The inverse of :func:`flatten` for many names: ``{"a[1]": 1, "a[2]": 2, "b": 3}`` -> ``{"a": [1, 2], "b": 3}``."""
+    arrays: dict[str, dict[tuple[int, ...], Any]] = {}
     for key, value in values.items():
-        if key.startswith(name + "[") and key.endswith("]"):
-            cells[tuple(int(i) for i in key[len(name) + 1 : -1].split(","))] = value
-    if not cells:
-        raise KeyError(name)
+        name, bracket, index = key.partition("[")
+        place = tuple(int(i) for i in index[:-1].split(",")) if bracket else ()
+        arrays.setdefault(name, {})[place] = value
 
-    def build(head: tuple[int, ...]) -> Any:
-        if head in cells:
-            return cells[head]
-        items: list[Any] = []
-        while any(c[: len(head) + 1] == (*head, len(items) + 1) for c in cells):
-            items.append(build((*head, len(items) + 1)))
-        return items
+    def build(cells: dict[tuple[int, ...], Any]) -> Any:
+        if () in cells:
+            return cells[()]
+        rows: dict[int, dict[tuple[int, ...], Any]] = {}
+        for place, value in cells.items():
+            rows.setdefault(place[0], {})[place[1:]] = value
+        return [build(rows[k]) for k in sorted(rows)]
 
-    return build(())
+    return {name: build(cells) for name, cells in arrays.items()}
 
 
 def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
