@@ -166,6 +166,8 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     if where is not None:
         w = np.where(where, w, 0.0)
         k = k if where[k] else int(np.argmax(w))
+    if not w.sum() > 0.0:
+        return 0.0, 0.0, 0.0
     order = np.argsort(values)
     total = np.cumsum(w[order]) / w.sum()
     low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.05, 0.95))

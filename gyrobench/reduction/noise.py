@@ -58,18 +58,19 @@ class Cells:
     prior: Array  # (G,), sums to 1
 
 
-#: Prior weights of the three families white / Gauss-Markov / both.  Correlation times run from 0.3 windows to
-#: LONGEST of the record with density proportional to tau**SLOPE per unit of log tau.  Chosen so that the 95 % intervals
-#: of a nine-term tumble cover between 0.93 and 0.97 for white and for Gauss-Markov noise of 0.5 to 10 windows.
-FAMILIES = (0.6, 0.2, 0.2)
-LONGEST = 0.25
-SLOPE = 0.2
+#: Prior weights of the three families white / Gauss-Markov / both.  Correlation times run from 0.3 windows (1 window
+#: for both) to LONGEST times the root of the length of the record, in windows, with a density proportional to
+#: tau**SLOPE per unit of log tau.  Chosen by Monte Carlo (tests/reduction/coverage.py) so that 95 % intervals of a
+#: nine-term tumble cover whatever the noise is.
+FAMILIES = (0.5, 0.2, 0.3)
+LONGEST = 2.2
+SLOPES = (0.2, 0.6)
 
 
 def cells(t0: Array, t1: Array) -> Cells:
     """The grid of candidate models for windows [t0, t1] (s)."""
     window, record = float(np.median(t1 - t0)), float(t1[-1] - t0[0])
-    longest = max(LONGEST * record, 3.0 * window)
+    longest = max(LONGEST * np.sqrt(record / window), 3.0) * window
     tau_p = np.geomspace(0.3 * window, longest, 12)
     tau_b = np.repeat(np.geomspace(window, longest, 10), 7)
     v = mean_variance(window / tau_b)
@@ -78,8 +79,13 @@ def cells(t0: Array, t1: Array) -> Cells:
     odds = np.exp(low + np.tile(np.linspace(0.0, 1.0, 7), 10) * (high - low))
     tau = np.concatenate([[window], tau_p, tau_b])
     share = np.concatenate([[0.0], np.ones(12), odds / (1.0 + odds)])
-    prior = np.concatenate([[1.0], tau_p**SLOPE / np.sum(tau_p**SLOPE), tau_b**SLOPE / np.sum(tau_b**SLOPE)])
+    prior = np.concatenate([[1.0], _weights(tau_p, SLOPES[0]), _weights(tau_b, SLOPES[1])])
     return Cells(tau, share, prior * np.repeat(FAMILIES, (1, 12, 70)))
+
+
+def _weights(tau: Array, slope: float) -> Array:
+    out: Array = tau**slope / np.sum(tau**slope)
+    return out
 
 
 def whiten(t0: Array, t1: Array, columns: Array, tau: Array, share: Array) -> tuple[Array, Array]:

@@ -1,0 +1,80 @@
+"""Type B uncertainties of the tumble: each source's effect on every coefficient, by exact perturbation of the model.
+
+A source changes what the reduction believes (geometry: regressors X and input-axis rate) or what it reads (current).
+With gain G (estimates = G y) the change of the estimates is G (dy - dX a).  For the ideal geometry this gives the known
+sensitivities: input axis tilted towards the output axis by eps: eps W sin(phi)/gamma in D_O and nothing else
+[TUM1-SENS-IA]; table axis off the pole by delta: W delta/(gamma cos phi) in D_I or 2 W delta/(gamma^2 sin 2 phi) in
+D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, axis wobble, temperature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames
+from gyrobench.reduction import attitude
+
+if TYPE_CHECKING:
+    from .reduction import TumbleSetup
+
+Array = NDArray[np.float64]
+SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One source: its standard uncertainty and the change of each estimate (rad/s per g0^n) for one unit of it."""
+
+    source: str
+    size: float
+    unit: str
+    change: Array
+    note: str = ""
+
+
+def effects(
+    setup: TumbleSetup, turning: attitude.Turning, current: Array, names: tuple[str, ...], beta: Array, gain: Array
+) -> list[Effect]:
+    """All sources with their sensitivities; sizes come from ``setup`` and may be 0.
+
+    current (n,) in A with the sign of the precession convention; beta (p,), gain (p, n): estimates = gain y.
+    """
+    X = attitude.regressors(turning, setup.base, setup.gravity, names)
+    rate = attitude.input_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+
+    def geometry(base: Array, turned: attitude.Turning) -> Array:
+        dX = attitude.regressors(turned, base, setup.gravity, names) - X
+        drate = attitude.input_rate(turned, base, setup.latitude, setup.earth_rate) - rate
+        out: Array = gain @ (drate - dX @ beta) / SMALL
+        return out
+
+    def axis(direction: Array) -> Array:
+        return geometry(setup.base @ frames.rotation(direction, SMALL).T, turning)
+
+    def mount(direction: Array) -> Array:
+        tilt = frames.rotation(direction, SMALL)
+        return geometry(setup.base, replace(turning, face=tilt @ turning.face))
+
+    read: Callable[[Array], Array] = lambda di: gain @ (-setup.k * di)  # noqa: E731
+    full = float(np.max(np.abs(current))) or 1.0
+    one = np.ones_like(current)
+    along_i, along_o, along_s = np.eye(3)
+    return [
+        Effect("table axis off the pole, about east", setup.u_axis, "rad", axis(setup.base[0])),
+        Effect("table axis off the pole, about p × east", setup.u_axis, "rad", axis(setup.base[1])),
+        Effect("input axis towards output axis", setup.u_mount, "rad", mount(along_s)),
+        Effect("input axis towards spin axis", setup.u_mount, "rad", mount(-along_o)),
+        Effect("gyro turned about its input axis", setup.u_mount, "rad", mount(along_i)),
+        Effect("torquer scale factor", setup.u_scale_factor, "1", read(current), "relative, the same for all currents"),
+        Effect(
+            "torquer nonlinearity", setup.u_nonlinearity, "1", read(current * np.abs(current) / full),
+            f"relative departure from proportionality at {full * 1e3:.3g} mA",
+        ),
+        Effect("offset of the current reading", setup.u_current, "A", read(one)),
+        Effect("resolution of the current reading", setup.quantum / 12.0**0.5, "A", read(one), "as if never dithered"),
+    ]  # fmt: skip

@@ -1,0 +1,85 @@
+"""The book's closed formulas of the single-axis tumble, corrected.  [TUM1-REDUCE; eq. 3-14..3-21 with E20-E23]
+
+Harmonics of mount 1 and 2 over theta = -(table angle), first index the order, second the mount, gamma = g/g0, phi the
+latitude, y3 and y4 the drift in the dwells with the output axis up and down:
+
+    D_F  = (y3 + y4)/2                     D_O  = (y4 - y3)/(2 gamma)
+    D_I  = -(B11 + B12)/(2 gamma cos phi)  D_S  = (A12 - A11)/(2 gamma cos phi)
+    D_II = (A01 + A02 - A21 - A22 - y3 - y4)/(2 gamma^2 cos^2 phi)
+    D_SS = (A01 + A02 + A21 + A22 - y3 - y4)/(2 gamma^2 cos^2 phi)
+    D_IO = (B11 - B12)/(gamma^2 sin 2 phi) D_OS = (A11 + A12)/(gamma^2 sin 2 phi)
+    D_IS = (B21 - B22)/(gamma^2 cos^2 phi)
+
+They hold for the ideal geometry (mounts of gyrobench.frames, table axis on the pole) and whole turns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.frames import G0, tumble_faces
+from gyrobench.reduction import harmonic
+from gyrobench.reduction.regression import Fit
+
+Array = NDArray[np.float64]
+
+
+def formulas(
+    one: Mapping[str, float], two: Mapping[str, float], y3: float, y4: float, latitude: float, gravity: float
+) -> dict[str, float]:
+    """Nine coefficients from the amplitudes A0 A1 B1 A2 B2 of both mounts and the two dwells (unit of the data)."""
+    g, c, s2 = gravity / G0, math.cos(latitude), math.sin(2.0 * latitude)
+    mean, second, dwell = one["A0"] + two["A0"], one["A2"] + two["A2"], y3 + y4
+    return {
+        "D_F": dwell / 2.0,
+        "D_I": -(one["B1"] + two["B1"]) / (2.0 * g * c),
+        "D_O": (y4 - y3) / (2.0 * g),
+        "D_S": (two["A1"] - one["A1"]) / (2.0 * g * c),
+        "D_II": (mean - second - dwell) / (2.0 * g * g * c * c),
+        "D_SS": (mean + second - dwell) / (2.0 * g * g * c * c),
+        "D_IO": (one["B1"] - two["B1"]) / (g * g * s2),
+        "D_OS": (one["A1"] + two["A1"]) / (g * g * s2),
+        "D_IS": (one["B2"] - two["B2"]) / (g * g * c * c),
+    }
+
+
+def role(face: Array, latitude: float) -> str | None:
+    """``mount 1``, ``mount 2``, ``static 3`` or ``static 4`` if ``face`` is that attitude to 1e-6, else None."""
+    for name, ideal in tumble_faces(latitude).items():
+        if np.allclose(face, ideal, atol=1e-6):
+            return name
+    return None
+
+
+def reduce(
+    phase: Array, start: Array, end: Array, length: Array, y: Array, faces: Mapping[int, Array],
+    latitude: float, gravity: float,
+) -> tuple[dict[str, float], dict[str, Fit], str]:  # fmt: skip
+    """Coefficients by :func:`formulas`, the harmonic fits of the mounts, and why not ("" when all is well).
+
+    phase, start, end (rad), length (s), y (n,): one entry for each window.
+    """
+    roles = {p: role(faces[p], latitude) for p in faces}
+    if None in roles.values():
+        odd = ", ".join(str(p) for p, r in roles.items() if r is None)
+        return {}, {}, f"phase {odd} is not one of the book's four attitudes: least squares only"
+    fits: dict[str, Fit] = {}
+    dwells: dict[str, float] = {}
+    for name in ("mount 1", "mount 2", "static 3", "static 4"):
+        mine = [p for p, r in roles.items() if r == name]
+        rows = np.isin(phase, mine)
+        if name.startswith("static"):
+            dwells[name] = float(np.average(y[rows], weights=length[rows]))
+            continue
+        for p in mine:
+            here = phase == p
+            if harmonic.whole_turns(start[here], end[here]) is None:
+                turned = math.degrees(float(np.sum(np.abs(end[here] - start[here]))))
+                return {}, {}, f"phase {p} covers {turned:.4g} deg, no whole turns without gap: least squares only"
+        fits[name] = harmonic.fit(-start[rows], -end[rows], y[rows])
+    one, two = (dict(zip(fits[m].names, fits[m].beta.tolist(), strict=True)) for m in ("mount 1", "mount 2"))
+    return formulas(one, two, dwells["static 3"], dwells["static 4"], latitude, gravity), fits, ""

@@ -1,0 +1,395 @@
+"""Reduction of the single-axis tumble: nine drift coefficients of a floated gyro from averaged torquer currents.
+
+    y = omega_IA - k i = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
+
+Every window is a row; regressors are averaged over the window as the current is, so no [AVG-SINC] damping is left.
+The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The book's closed
+formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21]
+
+Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), independent mount errors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.reduction import attitude, correlated, regression, uncertainty
+from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.result import BudgetLine, Coefficient, Result
+
+from . import budget, closed, diagnostics
+
+__all__ = ["ReductionError", "TumbleSetup", "from_record", "reduce", "refusals"]
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
+
+
+@dataclass(frozen=True)
+class TumbleSetup:
+    """Where and how the record was taken; SI throughout, matrices with rows = axes.
+
+    k: torquer scale factor, rad/s/A.  base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes I, O, S in
+    table axes.  modes: phase -> "rate" or "dwell" (None: by the direction of the output axis).  truth: simulated
+    coefficients, rad/s per g0^n.  fold: D_OO may be there and is folded into others.  specification: name -> limits in
+    surface units.  u_*: standard uncertainties of type B; u_nonlinearity: relative, at the largest current of the
+    record; quantum: resolution of the current reading.  polarity: "project" k i = omega_IA - omega_d, or "book"
+    k i = omega_d - omega_IA.
+    """
+
+    latitude: float
+    gravity: float
+    k: float
+    faces: Mapping[int, Array]
+    earth_rate: float = frames.EARTH_RATE
+    base: Array = field(default_factory=lambda: np.empty((0, 0)))  # empty: table axis on the pole
+    labels: Mapping[int, str] = field(default_factory=dict)
+    modes: Mapping[int, str] | None = None
+    truth: Mapping[str, float] | None = None
+    terms: int = 9
+    fold: bool = False
+    specification: Mapping[str, tuple[float | None, float | None]] | None = None
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_scale_factor: float = 0.0
+    u_nonlinearity: float = 0.0
+    u_current: float = 0.0
+    quantum: float = 0.0
+    polarity: str = "project"
+    instrument: str = ""
+
+    def __post_init__(self) -> None:
+        if np.size(self.base) == 0 and math.isfinite(self.latitude) and abs(self.latitude) <= math.pi / 2:
+            object.__setattr__(self, "base", frames.polar_base(self.latitude))
+
+    def label(self, phase: int) -> str:
+        return self.labels.get(phase, f"phase {phase}")
+
+    def turns(self, phase: int) -> bool:
+        """True where the table turns: by ``modes``, or where the output axis is nearer to its axis than to the vertical."""
+        if self.modes is not None and phase in self.modes:
+            return self.modes[phase] == "rate"
+        output = np.asarray(self.faces[phase])[1]
+        return bool(abs(output[2]) >= abs(output @ (np.asarray(self.base) @ frames.U)))
+
+
+def refusals(latitude: float) -> list[str]:
+    """Why a tumble at ``latitude`` (rad) cannot give the nine coefficients, as sentences; empty when it can."""
+    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
+        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+    size = abs(math.degrees(latitude))
+    if 5.0 <= size <= 85.0:
+        return []
+    faces, base = frames.tumble_faces(latitude), frames.polar_base(latitude)
+    angles = np.radians(np.arange(0.0, 360.0, 10.0))
+    rows = [frames.to_face(-frames.U, faces[m], base, a) for m in ("mount 1", "mount 2") for a in angles]
+    rows += [frames.to_face(-frames.U, faces[s], base, 0.0) for s in ("static 3", "static 4")]
+    design = regression.examine(drift.regressors(np.array(rows), drift.terms(9)), drift.terms(9))
+    where = f"latitude {math.degrees(latitude):.4g}° (5° to 85° north or south is possible): "
+    if design.rank < 9:
+        return [f"{where}rank {design.rank} of 9, the record does not see {'; '.join(design.lost)}"]
+    return [f"{where}condition {design.condition:.3g}, hardly seen is {design.weakest}"]
+
+
+def _setup_problems(s: TumbleSetup) -> list[str]:
+    found = refusals(s.latitude)
+    if s.terms not in drift.TERM_SETS:
+        found.append(f"{s.terms}-term model unknown; there are {', '.join(map(str, drift.TERM_SETS))}")
+    if not 9.7 <= s.gravity <= 9.9:
+        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
+    if not (math.isfinite(s.k) and s.k > 0.0):
+        found.append(f"scale factor k = {s.k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'")
+    if s.polarity not in ("project", "book"):
+        found.append(
+            f"polarity '{s.polarity}' unknown; there are 'project' (k i = ω_IA − ω_d) and 'book' (k i = ω_d − ω_IA)"
+        )
+    for name, matrix in [("table base", s.base), *((f"mount of {s.label(p)}", f) for p, f in s.faces.items())]:
+        try:
+            frames.check_rotation(matrix, name)
+        except ValueError as error:
+            found.append(str(error))
+    if s.truth and s.truth.get("D_OO", 0.0) != 0.0 and not s.fold:
+        found.append(
+            f"D_OO = {s.truth['D_OO'] / DPH:g} °/h/g² is simulated, but at constant |g| it cannot be told from D_F, "
+            "D_II and D_SS; set fold to accept the combinations D_F + γ² D_OO, D_II − D_OO, D_SS − D_OO"
+        )
+    if s.terms == 10 and not s.fold:
+        found.append(
+            "ten terms have rank 9 at constant |g|: the data do not see D_II + D_OO + D_SS − γ² D_F; reduce nine "
+            "terms, or set fold to report the combinations"
+        )
+    return found
+
+
+def _plan_problems(s: TumbleSetup, w: Mapping[str, Array]) -> list[str]:
+    """Missing phases, mounts and dwells, tables that stand still, windows too wide."""
+    phase = np.asarray(w["phase"]).astype(int)
+    there = set(phase.tolist())
+    found = [f"phase {p} ({s.label(p)}) is missing in the record" for p in s.faces if p not in there]
+    found += [f"phase {p} is in the record, but its mount is not given" for p in sorted(there - set(s.faces))]
+    rate = [p for p in s.faces if s.turns(p)]
+    dwell = [p for p in s.faces if p not in rate]
+    side = {np.sign(np.asarray(s.faces[p])[1, 2]) for p in rate}
+    if len(side) < 2:
+        found.append("only one mount: two are needed, output axis along +pole and −pole (D_I, D_IO and D_S, D_OS mix)")
+    up = {np.sign(np.asarray(s.faces[p])[1] @ (np.asarray(s.base) @ frames.U)) for p in dwell}
+    if len(up) < 2:
+        what = "no dwells" if not dwell else "only one dwell"
+        found.append(
+            f"{what} with the output axis vertical, up and down are needed: D_F cannot be told from D_II + D_SS"
+        )
+    width = np.asarray(w["angle_end"], dtype=float) - np.asarray(w["angle_start"], dtype=float)
+    for p in rate:
+        mine = np.abs(width[phase == p])
+        if mine.size == 0:
+            continue
+        if np.max(mine) < 1e-3:
+            found.append(f"phase {p} ({s.label(p)}): the table angle does not move, expected a turning table (rate 0?)")
+        elif np.max(mine) > 2.0 * math.pi / 5.0 * 1.001:
+            per = 2.0 * math.pi / float(np.max(mine))
+            found.append(f"phase {p} ({s.label(p)}): {per:.2g} windows a turn, at least 5 are needed for two harmonics")
+    for p in dwell:
+        mine = np.abs(width[phase == p])
+        if mine.size and np.max(mine) > 1e-2:
+            found.append(f"phase {p} ({s.label(p)}): the table turns by {math.degrees(np.max(mine)):.3g}° in a dwell")
+    return found
+
+
+def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
+    """Coefficients with uncertainties from the windows of a record (columns of a record, SI; see checks).
+
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    problems = _setup_problems(setup) + window_problems(windows)
+    if not problems:
+        problems = _plan_problems(setup, windows)
+    if problems:
+        raise ReductionError(problems)
+    phase = np.asarray(windows["phase"]).astype(int)
+    column = {c: np.asarray(windows[c], dtype=float) for c in ("t_start", "t_end", "angle_start", "angle_end", "mean")}
+    face = np.array([np.asarray(setup.faces[p], dtype=float) for p in phase.tolist()])
+    turning = attitude.Turning(column["angle_start"], column["angle_end"], column["t_start"], column["t_end"], face)
+    current = column["mean"] if setup.polarity == "project" else -column["mean"]
+    rate = attitude.input_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+    y = rate - setup.k * current
+    names = drift.terms(9 if setup.terms == 10 else setup.terms)
+    X = attitude.regressors(turning, setup.base, setup.gravity, names)
+    try:
+        est = correlated.fit(X, y, names, turning.t_start, turning.t_end)
+    except regression.RegressionError as error:
+        raise ReductionError(str(error)) from None
+    book, fits, why = closed.reduce(
+        phase, turning.angle_start, turning.angle_end, turning.t_end - turning.t_start, y, setup.faces, setup.latitude,
+        setup.gravity,
+    )  # fmt: skip
+    effects = budget.effects(setup, turning, current, names, est.beta, est.gain)
+    found = diagnostics.Findings(setup, phase, turning, y, X, est, book, fits)
+    coefficients = [_coefficient(setup, n, j, est, book, effects) for j, n in enumerate(names)]
+    warnings = list(est.warnings) + found.warnings
+    if why:
+        warnings.append(f"No closed formulas: {why}.")
+    if est.design.condition > 100.0:
+        warnings.append(f"Condition {est.design.condition:.3g}: hardly seen is {est.design.weakest}.")
+    if setup.fold:
+        warnings.append(
+            "D_OO is folded: at constant |g| only D_F + γ² D_OO, D_II − D_OO and D_SS − D_OO can be had (γ = g/g0 = "
+            f"{setup.gravity / frames.G0:.6f}); separating them needs |f| ≠ 1 g, a centrifuge."
+        )
+    missing = [n for n in drift.NAMES if n not in names and n != "D_OO" and (setup.truth or {}).get(n, 0.0) != 0.0]
+    if missing:
+        warnings.append(
+            f"{', '.join(missing)} is simulated but not in the {setup.terms}-term model: the others are biased."
+        )
+    return Result(
+        system="tumble_single_axis",
+        title="Single-axis tumble test of a floated gyro",
+        method="Torque-rebalance tumble about the polar axis in two mounts with two dwells; least squares over all "
+        "windows under an estimated noise model [TEST-TUMBLE1-SDF]",
+        sources=[
+            "TEST-TUMBLE1-SDF, TUM1-REDUCE; 000_791234d3afc34a0c.txt eq. 3-12..3-21, corrected by E20-E23",
+            "GYRO-STATIC-9; 000_791234d3afc34a0c.txt eq. 2-36, 2-47",
+            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+        ],
+        equation=_equation(names),
+        conventions=_conventions(setup),
+        coefficients=coefficients,
+        series=found.series(),
+        correlation=regression.correlation(est.covariance).tolist(),
+        condition=est.design.condition,
+        rank=est.design.rank,
+        dof=float(y.size - len(names)),
+        noise=found.noise(),
+        tests=found.tests(),
+        residual_std=found.residual_std,
+        residual_unit="°/h",
+        acf=found.acf(),
+        allan=found.allan(),
+        psd=found.psd(),
+        harmonics=found.harmonics(),
+        budget=_budget_lines(names, setup, est, effects),
+        repeatability=found.repeatability(),
+        tables=found.tables(),
+        warnings=warnings,
+        summary=_summary(coefficients, found),
+        decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        site={
+            "latitude / °": math.degrees(setup.latitude),
+            "gravity / (m/s²)": setup.gravity,
+            "Earth rate / (rad/s)": setup.earth_rate,
+        },
+        instrument=setup.instrument,
+        simulated=setup.truth is not None,
+    )
+
+
+def _coefficient(
+    s: TumbleSetup, name: str, j: int, est: correlated.Estimate, book: Mapping[str, float], effects: list[budget.Effect]
+) -> Coefficient:
+    contributions = [float(e.change[j]) * e.size for e in effects]
+    u, U = uncertainty.combine(float(est.u[j]), float(est.half_width[j]), contributions)
+    value, truth = float(est.beta[j]), None
+    if s.truth is not None:
+        oo = s.truth.get("D_OO", 0.0)
+        extra = {"D_F": oo * (s.gravity / frames.G0) ** 2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
+        truth = (s.truth.get(name, 0.0) + extra) / DPH
+    shown = FOLDED.get(name, name) if s.fold else name
+    spec = s.specification or {}
+    limit = spec.get(shown, spec.get(name))
+    estimate, u_s, U_s = value / DPH, u / DPH, U / DPH
+    u_a = float(est.u[j]) / DPH
+    dof = float(est.dof[j])
+    return Coefficient(
+        name=shown,
+        meaning=drift.MEANING[name] + (", with D_OO folded in" if shown != name else ""),
+        unit=units.display(drift.surface_unit(name)),
+        estimate=estimate,
+        u=u_s,
+        k=U / u if u > 0.0 else uncertainty.NORMAL,
+        interval=(estimate - U_s, estimate + U_s),
+        t=estimate / u_a if u_a > 0.0 else None,
+        p=float(est.p[j]) if u_a > 0.0 else None,
+        u_a=u_a,
+        dof=dof if math.isfinite(dof) else None,
+        closed=book[name] / DPH if name in book else None,
+        truth=truth,
+        z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
+        limit=limit,
+        verdict=uncertainty.verdict(estimate, U_s, limit),
+    )
+
+
+def _budget_lines(
+    names: tuple[str, ...], s: TumbleSetup, est: correlated.Estimate, effects: list[budget.Effect]
+) -> list[BudgetLine]:
+    lines = []
+    for j, name in enumerate(names):
+        unit = units.display(drift.surface_unit(name))
+        shown = FOLDED.get(name, name) if s.fold else name
+        u_a = float(est.u[j]) / DPH
+        note = "type A, from the residuals under the estimated noise"
+        lines.append(BudgetLine("random drift and reading noise", u_a, unit, 1.0, "1", u_a, unit, shown, note))
+        for e in effects:
+            change = abs(float(e.change[j])) / DPH
+            if e.size > 0.0 and change * e.size > 1e-9 * u_a:
+                per = unit if e.unit == "1" else f"{unit}/{e.unit}"
+                lines.append(BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, unit, shown, e.note))
+    return lines
+
+
+def _equation(names: tuple[str, ...]) -> str:
+    axis = {"I": "X", "O": "Y", "S": "Z"}
+    parts = []
+    for n in names:
+        index = n[2:]
+        if n == "D_F":
+            parts.append("D_F")
+        elif len(index) == 2 and index[0] == index[1]:
+            parts.append(f'D_"{index}" {axis[index[0]]}^2')
+        else:
+            symbol = f"D_{index}" if len(index) == 1 else f'D_"{index}"'
+            parts.append(f"{symbol} {' '.join(axis[a] for a in index)}")
+    return 'omega_"IA" - k i = omega_d = ' + " + ".join(parts)
+
+
+def _conventions(s: TumbleSetup) -> list[str]:
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    return [
+        "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
+        "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
+        "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        "Gyro axes I, O, S right-handed; local frame east, north, up; table angle right-handed about the pole, so that "
+        "turning against the Earth is negative; the book's θ is minus the table angle.",
+        *([] if s.terms in (9, 10) else [f"{s.terms}-term model: the terms left out are taken as zero."]),
+        *([] if s.fold else ["D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."]),
+    ]
+
+
+def _summary(coefficients: list[Coefficient], found: diagnostics.Findings) -> list[str]:
+    first = coefficients[0]
+    linear = max((c for c in coefficients if c.unit == "°/h/g"), key=lambda c: abs(c.estimate))
+    return [
+        f"Constant drift {first.name} = {diagnostics.plus_minus(first)}.",
+        f"Largest drift per g: {linear.name} = {diagnostics.plus_minus(linear)}.",
+        found.noise_sentence(),
+    ]
+
+
+def setup_of(
+    meta: Mapping[str, Any], specification: Mapping[str, tuple[float | None, float | None]] | None = None
+) -> TumbleSetup:
+    """The setup a run.json describes: options, plan and the parameters of the parts (slot.name, SI).
+
+    Scale factor: option ``k``, else the gyro's parameter ``k``.  Truth only where the gyro part has the coefficients.
+    """
+    options, parameters = dict(meta.get("options", {})), dict(meta.get("parameters", {}))
+    latitude = float(options["latitude"])
+    gravity = float(options.get("gravity") or parameters.get("site.gravity") or 0.0)
+    if gravity == 0.0:
+        gravity = frames.normal_gravity(latitude, float(options.get("height", 0.0)))
+    k = options.get("k") or parameters.get("gyro.k")
+    if k is None:
+        raise ReductionError("torquer scale factor unknown: the gyro has no parameter k; give the option k")
+    ideal = frames.tumble_faces(latitude)
+    plan = meta["plan"]
+    unknown = sorted({r["face"] for r in plan} - set(ideal))
+    if unknown:
+        raise ReductionError(f"mount {', '.join(unknown)} unknown; there are {', '.join(ideal)}")
+    truth = {n: float(parameters[f"gyro.{n}"]) for n in drift.NAMES if f"gyro.{n}" in parameters}
+    sizes = ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
+    return TumbleSetup(
+        latitude=latitude,
+        gravity=gravity,
+        k=float(k),
+        faces={int(r["phase"]): ideal[r["face"]] for r in plan},
+        earth_rate=float(parameters.get("site.earth_rate", frames.EARTH_RATE)),
+        labels={int(r["phase"]): str(r["label"]) for r in plan},
+        modes={int(r["phase"]): "rate" if r["mode"] == "rate" else "dwell" for r in plan},
+        truth=truth or None,
+        terms=int(options.get("terms", 9)),
+        fold=bool(options.get("fold", False)),
+        specification=specification,
+        quantum=float(parameters.get("rebalance.resolution", 0.0)),
+        instrument=str(meta.get("instrument", "")),
+        **{n: float(options.get(n, 0.0)) for n in sizes},
+    )
+
+
+def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    result = reduce(record.windows, setup_of(record.meta, specification))
+    result.provenance = dict(record.meta)
+    if not record.meta.get("complete", True):
+        result.warnings.insert(
+            0, f"The run stopped at {record.meta.get('stopped_at', 0.0):.6g} s, before its plan was done."
+        )
+    return result
