@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from gyrobench import frames
+from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
+from . import measured
+
+Specification = Mapping[str, tuple[float | None, float | None]]
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
 
@@ -66,7 +72,12 @@ class TumbleSingleAxis(System):
         "u_axis": Option(0.0, "rad", "standard uncertainty of the table axis against the pole", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the fixture", 0.0),
         "u_scale_factor": Option(0.0, "1", "relative standard uncertainty of the torquer scale factor", 0.0),
+        "u_nonlinearity": Option(0.0, "1", "relative torquer nonlinearity at the largest current, standard unc.", 0.0),
+        "u_current": Option(0.0, "A", "standard uncertainty of the zero of the current meter", 0.0),
+        "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),
+        "terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9),
     }
+    noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "rebalance.meter")
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "rebalance.i", "gyro.drift")
@@ -113,7 +124,13 @@ class TumbleSingleAxis(System):
             )
         return found
 
-    def reduce(self, record: Record, specification: dict[str, Any] | None = None) -> Any:
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
         from .reduction import from_record
 
         return from_record(record, specification)
+
+    def template(self) -> str:
+        return measured.TEMPLATE
+
+    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
+        return measured.read(self, data, values)

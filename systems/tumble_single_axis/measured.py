@@ -1,0 +1,91 @@
+"""A laboratory's record of the single-axis tumble: which columns it has, and how it becomes a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.system.measured import DataError, read_measured
+from gyrobench.system.record import Record
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
+
+TEMPLATE = """\
+# Single-axis tumble of a floated gyro in torque rebalance: one row for each averaging window.
+# latitude = 45.75deg
+# k = 17.2deg/h/mA
+# gravity = 9.8067m/s2
+# instrument = type and number of the gyro
+# operator = who took the record
+# polarity = project
+# phase 1 = static 3
+# phase 2 = mount 1
+# phase 3 = static 4
+# phase 4 = mount 2
+#
+# latitude, k (torquer scale factor): needed, here or by --set.  gravity, height: optional (WGS84 normal gravity).
+# polarity: project (k i = input rate - drift, positive current precesses positively) or book (the opposite sign).
+# phase N: which attitude the rows with this number were taken in:
+#   mount 1   table turning, output axis along +pole, input axis east at angle 0
+#   mount 2   table turning, output axis along -pole, input axis east at angle 0
+#   static 3  table at rest at angle 0, output axis up, input axis east
+#   static 4  table at rest at angle 0, output axis down, input axis east
+# angle: of the table, right-handed about the pole, counted on through the turns; against the Earth it decreases.
+# mean: torquer current averaged over the window.  std, n (of the samples) and flagged (suspect samples): optional.
+# Units in brackets may be others of the same kind (min, arcsec, A ...).
+phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
+"""
+TEXTS = ("instrument", "operator", "polarity", "date", "report")
+
+
+def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
+
+    Raises DataError, and ValueProblem for an option that does not fit.
+    """
+    windows, comments = read_measured(data)
+    said = {**comments, **values}
+    for name in values:
+        if name not in system.options and name not in TEXTS and not name.startswith("phase "):
+            system.set(name, values[name])  # says which options there are
+    for name, value in said.items():
+        if name in system.options:
+            system.set(name, value)
+    problems = [
+        f"'{n}' is not given: write '# {n} = ...' in the file or --set {n}=..." for n in ("k",) if not system[n]
+    ]
+    if "latitude" not in said:
+        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
+    known = frames.tumble_faces(system["latitude"])
+    plan = []
+    for phase in sorted({int(p) for p in windows["phase"]}):
+        face = said.get(f"phase {phase}")
+        if face not in known:
+            there = f"{face!r} is no attitude" if face else "its attitude is not given"
+            problems.append(f"phase {phase}: {there}: write '# phase {phase} = ...' with one of {', '.join(known)}")
+            continue
+        mode = "rate" if face.startswith("mount") else "hold"
+        plan.append({"phase": phase, "label": face, "mode": mode, "face": face})
+    if problems:
+        raise DataError(data, problems)
+    count = len(windows["phase"])
+    windows.setdefault("std", np.full(count, np.nan))
+    windows.setdefault("n", np.ones(count, dtype=np.int64))
+    windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
+    meta = {
+        "system": system.name,
+        "title": system.title,
+        "spec": list(system.spec),
+        "measured": True,
+        "complete": True,
+        "options": dict(system.values),
+        "parameters": {},
+        "plan": plan,
+        **{n: said[n] for n in TEXTS if n in said},
+    }
+    return Record(windows, {}, meta)
