@@ -24,7 +24,7 @@ class RebalanceAnalog(Component):
     k i = omega_IA - omega_d exactly.
 
     Not modelled: bandwidth and drift of the current source, heating of the torquer, pulse-width operation.
-    Sources: 000_791234d3afc34a0c.txt ch. 5, eq. 5-62..5-68.
+    Source: 000_791234d3afc34a0c.txt ch. 5, eq. 5-62..5-68.
     """
 
     version = "1.0.0"

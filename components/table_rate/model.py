@@ -7,7 +7,7 @@ IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class TableRate(Component):
-    """Turntable with one driven axis, kinematic: hold, index and rate.  [TABLE-RATE, TABLE-POSITION; 001... ch. 5.4]
+    """Turntable with one driven axis, kinematic: hold, index and rate.  [TABLE-RATE, TABLE-POSITION]
 
     The table follows its command without error.  From the moment a command (mode, target) changes, the motion
     is a chain of five segments of constant acceleration, each in closed form from its own start,
@@ -33,6 +33,7 @@ class TableRate(Component):
 
     Not modelled: servo error and bandwidth, axis wobble, bearing torque, acceleration of the mounted
     instrument (it stands on the axis), time of a change of mount.
+    Source: 000_791234d3afc34a0c.txt ch. 5.4 two-2, 5.5 two-1, 6.1; frames of spec d1, 0.1 and 0.3.
     """
 
     version = "1.0.0"
