@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .plots import short
-from .style import BLUE, GREEN, INK, ORANGE, PAPER, PURPLE, SKY, VERMILION, WIDE, axis_label, figure, svg
+from .style import BLUE, GREEN, INK, ORANGE, PAPER, PURPLE, SKY, VERMILION, WIDE, axis_label, figure, styled, svg
 
 _HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo")
 
@@ -83,21 +83,21 @@ def _shares(lines: Sequence[Mapping[str, Any]], names: Sequence[str], u: Mapping
 
 
 def wires_of(provenance: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """(from slot, variable, to slot, variable) of each wire, however the record writes them."""
+    """(from slot, variable, to slot, variable) of each wire.
+
+    A wire is "a.x -> b.y", a pair of ends, or a dictionary with "wire" or with "from" and "to"; one that is marked as
+    not connected is left out.
+    """
     out = []
     for wire in provenance.get("wires") or []:
-        ends: Sequence[Any]
         if isinstance(wire, Mapping):
-            ends = (wire.get("from") or wire.get("source"), wire.get("to") or wire.get("target"))
-        elif isinstance(wire, str):
-            ends = re.split(r"\s*->\s*", wire)
-        else:
-            ends = list(wire)
-        if len(ends) == 4:
-            out.append((str(ends[0]), str(ends[1]), str(ends[2]), str(ends[3])))
-        elif len(ends) == 2 and all(isinstance(e, str) and "." in e for e in ends):
-            a, b = (str(e).split(".", 1) for e in ends)
-            out.append((a[0], a[1], b[0], b[1]))
+            if not wire.get("connected", True):
+                continue
+            wire = wire["wire"] if "wire" in wire else (wire.get("from"), wire.get("to"))
+        ends = re.split(r"\s*->\s*", wire) if isinstance(wire, str) else [str(e) for e in wire]
+        if len(ends) == 2 and all("." in e for e in ends):
+            (a, x), (b, y) = (e.split(".", 1) for e in ends)
+            out.append((a, x, b, y))
     return out
 
 
@@ -109,8 +109,14 @@ def merge_indices(names: Sequence[str]) -> list[str]:
 def system(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str:
     """N² drawing: parts on the diagonal in execution order, wires above it forward, below it backward.
 
-    A wire below the diagonal carries the value of the step before: it is drawn dashed.
+    A wire below the diagonal carries the value of the step before: it is drawn dashed.  ``provenance`` holds the
+    "wires"; the SVG can also stand alone.
     """
+    with styled():
+        return _n_squared(order, provenance, key)
+
+
+def _n_squared(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str:
     from matplotlib.patches import Rectangle
 
     wires = [w for w in wires_of(provenance) if w[0] in order and w[2] in order]

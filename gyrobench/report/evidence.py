@@ -7,7 +7,7 @@ from typing import Any
 from . import drawing, plots
 from .blocks import Column, Fold, Picture, Row, Table, Text, number_cell, pictures, text_cell
 from .numbers import write_number, write_p
-from .tables import generic, heading
+from .tables import generic, heading, words
 
 Json = dict[str, Any]
 
@@ -161,14 +161,25 @@ def repeatability(doc: Json) -> list[Any]:
     blocks += generic(
         doc, ("step_check",), "Step check: the same run with half the step; change of each coefficient against u."
     )
+    return blocks
+
+
+def _method_tables(doc: Json) -> list[Any]:
+    """The tables a method brings itself; numbers are rounded to the column "u" where there is one."""
+    blocks: list[Any] = []
     for k, table in enumerate(doc["tables"]):
-        columns = [Column(str(h)) for h in table.get("columns", [])]
-        rows = [
-            Row([number_cell(doc, ("tables", k, "rows", i, j)) for j in range(len(columns))])
-            for i in range(len(table.get("rows", [])))
-        ]
+        heads = [str(h) for h in table.get("columns", [])]
+        rows = []
+        for i, values in enumerate(table.get("rows", [])):
+            u = next((v for h, v in zip(heads, values, strict=False) if h == "u"), None)
+            cells = []
+            for j, head in enumerate(heads):
+                apart = {"significant": 2} if head == "difference" else {"u": u}
+                cells.append(number_cell(doc, ("tables", k, "rows", i, j), **apart))
+            rows.append(Row(cells))
         caption = ". ".join(t.rstrip(".") for t in (table.get("title", ""), table.get("caption", "")) if t)
-        blocks.append(Table(columns, rows, f"{caption}."))
+        if rows:
+            blocks.append(Table([Column(*words(h)) for h in heads], rows, f"{caption}."))
     return blocks
 
 

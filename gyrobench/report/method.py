@@ -8,6 +8,7 @@ from typing import Any
 from . import drawing
 from .blocks import Cell, Column, Equation, Fold, Items, Picture, Row, Table, Text, number_cell, pictures, text_cell
 from .document import look
+from .numbers import write_number
 
 Json = dict[str, Any]
 
@@ -32,10 +33,7 @@ def system(doc: Json) -> list[Any]:
         blocks += pictures(
             Picture("system", svg, caption, "Parts in execution order with their wires: " + ", ".join(order))
         )
-        cuts, delays = run.get("cuts") or [], run.get("delays") or []
-        blocks.append(
-            Items([f"Order: {', '.join(order)}.", f"Cut at: {_ends(cuts)}.", f"Delayed by one step: {_ends(delays)}."])
-        )
+        blocks.append(Items([f"Order: {', '.join(order)}.", *_cuts(run)]))
     rows = []
     keys = (
         "phase",
@@ -73,15 +71,13 @@ def system(doc: Json) -> list[Any]:
     return blocks
 
 
-def _ends(wires: Any) -> str:
-    """Cut or delayed wires in words."""
-    if isinstance(wires, Mapping):
-        return ", ".join(f"{k} ({v})" for k, v in wires.items()) or "nothing"
-    parts = [
-        w if isinstance(w, str) else " → ".join(str(e) for e in (w.values() if isinstance(w, Mapping) else w))
-        for w in wires
-    ]
-    return ", ".join(parts) or "nothing"
+def _cuts(run: Mapping[str, Any]) -> list[str]:
+    """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
+    cuts, delays = run.get("cuts") or [], run.get("delays") or []
+    said = [f"Cut: {c}." for c in map(str, cuts)] or ["No connection is cut: every value is used in its own step."]
+    if isinstance(delays, Mapping):
+        return said + [f"Delay on {wire}: {write_number(seconds).text} s." for wire, seconds in delays.items()]
+    return said + [f"Delay of one step on {wire}." for wire in delays]
 
 
 def full_values(doc: Json) -> list[Any]:

@@ -71,6 +71,11 @@ def write_p(p: float | None) -> Written:
     return _fixed(p, 3, repr(float(p)))
 
 
+def superscript(number: int) -> str:
+    """-6 as ⁻⁶."""
+    return str(number).translate(_SUPERSCRIPT)
+
+
 def _exponent(value: float) -> int:
     return math.floor(math.log10(abs(value))) if value else 0
 
@@ -91,4 +96,4 @@ def _power(value: float, significant: int, exponent: int, full: str, strip: bool
     mantissa = _fixed(value / 10.0**exponent, significant - 1, full, strip)
     if mantissa.text == "0":
         return mantissa
-    return Written(mantissa.whole, f"{mantissa.rest}·10{str(exponent).translate(_SUPERSCRIPT)}", full)
+    return Written(mantissa.whole, f"{mantissa.rest}·10{superscript(exponent)}", full)

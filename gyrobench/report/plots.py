@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .numbers import superscript
 from .style import (
     BLUE,
     CYCLE,
@@ -55,8 +56,11 @@ def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | 
     return low - pad * (high - low), high + pad * (high - low)
 
 
-def fit(series: Sequence[Json], key: str, everything: Sequence[Json]) -> str:
-    """Points, fit and, beneath on the same axis, residuals; scales shared with all other series."""
+def fit(series: Sequence[Json], key: str, alike: Sequence[Json], everything: Sequence[Json]) -> str:
+    """Points, fit and, beneath on the same axis, residuals.
+
+    The scale is shared with the series that are ``alike``, that of the residuals with ``everything``.
+    """
     fig, axes = figure(
         WIDE if len(series) > 1 else WIDE * 0.75,
         84,
@@ -82,8 +86,8 @@ def fit(series: Sequence[Json], key: str, everything: Sequence[Json]) -> str:
     first = series[0]
     axes[0, 0].set_ylabel(axis_label(first["y_name"], first["y_unit"]))
     axes[1, 0].set_ylabel(axis_label("residual", first["y_unit"]))
-    for row, name in ((0, "y"), (1, "residual")):
-        shared = limits([v for s in everything for v in s[name] if v is not None])
+    for row, name, others in ((0, "y", alike), (1, "residual", everything)):
+        shared = limits([v for s in others for v in s[name] if v is not None])
         if shared:
             axes[row, 0].set_ylim(*shared)
     fig.align_ylabels(axes[:, 0])
@@ -115,19 +119,41 @@ def residuals_in_time(series: Sequence[Json], key: str) -> str:
     return svg(fig, key, zoom=ax)
 
 
-def channels(record: Json, name: str, label: str, unit: str, key: str) -> str:
-    """One recorded channel against time, decimated by its min-max envelope."""
-    t, y = finite(list(record["time"]), list(record[name]))
-    if len(t) < 3:
+# what is recorded in SI and read in other units
+_SHOWN = {"rad": ("°", 180.0 / math.pi), "rad/s": ("°/h", 648000.0 / math.pi)}
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M"}
+
+
+def scaled(values: Sequence[float], unit: str) -> tuple[float, str]:
+    """Factor and unit in which values recorded in an SI unit are easy to read: °, °/h, µV, mA, or 10⁻⁶ of the unit."""
+    shown, factor = _SHOWN.get(unit, (unit, 1.0))
+    size = factor * max((abs(v) for v in values), default=0.0)
+    exponent = 3 * math.floor(math.log10(size) / 3.0) if size > 0.0 else 0
+    if 1e-2 <= size < 1e5:
+        return factor, shown
+    if shown in ("V", "A", "N", "m", "s", "W") and exponent in _PREFIXES:
+        return factor * 10.0**-exponent, _PREFIXES[exponent] + shown
+    return factor * 10.0**-exponent, f"10{superscript(exponent)} {shown}"
+
+
+def channels(record: Json, names: Sequence[str], units: Mapping[str, str], key: str) -> str:
+    """Recorded channels against time, one above the other, decimated by their min-max envelope."""
+    time = [float(v) for v in record["time"]]
+    if len(time) < 3 or not names:
         return ""
-    divisor, time_unit = time_axis(t)
-    t, y = envelope([v / divisor for v in t], y)
-    fig, axes = figure(WIDE, 48)
-    axes[0, 0].plot(t, y, "-", color=BLUE, linewidth=0.8)
-    axes[0, 0].set_xlabel(axis_label("time", time_unit))
-    axes[0, 0].set_ylabel(axis_label(label, unit))
-    axes[0, 0].margins(x=0.01)
-    return svg(fig, key, zoom=axes[0, 0])
+    divisor, time_unit = time_axis(time)
+    fig, axes = figure(WIDE, 14 + 27 * len(names), nrows=len(names), sharex=True)
+    for ax, name in zip(axes[:, 0], names, strict=True):
+        t, y = finite(time, [float(v) for v in record[name]])
+        factor, unit = scaled(y, units.get(name, "SI"))
+        t, y = envelope([v / divisor for v in t], [v * factor for v in y])
+        ax.plot(t, y, "-", color=BLUE, linewidth=0.8)
+        ax.set_ylabel(axis_label(name, unit))
+        ax.margins(x=0.01)
+        ax.locator_params(axis="y", nbins=4)
+    axes[-1, 0].set_xlabel(axis_label("time", time_unit))
+    fig.align_ylabels(axes[:, 0])
+    return svg(fig, key, zoom=axes[-1, 0])
 
 
 def acf(data: Json, key: str) -> str:

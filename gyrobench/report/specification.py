@@ -43,8 +43,10 @@ def load_specification(path: str | Path) -> Limits:
 def check_units(path: str | Path, units: dict[str, str]) -> None:
     """Raise SpecificationError when an entry names no reported coefficient, or another unit than reported.
 
-    ``units`` maps coefficient names to the units of the report.
+    ``units`` maps coefficient names to the units of the report; an entry D_F also stands for a combination whose
+    name begins with it, as "D_F + γ² D_OO".
     """
+    units = {**{name.split(" ")[0]: unit for name, unit in units.items()}, **units}
     for name, entry in _entries(Path(path)).items():
         if name not in units:
             known = ", ".join(units)

@@ -143,7 +143,7 @@ def themed(svg_text: str) -> str:
 def axis_label(name: str, unit: str) -> str:
     """ "drift rate / (°/h)", "table angle / °", "share / 1"."""
     unit = unit or "1"
-    return f"{name} / ({unit})" if "/" in unit else f"{name} / {unit}"
+    return f"{name} / ({unit})" if "/" in unit or " " in unit else f"{name} / {unit}"
 
 
 def zero_line(ax: Any) -> None:

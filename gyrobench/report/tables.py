@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .blocks import Cell, Column, Fold, Row, Table, Text, number_cell, text_cell
+from .blocks import Cell, Column, Fold, Items, Row, Table, Text, number_cell, text_cell
 from .document import look
 from .numbers import write_number
 
@@ -30,11 +30,14 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """A field name as words and its unit: ``sigma_deg_per_h`` is ("sigma", "°/h")."""
+    """A field name as words and its unit: ``sigma_deg_per_h`` or ``sigma / (°/h)`` is ("sigma", "°/h")."""
+    if " / " in key:
+        name, unit = key.rsplit(" / ", 1)
+        return name, unit[1:-1] if unit.startswith("(") and unit.endswith(")") else unit
     for ending, unit in _UNITS.items():
         if key.endswith(ending) and len(key) > len(ending):
             return key[: -len(ending)].replace("_", " "), unit
-    return key.replace("_", " "), {"step": "s"}.get(key, "")
+    return key.replace("_", " "), {"step": "s", "from": "s", "to": "s"}.get(key, "")
 
 
 def heading(text: str) -> Row:
@@ -99,6 +102,9 @@ def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None) -> Cell
         return text_cell("yes" if value else "no")
     if isinstance(value, int | float) or value is None:
         return number_cell(doc, path, u)
+    if isinstance(value, list) and len(value) == 2 and all(isinstance(v, int | float) for v in value):
+        low, high = (write_number(v).text for v in value)
+        return text_cell(f"{low} … {high}")
     return text_cell(value if isinstance(value, str) else compact(value))
 
 
@@ -143,17 +149,20 @@ def how_tables(doc: Any) -> list[Any]:
         )
         columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
         blocks.append(Table(columns, rows, "Parts in their slots, with the time spent in each.", small=True))
-    blocks += _parameters(doc)
-    facts = {k: run[k] for k in ("seed", "step", "engine", "complete", "stopped_at") if run.get(k) is not None}
+    blocks += _changed(doc) + _defaults(doc)
+    facts = [
+        k for k in ("seed", "step", "engine", "isolated", "complete", "stopped_at") if run.get(k) not in (None, [])
+    ]
     if facts:
         units = {"step": "s", "stopped_at": "s"}
         rows = [
             Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k)), text_cell(units.get(k, ""))]) for k in facts
         ]
-        for extra in run.get("options") or {}:
-            name, unit = words(str(extra))
-            rows.append(Row([text_cell(name), _cell(doc, ("provenance", "options", extra)), text_cell(unit)]))
         blocks.append(Table([Column("run"), Column("value"), Column("unit")], rows, "How the run was made."))
+    if run.get("data"):
+        blocks += generic(doc, ("provenance", "data"), "The data that were reduced.")
+    if run.get("notes"):
+        blocks.append(Items([str(n) for n in run["notes"]]))
     if run.get("versions"):
         rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
         blocks.append(
@@ -165,30 +174,31 @@ def how_tables(doc: Any) -> list[Any]:
     return blocks
 
 
-def _parameters(doc: Any) -> list[Any]:
+def _changed(doc: Any) -> list[Any]:
+    """What was changed against the defaults: parameters, options, swapped parts."""
     run = doc["provenance"]
-    parameters = run.get("parameters") or {}
-    if not isinstance(parameters, Mapping):
-        return []
     changed = [str(c) for c in (run.get("changed") or [])]
-    columns = [Column("parameter"), Column("value (SI)")]
+    if not changed:
+        text = "Nothing was changed: every part ran with its defaults."
+        return [Text(text)] if run.get("parameters") or run.get("options") else []
+    rows = []
+    for name in changed:
+        where = next((k for k in ("parameters", "options") if name in (run.get(k) or {})), "")
+        value = _cell(doc, ("provenance", where, name)) if where else text_cell("changed")
+        rows.append(Row([text_cell(name, "strong"), value]))
+    return [Table([Column("changed"), Column("value (SI)")], rows, "What was changed, in SI units.", small=True)]
 
-    def table(names: list[str], caption: str) -> Table:
-        rows = [Row([text_cell(n), _cell(doc, ("provenance", "parameters", n))]) for n in names]
-        return Table([Column(c.head, wide=c.wide) for c in columns], rows, caption, small=True)
 
-    mine = [n for n in changed if n in parameters]
-    others = [n for n in parameters if n not in changed]
+def _defaults(doc: Any) -> list[Any]:
+    """Options and parameters that stand at their defaults, folded."""
+    run = doc["provenance"]
+    changed = {str(c) for c in (run.get("changed") or [])}
     blocks: list[Any] = []
-    if mine:
-        blocks.append(table(mine, "Parameters that were changed, in SI units."))
-    elif parameters:
-        blocks.append(Text("No parameter was changed: every part ran with its defaults."))
-    if others:
-        blocks.append(
-            Fold(
-                f"Defaults ({len(others)} parameters)",
-                [table(others, "Parameters left at their defaults, in SI units.")],
-            )
-        )
+    for key, what in (("options", "options of the system"), ("parameters", "parameters of the parts")):
+        names = [n for n in (run.get(key) or {}) if n not in changed]
+        if names:
+            rows = [Row([text_cell(n), _cell(doc, ("provenance", key, n))]) for n in names]
+            caption = f"{what.capitalize()} left at their defaults, in SI units."
+            table = Table([Column("name"), Column("value (SI)")], rows, caption, small=True)
+            blocks.append(Fold(f"Defaults: {len(names)} {what}", [table]))
     return blocks

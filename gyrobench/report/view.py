@@ -137,26 +137,37 @@ def _coefficients(doc: Json) -> list[Any]:
     return [Table(columns, rows, f"Coefficients. {note}")] if rows else []
 
 
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
     curves = [s for s in doc["series"] if plots.is_curve(s)]
     blocks: list[Any] = []
-    for k in range(0, len(curves), 2):
-        pair = curves[k : k + 2]
-        first = pair[0]
-        key = f"fit-{k // 2 + 1}"
-        names = " and ".join(f"“{s['label']}”" for s in pair)
-        caption = (
-            f"{first['y_name'].capitalize()} against {first['x_name']}, {names}. Points: measured windows; line: the "
-            f"fitted model; beneath: what is left. A model that fits leaves no pattern beneath."
-        )
-        blocks += pictures(
-            Picture(key, plots.fit(pair, key, curves), caption, f"Points and fitted curve with residuals: {names}")
-        )
-    for k, name in enumerate(n for n in record if n != "time"):
-        key = f"channel-{k + 1}"
-        svg = plots.channels(record, name, name, "SI", key)
-        caption = f"Recorded channel {name}, in SI units; long records are drawn by their smallest and largest values."
-        blocks += pictures(Picture(key, svg, caption, f"Record of {name} against time", zoom=True))
+    number = 0
+    for axis in dict.fromkeys((s["x_name"], s["x_unit"]) for s in curves):
+        alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
+        for k in range(0, len(alike), 2):
+            pair = alike[k : k + 2]
+            number += 1
+            key = f"fit-{number}"
+            both = " and ".join(f"“{s['label']}”" for s in pair)
+            caption = (
+                f"{_capital(pair[0]['y_name'])} against {axis[0]}, {both}. Points: measured windows; line: the fitted "
+                f"model; beneath: what is left. A model that fits leaves no pattern beneath."
+            )
+            alt = f"Points and fitted curve with residuals: {both}"
+            blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
+    names = [n for n in record if n != "time"][:6]
+    units = doc["provenance"].get("units") or {}
+    caption = (
+        "The run in time: recorded channels, one above the other. Long records are drawn by the smallest and largest "
+        "value of each stretch."
+    )
+    svg = plots.channels(record, names, units, "channels") if names else ""
+    blocks += pictures(
+        Picture("channels", svg, caption, "Recorded channels against time: " + ", ".join(names), zoom=True)
+    )
     rows = []
     for k, s in enumerate(doc["series"]):
         rows.append(

@@ -10,10 +10,15 @@
   }
 
   function zoomable(figure) {
-    var svg = figure.querySelector("svg[data-x0]"), rect = svg && svg.querySelector("clipPath rect");
-    if (!rect) { return; }
-    var box = { x: +rect.getAttribute("x"), y: +rect.getAttribute("y"), w: +rect.getAttribute("width"), h: +rect.getAttribute("height") };
-    var whole = [+svg.dataset.x0, +svg.dataset.x1], view = whole.slice(), clip = "url(#" + rect.parentNode.id + ")";
+    var svg = figure.querySelector("svg[data-x0]");
+    if (!svg) { return; }
+    var boxes = Array.from(svg.querySelectorAll("clipPath rect"), function (r) {
+      return { x: +r.getAttribute("x"), y: +r.getAttribute("y"), w: +r.getAttribute("width"), h: +r.getAttribute("height") };
+    });
+    if (!boxes.length) { return; }
+    boxes.sort(function (a, b) { return a.y - b.y; });
+    var box = boxes[boxes.length - 1];  // all panels share the time axis; the lowest carries its numbers
+    var whole = [+svg.dataset.x0, +svg.dataset.x1], view = whole.slice();
     var lines = [], marks = [], labels = [];
     svg.querySelectorAll("[clip-path]").forEach(function (node) {
       if (node.closest('[id*="-xtick_"], [id*="-ytick_"]')) { return; }
@@ -22,7 +27,7 @@
       } else {
         var outer = document.createElementNS(NS, "g");
         node.parentNode.insertBefore(outer, node);
-        outer.setAttribute("clip-path", clip);
+        outer.setAttribute("clip-path", node.getAttribute("clip-path"));
         node.removeAttribute("clip-path");
         node.setAttribute("vector-effect", "non-scaling-stroke");
         outer.appendChild(node);
@@ -61,7 +66,7 @@
       for (var k = Math.ceil(view[0] / step); k * step <= view[1]; k++) {
         var x = box.x + (k * step - view[0]) / (view[1] - view[0]) * box.w;
         var line = document.createElementNS(NS, "path"), text = document.createElementNS(NS, "text");
-        line.setAttribute("d", "M" + x + " " + box.y + "V" + (box.y + box.h));
+        line.setAttribute("d", boxes.map(function (b) { return "M" + x + " " + b.y + "V" + (b.y + b.h); }).join(""));
         line.setAttribute("style", "stroke: var(--grid); stroke-width: 0.5");
         text.setAttribute("x", x);
         text.setAttribute("y", box.y + box.h + 10);
