@@ -20,7 +20,7 @@ After the last one ``outputs`` is evaluated and everything is checked to be fini
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -94,6 +94,8 @@ class Component:
         if "step" not in found and (methods or any(isinstance(d, State) for d in found.values())):
             found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
         for n, d in found.items():
+            if hasattr(Component, n) or n in ("der", "noise", "instance"):
+                raise PartError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
             d.name = n
         cls.declarations = found
         cls.layout = make_layout(found)
@@ -289,7 +291,7 @@ class Component:
     def _guard(self, method: Callable[[], None]) -> None:
         try:
             method()
-        except (ArithmeticError, ValueError) as e:
+        except (ArithmeticError, IndexError, ValueError) as e:
             where = f"{method.__name__} at t = {self.t:.9g} s"
             raise PartError(f"{self.instance}: {e} in {where}") from e
 

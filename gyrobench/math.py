@@ -180,8 +180,11 @@ def sign(x: Number) -> Number:
 
 
 def index(x: Number) -> int:
-    """A float that holds a whole number, as an array index."""
-    return int(value(x))
+    """A float that holds a whole number, as an array index.  Raises IndexError below 0."""
+    n = int(value(x))
+    if n < 0:
+        raise IndexError(f"an index is {n}")
+    return n
 
 
 FUNCTIONS = (

@@ -2,6 +2,6 @@
 
 from gyrobench.packaging.compiler import CompilerError
 from gyrobench.packaging.fmu import BuildError, build, load_part
-from gyrobench.packaging.translate import SubsetError
+from gyrobench.packaging.source import SubsetError
 
 __all__ = ["BuildError", "CompilerError", "SubsetError", "build", "load_part"]

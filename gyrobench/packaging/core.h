@@ -54,6 +54,14 @@ static void fail(Part *p, const char *format, ...) {
     va_end(a);
 }
 
+/* An index that is known only when it runs. */
+static inline int whole(double x) { return x > -1e9 && x < 1e9 ? (int)x : -1; }
+static inline int at(Part *p, int i, int n) {
+    if (i >= 0 && i < n) return i;
+    fail(p, "an index is %d, not in 0 to %d (t = %.9g s)", i, n - 1, p->n.v.t);
+    return 0;
+}
+
 /* -------------------------------------------------------------------------------------- functions */
 static inline double f_fabs(double x) { return x < 0.0 ? -x : x; }
 static inline double f_minimum(double a, double b) { return a < b ? a : b; }

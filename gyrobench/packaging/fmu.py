@@ -71,8 +71,8 @@ def _guid(digest: str) -> str:
 def _tool_text() -> str:
     """All files whose text decides what a build writes."""
     here = Path(__file__).parent
-    names = ("compiler", "description", "description3", "fmu", "native", "python_target", "translate")
-    files = [*(here / f"{n}.py" for n in names), *sorted(here.glob("*.[ch]"))]
+    after = ("__init__", "instance", "reference", "validate")  # these run what was built
+    files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
     files += [here.parent / f"{n}.py" for n in (*python_target.RUNTIME, "units")]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 

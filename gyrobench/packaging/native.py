@@ -6,7 +6,8 @@ import importlib.util
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.translate import Source, equations
+from gyrobench.packaging.source import Source, member
+from gyrobench.packaging.translate import equations
 
 HERE = Path(__file__).parent
 PER = {"start": 0, "step": 1, "second": 2}
@@ -25,18 +26,19 @@ def _struct(cls: type[Component]) -> str:
         if s.section == "derivative":
             if ("der", s.decl.name) not in done:
                 done.add(("der", s.decl.name))
-                inner.append(f"{s.decl.name}{_dimensions(s.decl.shape)}")
+                inner.append(f"{member(s.decl.name)}{_dimensions(s.decl.shape)}")
             continue
         if inner:
             lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
             inner = []
         if ("", s.decl.name) not in done:
             done.add(("", s.decl.name))
-            lines.append(f"    double {s.decl.name}{_dimensions(s.decl.shape)}; /* {s.decl.unit}, {s.decl.doc} */")
+            comment = f"{s.decl.unit}, {s.decl.doc}".replace("*/", "* /")
+            lines.append(f"    double {member(s.decl.name)}{_dimensions(s.decl.shape)}; /* {comment} */")
     if inner:
         lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
     if cls.noises:
-        lines.append(f"    struct {{ double {', '.join(n.name for n in cls.noises)}; }} noise; /* samples */")
+        lines.append(f"    struct {{ double {', '.join(member(n.name) for n in cls.noises)}; }} noise; /* samples */")
     lines.append("    double t, h, tick; /* time, internal step, count of internal steps */")
     return "\n".join(["typedef struct {", *lines, "} Vars;"])
 
