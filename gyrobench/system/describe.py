@@ -14,7 +14,7 @@ def describe(assembly: Assembly) -> dict[str, Any]:
     for slot, declared in system.slots.items():
         d = assembly.descriptions[slot]
         slots[slot] = {
-            "socket": declared.socket,
+            "socket": declared.socket if isinstance(declared.socket, str) else declared.socket.name,
             "part": declared.part,
             "fmu": str(assembly.paths[slot].name),
             "model": d.modelName,

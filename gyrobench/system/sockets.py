@@ -159,8 +159,10 @@ SOCKETS: dict[str, Socket] = {
 }
 
 
-def socket(name: str) -> Socket:
-    """The socket called ``name``; raises KeyError naming those that exist."""
+def socket(name: str | Socket) -> Socket:
+    """The socket called ``name``, or a system's own; raises KeyError naming those that exist."""
+    if isinstance(name, Socket):
+        return name
     if name not in SOCKETS:
         raise KeyError(f"socket '{name}': unknown; sockets: {', '.join(SOCKETS)}")
     return SOCKETS[name]

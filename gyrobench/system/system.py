@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import Bench
 from gyrobench.system.plan import Plan
+from gyrobench.system.sockets import Socket
 from gyrobench.system.values import ValueProblem, flatten, parse
 
 if TYPE_CHECKING:
@@ -51,9 +52,12 @@ class RefusedError(Exception):
 
 @dataclass(frozen=True)
 class Slot:
-    """A place in a system: its socket and the name of the part that is there unless another one is given."""
+    """A place in a system: its socket and the name of the part that is there unless another one is given.
 
-    socket: str
+    socket: the name of one of gyrobench.system.sockets, or a Socket of the system's own.
+    """
+
+    socket: str | Socket
     part: str
 
 
@@ -110,7 +114,7 @@ class System:
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
     channel_period: ClassVar[float] = 1.0  # s
     step: float = 1e-3  # s, communication step
-    stop: float | None = None  # s; None: only `done` ends the run
+    stop: float | None = None  # s, or a property; None: only `done` ends the run
     name: str = ""
     folder: Path | None = None
 
@@ -144,7 +148,7 @@ class System:
     def with_values(self, values: Mapping[str, Any]) -> System:
         """A copy with further values set."""
         copy = type(self)()
-        copy.name, copy.folder, copy.step, copy.stop = self.name, self.folder, self.step, self.stop
+        copy.__dict__.update({k: v for k, v in vars(self).items() if k in ("name", "folder", "step", "stop")})
         copy.values, copy.overrides, copy.given = dict(self.values), dict(self.overrides), list(self.given)
         for name, value in values.items():
             copy.set(name, value)
