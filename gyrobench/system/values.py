@@ -32,7 +32,7 @@ def flatten(name: str, value: Any) -> dict[str, Any]:
 
 
 def nest(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The inverse of :func:`flatten` for many names: ``{"a[1]": 1, "a[2]": 2, "b": 3}`` -> ``{"a": [1, 2], "b": 3}``."""
+    """The inverse of :func:`flatten`: ``{"a[1]": 1, "a[2]": 2, "b": 3}`` -> ``{"a": [1, 2], "b": 3}``"""
     arrays: dict[str, dict[tuple[int, ...], Any]] = {}
     for key, value in values.items():
         name, bracket, index = key.partition("[")
