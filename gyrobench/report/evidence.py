@@ -85,7 +85,7 @@ def stability(doc: Json) -> list[Any]:
             half=True,
         ),
     )
-    return blocks + generic(doc, ("allan", "slopes"), "Slopes of the Allan deviation.")
+    return blocks + generic(doc, ("allan", "slopes"), "Slopes of the Allan deviation.", significant=3)
 
 
 def estimates(doc: Json) -> list[Any]:
@@ -122,7 +122,7 @@ def estimates(doc: Json) -> list[Any]:
                         [
                             text_cell(c["name"], "strong"),
                             number_cell(doc, (*path, "u_a"), u),
-                            number_cell(doc, (*path, "dof")),
+                            number_cell(doc, (*path, "dof"), significant=3),
                             number_cell(doc, (*path, "k"), 0.1),
                             number_cell(doc, ("derived", "U", k), u),
                             number_cell(doc, (*path, "t"), significant=3, trim=False),
@@ -209,12 +209,8 @@ def budget(doc: Json) -> list[Any]:
                 )
             )
         total = number_cell(doc, ("derived", "budget_sum", name), u.get(name))
-        blank = [text_cell("")] * 4
-        rows.append(Row([text_cell("sum (root of squares)", "strong"), *blank, total, text_cell("")]))
-        index = next((k for k, c in enumerate(doc["coefficients"]) if c["name"] == name), None)
-        if index is not None:
-            stated = number_cell(doc, ("coefficients", index, "u"), u.get(name))
-            rows.append(Row([text_cell("u stated", "strong"), *blank, stated, text_cell("")]))
+        note = f"u stated: {write_number(u[name], u[name]).text}" if name in u else ""
+        rows.append(Row([text_cell("sum (root of squares)", "strong"), *[text_cell("")] * 4, total, text_cell(note)]))
     heads = ("source", "size", "unit", "sensitivity", "unit", "contribution", "note")
     columns = [Column(h, wide=h in ("source", "note")) for h in heads]
     alt = "Error budget as bars: contribution of each source to the uncertainty of the coefficients"

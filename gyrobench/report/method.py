@@ -74,10 +74,16 @@ def system(doc: Json) -> list[Any]:
 def _cuts(run: Mapping[str, Any]) -> list[str]:
     """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
     cuts, delays = run.get("cuts") or [], run.get("delays") or []
-    said = [f"Cut: {c}." for c in map(str, cuts)] or ["No connection is cut: every value is used in its own step."]
-    if isinstance(delays, Mapping):
-        return said + [f"Delay on {wire}: {write_number(seconds).text} s." for wire, seconds in delays.items()]
-    return said + [f"Delay of one step on {wire}." for wire in delays]
+    said = [f"Cut at {c}" for c in map(str, cuts)] or ["No connection is cut: every value is used in its own step"]
+    times = dict(delays) if isinstance(delays, Mapping) else dict.fromkeys(delays)
+    for wire, seconds in times.items():
+        time = "one step" if seconds is None else f"{write_number(seconds).text} s"
+        k = next((k for k, s in enumerate(said) if wire in s), None)
+        if k is None:
+            said.append(f"Delay on {wire}: {time}")
+        else:
+            said[k] += f", {time}"
+    return [s.replace("->", "→") + "." for s in said]
 
 
 def full_values(doc: Json) -> list[Any]:

@@ -148,11 +148,10 @@ def channels(record: Json, names: Sequence[str], units: Mapping[str, str], key: 
         factor, unit = scaled(y, units.get(name, "SI"))
         t, y = envelope([v / divisor for v in t], [v * factor for v in y])
         ax.plot(t, y, "-", color=BLUE, linewidth=0.8)
-        ax.set_ylabel(axis_label(name, unit))
+        ax.set_title(axis_label(name, unit), pad=3)
         ax.margins(x=0.01)
         ax.locator_params(axis="y", nbins=4)
     axes[-1, 0].set_xlabel(axis_label("time", time_unit))
-    fig.align_ylabels(axes[:, 0])
     return svg(fig, key, zoom=axes[-1, 0])
 
 

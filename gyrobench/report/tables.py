@@ -56,7 +56,7 @@ def limit_text(limit: Sequence[float | None] | None) -> str:
     return f"{write_number(low, significant=6).text} … {write_number(high, significant=6).text}"
 
 
-def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = False) -> list[Any]:
+def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = False, significant: int = 4) -> list[Any]:
     """Blocks for any JSON value: rows of a table for a list of dictionaries, name and value for a dictionary.
 
     With ``by_u`` the floats of a row are rounded to the standard uncertainty that stands in the row (``u``
@@ -75,11 +75,15 @@ def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = Fa
             rows = []
             for k in flat:
                 name, unit = words(k)
-                rows.append(Row([text_cell(name), _cell(doc, (*path, k)), text_cell(unit)]))
+                rows.append(Row([text_cell(name), _cell(doc, (*path, k), None, significant), text_cell(unit)]))
             blocks.append(Table([Column("quantity"), Column("value"), Column("unit")], rows, caption))
         for k in nested:
             blocks += generic(
-                doc, (*path, k), f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption, by_u
+                doc,
+                (*path, k),
+                f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption,
+                by_u,
+                significant,
             )
         return blocks
     if _is_rows(value):
@@ -87,7 +91,7 @@ def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = Fa
         us = [
             next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value
         ]
-        rows = [Row([_cell(doc, (*path, i, k), us[i]) for k in keys]) for i in range(len(value))]
+        rows = [Row([_cell(doc, (*path, i, k), us[i], significant) for k in keys]) for i in range(len(value))]
         return [Table([Column(*words(k)) for k in keys], rows, caption)]
     return [Text(f"{caption.rstrip('.')}: {compact(value)}.")]
 
@@ -96,16 +100,21 @@ def _is_rows(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) for v in value)
 
 
-def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None) -> Cell:
+def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, significant: int = 4) -> Cell:
     value = look(doc, *path)
     if isinstance(value, bool):
         return text_cell("yes" if value else "no")
     if isinstance(value, int | float) or value is None:
-        return number_cell(doc, path, u)
-    if isinstance(value, list) and len(value) == 2 and all(isinstance(v, int | float) for v in value):
-        low, high = (write_number(v).text for v in value)
-        return text_cell(f"{low} … {high}")
+        return number_cell(doc, path, u, significant=significant)
+    if "range" in str(path[-1]) and isinstance(value, list) and all(isinstance(v, int | float) for v in value):
+        return text_cell(" … ".join(write_number(v, significant=significant).text for v in value))
     return text_cell(value if isinstance(value, str) else compact(value))
+
+
+def _plain(doc: Any, path: tuple[str | int, ...]) -> Cell:
+    """A parameter: all its digits that matter, not aligned, for magnitudes differ."""
+    cell = _cell(doc, path, None, 8)
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer)
 
 
 def compact(value: Any, length: int = 72) -> str:
@@ -156,7 +165,8 @@ def how_tables(doc: Any) -> list[Any]:
     if facts:
         units = {"step": "s", "stopped_at": "s"}
         rows = [
-            Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k)), text_cell(units.get(k, ""))]) for k in facts
+            Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k), None, 8), text_cell(units.get(k, ""))])
+            for k in facts
         ]
         blocks.append(Table([Column("run"), Column("value"), Column("unit")], rows, "How the run was made."))
     if run.get("data"):
@@ -184,7 +194,7 @@ def _changed(doc: Any) -> list[Any]:
     rows = []
     for name in changed:
         where = next((k for k in ("parameters", "options") if name in (run.get(k) or {})), "")
-        value = _cell(doc, ("provenance", where, name)) if where else text_cell("changed")
+        value = _plain(doc, ("provenance", where, name)) if where else text_cell("changed")
         rows.append(Row([text_cell(name, "strong"), value]))
     return [Table([Column("changed"), Column("value (SI)")], rows, "What was changed, in SI units.", small=True)]
 
@@ -197,7 +207,7 @@ def _defaults(doc: Any) -> list[Any]:
     for key, what in (("options", "options of the system"), ("parameters", "parameters of the parts")):
         names = [n for n in (run.get(key) or {}) if n not in changed]
         if names:
-            rows = [Row([text_cell(n), _cell(doc, ("provenance", key, n))]) for n in names]
+            rows = [Row([text_cell(n), _plain(doc, ("provenance", key, n))]) for n in names]
             caption = f"{what.capitalize()} left at their defaults, in SI units."
             table = Table([Column("name"), Column("value (SI)")], rows, caption, small=True)
             blocks.append(Fold(f"Defaults: {len(names)} {what}", [table]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -145,7 +146,8 @@ def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
     curves = [s for s in doc["series"] if plots.is_curve(s)]
     blocks: list[Any] = []
     number = 0
-    for axis in dict.fromkeys((s["x_name"], s["x_unit"]) for s in curves):
+    axes = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
+    for axis, _ in axes.most_common():  # the richest record first
         alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
         for k in range(0, len(alike), 2):
             pair = alike[k : k + 2]
