@@ -182,7 +182,7 @@ class Method(Expressions):
         if self.helper:
             head = self.prototype()
         else:
-            head = f"static void {self.name}{'_d' if self.dual else ''}(Part *part{seed})"
+            head = f"static inline void {self.name}{'_d' if self.dual else ''}(Part *part{seed})"
         lines = self.body(self.node.body, 1) if self.node else []
         zero = "{0.0, 0.0}" if self.dual else "0.0"
         declared = [
@@ -225,5 +225,5 @@ def equations(source: Source) -> str:
     for name, every in source.cls.ticks:
         turn = f"    if (fmod(part->n.v.tick, {every}.0) == 0.0) {name}(part);"
         turns.append(turn if every > 1 else f"    {name}(part);")
-    out.append("\n".join(["static void ticks(Part *part) {", *(turns or ["    (void)part;"]), "}"]))
+    out.append("\n".join(["static inline void ticks(Part *part) {", *(turns or ["    (void)part;"]), "}"]))
     return "\n\n".join(out)

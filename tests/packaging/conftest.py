@@ -1,0 +1,64 @@
+"""Every part of the standard bench as a parameter; parts written as text; FMUs built once a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from toybench import HEAD, PARTS, TARGETS, TOYS
+
+from gyrobench.component import Component
+from gyrobench.packaging import build, load_part
+from gyrobench.packaging.instance import Fmu, Instance, Plain
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "part" in metafunc.fixturenames:
+        metafunc.parametrize("part", PARTS)
+    if "target" in metafunc.fixturenames:
+        metafunc.parametrize("target", TARGETS)
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Builds a part of the standard bench (or, with ``toy=True``, of the toys)."""
+    out = tmp_path_factory.mktemp("fmus")
+
+    def built(part: str, target: str, fmi: int = 2, toy: bool = False) -> Path:
+        return build(part, target, fmi=fmi, out=out, bench=TOYS if toy else None)
+
+    return built
+
+
+@pytest.fixture
+def instance(fmu: Callable[..., Path]) -> Iterator[Callable[..., Instance]]:
+    """Makes instances ("plain", "native", "python", "native-fmi3") and frees them after the test."""
+    made: list[Instance] = []
+
+    def make(part: str, target: str, name: str = "slot", toy: bool = False, logging: bool = True) -> Instance:
+        one: Instance
+        if target == "plain":
+            one = Plain(load_part(part, TOYS if toy else None), name)
+        else:
+            fmi = 3 if target.endswith("fmi3") else 2
+            one = Fmu(fmu(part, target.removesuffix("-fmi3"), fmi, toy), name, logging=logging)
+        made.append(one)
+        return one
+
+    yield make
+    for one in made:
+        one.free()
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[[str, str], type[Component]]:
+    """A part from the text of its class body: ``written("name", body)``; its bench is ``tmp_path``."""
+
+    def write(name: str, body: str) -> type[Component]:
+        folder = tmp_path / "components" / name
+        folder.mkdir(parents=True)
+        (folder / "model.py").write_text(HEAD + body, encoding="utf-8")
+        return load_part(name, tmp_path)
+
+    return write

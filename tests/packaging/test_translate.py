@@ -1,0 +1,260 @@
+"""The subset of Python that equations may use: what is refused, and how, and what comes out."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from toybench import HEAD, TOYS
+
+from gyrobench.component import Component, PartError
+from gyrobench.packaging import SubsetError, compiler, load_part, native
+from gyrobench.packaging.instance import make
+from gyrobench.packaging.source import Source, dependencies
+
+Written = Callable[[str, str], type[Component]]
+
+DECLARED = """\
+    p = Parameter(1.0, "1")
+    n = Parameter(3, int, min=1, max=9)
+    m = Parameter([[1, 2], [3, 4]], "1")
+    u = Input([0.0, 0.0], "1")
+    w = Input(0.0, "1")
+    x = State(0.0, "1")
+    q = Discrete(0.0, "1")
+    y = Output("1")
+    z = Output("1", shape=(2,))
+
+    def rate(self, a, b):
+        return a * b
+
+    def flow(self):
+        self.der.x = -self.x
+
+    def outputs(self):
+"""
+FIRST = len((HEAD + DECLARED).splitlines()) + 1  # line of the first statement under test
+
+REFUSED = {
+    "self.y = self.x ** 2": "write x * x",
+    "self.y **= 2.0": "write x * x",
+    "while self.x > 0:\n    self.y = 1.0": "no while: write `for k in range(n)`",
+    "a = self.u[0:1]": "no slices: write a for loop",
+    "self.y = foo": "unknown name 'foo'",
+    "self.p = 1.0": "parameters and inputs are only read; use a local or a Discrete",
+    "self.u[0] = 1.0": "outputs() does not write self.u[0]",
+    "self.x = 1.0": "it writes outputs only",
+    "self.der.x = 1.0": "outputs() does not write self.der.x",
+    "self.t = 0.0": "outputs() does not write self.t",
+    "self.y = clip(self.x, lo=0.0, hi=1.0)": "no keyword arguments",
+    "a, b = 1.0, 2.0": "write one line for each",
+    "self.y = self.q = 1.0": "write one line for each",
+    "for v in self.u:\n    self.y = v": "only `for k in range(n)`",
+    "for k in range(0, 4, 2):\n    self.y = 1.0": "only `for k in range(n)`",
+    "for k in range(self.n):\n    self.y = 1.0": "index(expression)",
+    'self.y = "a"': "equations are of numbers only",
+    "self.y = True": "equations are of numbers only",
+    "self.y = math.sin(self.x)": "from gyrobench.math import sin",
+    "self.y = int(self.x)": "write floor",
+    "self.y = abs(self.x)": "write fabs",
+    "self.y = self.x % 2.0": "write x - y * floor(x / y)",
+    "print(self.x)": "`print(self.x)` is outside the subset",
+    "self.y = self.u": "self.u is an array (2): take one element",
+    "a = self.m[0]": "self.m[0] is an array (2)",
+    "self.y = self.m[0, 1]": "write self.m[i][j]",
+    "self.y = self.x[0]": "self.x is a number",
+    "self.y = self.u[2]": "self.u has the elements 0 to 1",
+    "self.y = self.u[-1]": "a whole number from 0 on",
+    "for k in range(3):\n    self.y = self.u[k]": "k runs over 0 to 2: self.u has the elements 0 to 1",
+    "for k in range(2):\n    self.y = self.u[k - 1]": "k - 1 runs over -1 to 0",
+    "self.y = self.u[self.w]": "an index is a loop variable",
+    "self.y = self.der.foo": "self.der.X of a State",
+    "self.y = self.noise.foo": "self.noise.X of a Noise",
+    "self.y = self.foo": "self.foo is not declared in Toy",
+    "a = [1.0, 2.0]\nself.y = a[2]": "a has the elements 0 to 1",
+    "a = [[1.0, 2.0], [3.0]]": "lists of equal length",
+    "self.z = [1.0, 2.0]": "write self.X[i] = ...",
+    "a = 1.0\na = [1.0, 2.0]": "'a' is something else already",
+    "if self.x > 0.0:\n    a = 1.0\nself.y = a": "'a' is not assigned on every path",
+    "for k in range(2):\n    pass\nself.y = k": "unknown name 'k'",
+    "self.y = sin(self.x, self.x)": "sin takes 1 argument, not 2",
+    "self.y = self.rate(self.x)": "self.rate takes 2 arguments, not 1",
+    "self.y = self.start()": "self.start is no helper method",
+    "self.y = self.x and self.w": "write 1.0 if self.x and self.w else 0.0",
+    "self.y = 1e400": "is not finite",
+    "return 1.0": "outputs returns nothing",
+    'self.refuse(self.x > 1.0, "no {foo}")': "{foo} is no scalar of this part",
+    'self.refuse(self.x > 1.0, f"{self.x}")': 'write self.refuse(condition, "message with {H}")',
+}
+
+
+@pytest.mark.parametrize("body", REFUSED)
+def test_refused_with_file_line_and_what_to_write(written: Written, tmp_path: Path, body: str) -> None:
+    cls = written("toy", DECLARED + textwrap.indent(body, " " * 8) + "\n")
+    with pytest.raises(SubsetError) as e:
+        native.c_source(cls, "guid")
+    assert REFUSED[body] in str(e.value)
+    path, line = re.match(r"(.*):(\d+): ", str(e.value)).groups()
+    assert path == str(tmp_path / "components/toy/model.py")
+    assert FIRST <= int(line) < FIRST + len(body.splitlines())
+
+
+def test_methods_have_plain_arguments(written: Written) -> None:
+    body = '    y = Output("1")\n    def rate(self, a, b=1.0):\n        return a\n    def outputs(self):\n        pass\n'
+    with pytest.raises(SubsetError, match="takes plain arguments without defaults"):
+        native.c_source(written("one", body), "guid")
+    body = '    y = Output("1")\n    def rate(self, a):\n        if a > 0.0:\n            return a\n'
+    with pytest.raises(SubsetError, match="returns a number on every path"):
+        native.c_source(written("two", body), "guid")
+
+
+def test_names_of_component_are_taken(written: Written) -> None:
+    with pytest.raises(PartError, match="take another name"):
+        written("toy", '    reset = Parameter(1.0, "1")\n')
+
+
+ACCEPTED = """\
+    NAN = Parameter(2.0, "1", "a name of the C library */")
+    X0 = Parameter(3.0, "1")
+    double = Input(4.0, "1")
+    tick = Output("1")
+    y = Output("1", shape=(9,))
+    gain = Parameter([0.5, 0.25], "1")
+    turns = Parameter(2, int)
+    SCALE = 10
+
+    def outer(self, a):
+        return self.inner(a, GAIN) + 1.0
+
+    def inner(self, a, b):
+        if a > b:
+            return a
+        elif a == b:
+            return 0.0
+        else:
+            return b
+
+    def outputs(self):
+        \"\"\"Comments, names and arrays.\"\"\"
+        seed = [self.NAN, self.X0]
+        table = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+        part: float = self.SCALE + GAIN
+        part += 1
+        for k in range(1, 3):
+            table[k - 1][k] = seed[k - 1] * k
+        self.y[0] = table[0][1] + table[1][2]
+        self.y[1] = self.outer(part)
+        self.y[2] = 1.0 if not (part > 0.0 and seed[0] < 1.0) or part == 2.0 else 0.5
+        self.y[3] = 1.0 if 0.0 < part < 20.0 else 0.0
+        for k in range(index(self.turns)):
+            self.y[4] = self.y[4] + self.gain[k]
+        self.y[5] = where(part > 2.0, minimum(1.0, part), 3.0) + maximum(sign(-part), -0.5)
+        if part > 100.0:
+            return
+        self.y[6] = -pi * +part / 3
+        self.y[7] = self.double + (part > 3.0)
+        self.y[8] = tan(0.1) + asin(0.2) + atan(0.3) + log(2.0) + floor(-2.5) + fabs(-1.5) + clip(part, 0.0, 1.0)
+        self.tick = 1.0
+"""
+
+
+def test_accepted_and_equal(written: Written, tmp_path: Path) -> None:
+    """By hand: SCALE + GAIN + 1 = 13.5; loops, arrays, helpers; then all of it equal in the native FMU."""
+    cls = written("toy", ACCEPTED)
+    part = cls("a")
+    part.initialize()
+    y = [part.get(f"y[{k + 1}]") for k in range(9)]
+    assert y[:5] == [2.0 * 1 + 3.0 * 2, 14.5, 1.0, 1.0, 0.75]
+    assert y[5] == 1.0 - 0.5 and y[7] == 5.0
+    native_fmu = make("toy", "native", bench=tmp_path)
+    native_fmu.initialize()
+    assert native_fmu.get([f"y[{k + 1}]" for k in range(9)]) == y
+    native_fmu.free()
+
+
+def strict(cls: type[Component], folder: Path) -> None:
+    for fmi in (2,):
+        for name, text in native.source_files(cls, "guid", fmi).items():
+            (folder / name).write_text(text, encoding="utf-8")
+        platform = compiler.this_platform()
+        compiler.compile_library(folder / f"fmi{fmi}.c", folder / "x.so", (folder,), platform, strict=True)
+
+
+def test_parts_compile_without_warnings(part: str, tmp_path: Path) -> None:
+    strict(load_part(part), tmp_path)
+
+
+@pytest.mark.parametrize("toy", ["lag", "linear", "noisy", "swing", "raiser"])
+def test_toys_compile_without_warnings(toy: str, tmp_path: Path) -> None:
+    strict(load_part(toy, TOYS), tmp_path)
+
+
+def test_odd_parts_compile_without_warnings(written: Written, tmp_path: Path) -> None:
+    strict(written("toy", ACCEPTED), tmp_path)
+    strict(written("bare", '    y = Output("1")\n    def outputs(self):\n        self.y = 1.0\n'), tmp_path)
+    strict(written("nothing", '    p = Parameter(1.0, "1")\n'), tmp_path)
+
+
+def test_dependencies(written: Written) -> None:
+    body = """\
+    a = Input(0.0, "1")
+    b = Input([0.0, 0.0], "1")
+    c = Input(0.0, "1")
+    d = Input(0.0, "1")
+    e = Input(1.0, "1")
+    q = Discrete(0.0, "1")
+    direct = Output("1")
+    through_local = Output("1")
+    through_helper = Output("1")
+    through_test = Output("1")
+    through_loop = Output("1")
+    after_return = Output("1")
+    through_output = Output("1")
+    none = Output("1")
+
+    def helper(self, x):
+        return x * self.other(x)
+
+    def other(self, x):
+        return x + self.c
+
+    def outputs(self):
+        k = [0.0, 0.0]
+        k[0] = self.b[1]
+        for i in range(2):
+            self.through_local = self.through_local + k[i]
+        self.direct = 2.0 * self.a
+        self.through_helper = self.helper(self.q)
+        self.through_test = 0.0
+        if self.a > 0.0:
+            self.through_test = 1.0
+        for i in range(index(self.e)):
+            self.through_loop = 1.0
+        self.through_output = self.direct + 1.0
+        self.none = self.q
+        if self.d > 0.0:
+            return
+        self.after_return = 1.0
+"""
+    assert dependencies(Source(written("toy", body))) == {
+        "direct": {"a"},
+        "through_local": {"b"},
+        "through_helper": {"c"},
+        "through_test": {"a"},
+        "through_loop": {"e"},
+        "after_return": {"d"},
+        "through_output": {"a"},
+        "none": set(),
+    }
+
+
+def test_dependencies_are_in_the_description(instance: Callable) -> None:
+    description = instance("lag", "native", toy=True).description
+    unknowns = {u.variable.name: {v.name for v in u.dependencies} for u in description.outputs}
+    states = {"x", "v[1]", "v[2]"}
+    assert unknowns["direct"] == states | {"u[1]", "u[2]"}  # by declared name: an array counts as one
+    assert unknowns["y[1]"] == states
+    assert {u.variable.name for u in description.initialUnknowns} == set(unknowns) | {f"der({s})" for s in states}

@@ -1,0 +1,22 @@
+"""What the tests of packaging share: the standard parts, the toys beside this file, the head of written ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gyrobench.bench import Bench, standard_folder
+
+PARTS = sorted(Bench(standard_folder()).parts())
+TARGETS = ("native", "python")
+TOYS = Path(__file__).parent / "toys"
+
+HEAD = """\
+from __future__ import annotations
+import math
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.math import *
+
+GAIN = 2.5
+class Toy(Component):
+    \"\"\"A toy.\"\"\"
+"""

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.math import index, log
+
+
+class Raiser(Component):
+    """Fails on demand, in its equations or with a fault that is none of the part's refusals."""
+
+    table = Parameter([1.0, 2.0, 3.0], "1", "table")
+    u = Input(0.0, "1", "1 log of -1, 2 index out of the table, 3 growth without bound, 4 a fault of the program")
+    x = State(1.0, "1", "state")
+    big = Discrete(1.0, "1", "grows")
+    y = Output("1", "output")
+
+    def flow(self) -> None:
+        self.der.x = -self.x
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if self.u == 1.0:
+            self.big = log(-self.x)
+        if self.u == 2.0:
+            self.big = self.table[index(self.u + 1.0)]
+        if self.u == 3.0:
+            self.big = self.big * 1e300
+        if self.u == 4.0:
+            self.big = self.fault(self.x)
+
+    def fault(self, x):
+        return x
+
+    def outputs(self) -> None:
+        self.y = self.big + self.x
