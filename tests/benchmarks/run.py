@@ -1,0 +1,153 @@
+"""All budgets in one table, each against a rival measured in the same run.
+
+    python tests/benchmarks/run.py [--quick]
+
+Prints what, measured, budget, and the ratio to the rival.  Times are wall times of this machine now; read the ratios.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from pathlib import Path
+
+import peers
+
+HERE = Path(__file__).parent
+ROUNDS = 3
+STEPS = {"gyrobench, native engine": 1_000_000, "toolbox container, sequential": 300_000, "ecospy": 100_000}
+ROWS: list[tuple[str, str, str, str]] = []
+
+
+def row(what: str, measured: str, budget: str = "", ratio: str = "") -> None:
+    ROWS.append((what, measured, budget, ratio))
+    print("  ".join(x.ljust(w) for x, w in zip(ROWS[-1], (58, 16, 14, 40), strict=True)).rstrip(), flush=True)
+
+
+def environment() -> dict[str, str]:
+    """ecospy's library needs libtbb, which its package puts into the environment's lib folder."""
+    lib = str(Path(sys.prefix) / "lib")
+    path = os.pathsep.join(filter(None, (lib, os.environ.get("LD_LIBRARY_PATH", ""))))
+    return {**os.environ, "LD_LIBRARY_PATH": path}
+
+
+def one(name: str, folder: Path, quick: bool) -> dict[str, float] | str:
+    steps = STEPS.get(name, 10_000) // (10 if quick else 1)
+    command = [sys.executable, str(HERE / "peers.py"), name, str(folder), str(steps)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=300, check=False)
+    for line in reversed(done.stdout.splitlines()):
+        if line.startswith('{"us"'):
+            return dict(json.loads(line))
+    missing = "No module named" in done.stderr
+    return "not installed" if missing else f"failed: {(done.stderr.strip().splitlines() or ['no output'])[-1][:60]}"
+
+
+def masters(quick: bool) -> None:
+    """The engine against its peers, in turn, ROUNDS times; medians."""
+    from gyrobench.packaging import build
+    from gyrobench.system.container import export_container
+    from gyrobench.system.ssp import export_ssp
+    from gyrobench.system.system import load_system
+
+    print("\nFour trivial FMUs in a loop, 1 ms step, two channels each 10 ms: microseconds a step")
+    folder = Path(tempfile.mkdtemp(prefix="gyrobench-bench-"))
+    try:
+        for name in peers.ORDER:
+            build(name, bench=peers.BENCH, out=folder)
+        export_ssp(load_system("loop", peers.BENCH), folder / "loop.ssp", bench=peers.BENCH)
+        with zipfile.ZipFile(folder / "loop.ssp") as z:
+            z.extractall(folder / "loop")
+        try:
+            export_container(load_system("loop", peers.BENCH), folder / "loop.fmu", bench=peers.BENCH)
+        except Exception as error:
+            print(f"no container: {error}")
+        found: dict[str, list[dict[str, float]]] = {}
+        for _ in range(1 if quick else ROUNDS):
+            for name in peers.PEERS:
+                got = one(name, folder, quick)
+                if isinstance(got, str):
+                    row(name, got)
+                else:
+                    found.setdefault(name, []).append(got)
+        base = statistics.median(g["us"] for g in found["gyrobench, native engine"])
+        for name, got in found.items():
+            us = statistics.median(g["us"] for g in got)
+            budget = "0.15" if name == "gyrobench, native engine" else ""
+            row(name, f"{us:.3f} us", budget, f"{us / base:.1f} x ours; plant at 1 s: {got[-1]['at_1s']:.7f}")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def tumble(quick: bool) -> None:
+    """The whole tumble run, command to report, against the same equations in one C loop."""
+    print("\nSingle-axis tumble, full plan, 1 ms, about 20 million steps")
+    folder = Path(tempfile.mkdtemp(prefix="gyrobench-bench-"))
+    try:
+        loop = folder / "tumble_loop"
+        subprocess.run(["cc", "-O2", str(HERE / "tumble_loop.c"), "-o", str(loop), "-lm"], check=True)
+        command = [sys.executable, "-m", "gyrobench.cli", "run", "tumble_single_axis", "--out", str(folder / "run")]
+        subprocess.run([*command, "--set", "rate=2deg/s", "--set", "dwell=30s"], capture_output=True, check=True)
+        whole, floor = [], []
+        for _ in range(1 if quick else ROUNDS):
+            floor.append(
+                json.loads(subprocess.run([loop], capture_output=True, text=True, check=True).stdout)["seconds"]
+            )
+            began = time.perf_counter()
+            subprocess.run(command, capture_output=True, check=True)
+            whole.append(time.perf_counter() - began)
+            meta = json.loads((folder / "run" / "run.json").read_text())
+        steps = meta["steps"]
+        w, f = statistics.median(whole), statistics.median(floor)
+        row("one hand-written C loop", f"{f:.2f} s", "", f"{1e9 * f / steps:.0f} ns a step")
+        row("command to report", f"{w:.2f} s", "15 s", f"{w / f:.1f} x the C loop (budget 5)")
+        for slot, seconds in meta["timing"].items():
+            row(f"  {slot}", f"{1e6 * seconds / steps:.3f} us", "0.10 us", "a step, in the run")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def builds() -> None:
+    """Cold and warm build of all native FMUs, and the light commands."""
+    print("\nBuild and commands")
+    cache = tempfile.mkdtemp(prefix="gyrobench-bench-")
+    env = {**os.environ, "GYROBENCH_CACHE": cache}
+    try:
+        for what, budget in (("cold build of all native FMUs", "90 s"), ("warm build", "1 s")):
+            began = time.perf_counter()
+            command = [sys.executable, "-m", "gyrobench.cli", "build", "--all", "--out", cache]
+            subprocess.run(command, capture_output=True, check=True, env=env)
+            row(what, f"{time.perf_counter() - began:.2f} s", budget)
+        for command in (["list"], ["--help"]):
+            times = []
+            for _ in range(5):
+                began = time.perf_counter()
+                subprocess.run([sys.executable, "-m", "gyrobench.cli", *command], capture_output=True, check=True)
+                times.append(time.perf_counter() - began)
+            row(f"gyrobench {command[0]}", f"{statistics.median(times):.2f} s", "0.5 s")
+    finally:
+        shutil.rmtree(cache, ignore_errors=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="one round, a tenth of the steps")
+    quick = parser.parse_args().quick
+    packages = ("gyrobench", "fmpy", "fmu-manipulation-toolbox", "ecospy", "libcosimpy")
+    found = {d.metadata["Name"].lower().replace("_", "-"): d.version for d in importlib.metadata.distributions()}
+    print(", ".join(f"{p} {found.get(p, '-')}" for p in packages), f"on {os.cpu_count()} cores")
+    masters(quick)
+    tumble(quick)
+    builds()
+
+
+if __name__ == "__main__":
+    main()
