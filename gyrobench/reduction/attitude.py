@@ -1,8 +1,9 @@
-"""What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rate along I.
+"""What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rates along its
+axes.
 
-During a window the table turns evenly from angle_start to angle_end.  Averages are Gauss-Legendre sums over the angle,
-exact to rounding for windows up to a radian; no harmonic is damped by the averaging [AVG-SINC] because the regressors
-are averaged like the data.  Not modelled: change of the table rate inside a window.
+During a window the table turns evenly from angle_start to angle_end.  Averages are Gauss-Legendre sums over the
+angle, exact to rounding for windows up to a radian; no harmonic is damped by the averaging [AVG-SINC] because the
+regressors are averaged like the data.  Not modelled: change of the table rate inside a window.
 """
 
 from __future__ import annotations
@@ -65,9 +66,11 @@ def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, 
     return average(drift.regressors(xyz, names))
 
 
-def input_rate(turning: Turning, base: Array, latitude: float, earth_rate: float) -> Array:
-    """Window means (n,) of the inertial rate along the input axis, rad/s: Earth rate and table rate."""
-    earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, 0])
+def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float, axis: int = 0) -> Array:
+    """Window means (n,) of the inertial rate along a gyro axis (0 input, 1 output, 2 spin), rad/s: Earth and
+    table.
+    """
+    earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, axis])
     table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
-    out: Array = earth + turning.face[:, 0, 2] * table
+    out: Array = earth + turning.face[:, axis, 2] * table
     return out

@@ -12,7 +12,9 @@ REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
 
 
 class ReductionError(ValueError):
-    """Data that cannot be reduced; ``problems`` says for each finding what is wrong, where, and what would be right."""
+    """Data that cannot be reduced; ``problems`` says for each finding what is wrong, where, and what would be
+    right.
+    """
 
     def __init__(self, problems: str | Sequence[str]) -> None:
         self.problems = [problems] if isinstance(problems, str) else list(problems)

@@ -109,10 +109,10 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     density = _spread(w, np.sqrt(s2 * (1.0 - grid.share) * window), k)
     record = float(t1[-1] - t0[0])
     warnings = []
-    if white < 0.5 and tau[2] > 0.15 * record:
+    if white < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
-            f"The correlation time of the drift is not bounded by this record (95 % point {tau[2]:.3g} s, record "
-            f"{record:.4g} s): slower drift looks like the constant term, whose interval then holds for this record only."
+            f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
+            f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval then holds for this record only."
         )
     return Estimate(
         tuple(names), beta, covariance, u, half, probability, _dof(half / u), y - X @ beta,
@@ -149,7 +149,8 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
         middle = 0.5 * (low + high)
         outside = _tails(w, off, sd, dof, middle) > 1.0 - level
         low, high = np.where(outside, middle, low), np.where(outside, high, middle)
-    return high
+    out: Array = high
+    return out
 
 
 def _dof(ratio: Array) -> Array:

@@ -21,7 +21,9 @@ Array = NDArray[np.float64]
 
 
 def columns(start: Array, end: Array, orders: Sequence[int]) -> tuple[Array, tuple[str, ...]]:
-    """Window means of cos n theta, sin n theta between ``start`` and ``end`` (rad), with names A1, B1, ...; 0 gives A0."""
+    """Window means of cos n theta, sin n theta between ``start`` and ``end`` (rad), with names A1, B1, ...; 0 gives
+    A0.
+    """
     middle, width = (start + end) / 2.0, end - start
     out, names = [], []
     for n in orders:

@@ -191,7 +191,9 @@ def least_squares(X: Array, y: Array, names: Sequence[str], weights: Array | Non
 
 
 def generalized(X: Array, y: Array, names: Sequence[str], covariance: Array) -> Fit:
-    """Least squares with the covariance of the data known up to a factor; it must be symmetric and positive definite."""
+    """Least squares with the covariance of the data known up to a factor; it must be symmetric and positive
+    definite.
+    """
     check_data(X, y, names, math.inf)
     if covariance.shape != (y.size, y.size) or not np.allclose(covariance, covariance.T, rtol=1e-10, atol=0.0):
         raise RegressionError(f"the covariance must be symmetric, {y.size} by {y.size}")

@@ -7,6 +7,7 @@ Residuals come as stretches: runs of windows of equal length without a gap.  Not
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ def stretches(t0: Array, t1: Array, x: Array, tolerance: float = 0.01) -> list[t
     scale = tolerance * float(np.median(length))
     new = (np.abs(t0[1:] - t1[:-1]) > scale) | (np.abs(np.diff(length)) > scale)
     edges = [0, *(np.flatnonzero(new) + 1).tolist(), x.size]
-    return [(float(np.mean(length[a:b])), x[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(float(np.mean(length[a:b])), x[a:b]) for a, b in pairwise(edges)]
 
 
 def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
@@ -45,7 +46,9 @@ NORMAL = 1.959963984540054
 
 
 def ljung_box(acf: dict[str, list[float]], n: int, lags: int, fitted: int = 0) -> tuple[float, float]:
-    """Q = n (n + 2) sum rho_k^2/(n - k) over ``lags`` and its chi-squared probability, ``fitted`` noise parameters."""
+    """Q = n (n + 2) sum rho_k^2/(n - k) over ``lags`` and its chi-squared probability, ``fitted`` noise
+    parameters.
+    """
     rho = acf["rho"][1 : lags + 1]
     q = n * (n + 2) * sum(r * r / (n - k) for k, r in enumerate(rho, 1))
     return q, float(special.chdtrc(max(lags - fitted, 1), q))

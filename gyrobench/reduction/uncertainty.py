@@ -7,15 +7,16 @@ from collections.abc import Iterable
 
 NORMAL = 1.959963984540054
 DECISION_RULE = (
-    "Guard band equal to the expanded uncertainty U (95 %): pass when estimate ± U lies inside the limits, fail when it "
-    "lies outside, inconclusive when it holds a limit."
+    "Guard band equal to the expanded uncertainty U (95 %): pass when estimate ± U lies inside the limits, fail when "
+    "it lies outside, inconclusive when it holds a limit."
 )
 
 
 def combine(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
     """Standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
 
-    u^2 = u_a^2 + sum of squares; U^2 = half_a^2 + 1.96^2 times the same sum (type B known with many degrees of freedom).
+    u^2 = u_a^2 + sum of squares; U^2 = half_a^2 + 1.96^2 times the same sum (type B known with many degrees of
+    freedom).
     """
     b2 = sum(c * c for c in contributions)
     return math.sqrt(u_a * u_a + b2), math.sqrt(half_a * half_a + NORMAL**2 * b2)

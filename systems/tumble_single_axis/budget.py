@@ -1,8 +1,8 @@
 """Type B uncertainties of the tumble: each source's effect on every coefficient, by exact perturbation of the model.
 
 A source changes what the reduction believes (geometry: regressors X and input-axis rate) or what it reads (current).
-With gain G (estimates = G y) the change of the estimates is G (dy - dX a).  For the ideal geometry this gives the known
-sensitivities: input axis tilted towards the output axis by eps: eps W sin(phi)/gamma in D_O and nothing else
+With gain G (estimates = G y) the change of the estimates is G (dy - dX a).  For the ideal geometry this gives the
+known sensitivities: input axis tilted towards the output axis by eps: eps W sin(phi)/gamma in D_O and nothing else
 [TUM1-SENS-IA]; table axis off the pole by delta: W delta/(gamma cos phi) in D_I or 2 W delta/(gamma^2 sin 2 phi) in
 D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, axis wobble, temperature.
 """
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from .reduction import TumbleSetup
 
 Array = NDArray[np.float64]
+TILT = "ε_IO"  # the tilt of the input axis towards the output axis as an unknown
+TOWARDS_OUTPUT = "input axis towards output axis"
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
@@ -37,6 +39,19 @@ class Effect:
     note: str = ""
 
 
+def design(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], base: Array | None = None) -> Array:
+    """Window means (n, p) of the regressors ``names``; the column of :data:`TILT` is minus the rate along O,
+    rad/s.
+    """
+    base = setup.base if base is None else base
+    terms = tuple(n for n in names if n != TILT)
+    X = attitude.regressors(turning, base, setup.gravity, terms)
+    if TILT not in names:
+        return X
+    along = attitude.axis_rate(turning, base, setup.latitude, setup.earth_rate, 1)
+    return np.column_stack([X, -along])
+
+
 def effects(
     setup: TumbleSetup, turning: attitude.Turning, current: Array, names: tuple[str, ...], beta: Array, gain: Array
 ) -> list[Effect]:
@@ -44,12 +59,12 @@ def effects(
 
     current (n,) in A with the sign of the precession convention; beta (p,), gain (p, n): estimates = gain y.
     """
-    X = attitude.regressors(turning, setup.base, setup.gravity, names)
-    rate = attitude.input_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+    X = design(setup, turning, names)
+    rate = attitude.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
 
     def geometry(base: Array, turned: attitude.Turning) -> Array:
-        dX = attitude.regressors(turned, base, setup.gravity, names) - X
-        drate = attitude.input_rate(turned, base, setup.latitude, setup.earth_rate) - rate
+        dX = design(setup, turned, names, base) - X
+        drate = attitude.axis_rate(turned, base, setup.latitude, setup.earth_rate) - rate
         out: Array = gain @ (drate - dX @ beta) / SMALL
         return out
 
@@ -67,7 +82,7 @@ def effects(
     return [
         Effect("table axis off the pole, about east", setup.u_axis, "rad", axis(setup.base[0])),
         Effect("table axis off the pole, about p × east", setup.u_axis, "rad", axis(setup.base[1])),
-        Effect("input axis towards output axis", setup.u_mount, "rad", mount(along_s)),
+        Effect(TOWARDS_OUTPUT, setup.u_mount, "rad", mount(along_s)),
         Effect("input axis towards spin axis", setup.u_mount, "rad", mount(-along_o)),
         Effect("gyro turned about its input axis", setup.u_mount, "rad", mount(along_i)),
         Effect("torquer scale factor", setup.u_scale_factor, "1", read(current), "relative, the same for all currents"),

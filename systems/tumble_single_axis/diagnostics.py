@@ -17,6 +17,8 @@ from gyrobench.reduction import noise as noise_model
 from gyrobench.reduction.regression import Fit
 from gyrobench.reduction.result import Coefficient, Series, Test
 
+from .budget import TILT, design
+
 if TYPE_CHECKING:
     from .reduction import TumbleSetup
 
@@ -90,7 +92,9 @@ class Findings:
                 dense = np.radians(np.arange(0.0, 361.0, 3.0))
                 face = np.broadcast_to(np.asarray(self.setup.faces[p], dtype=float), (dense.size, 3, 3))
                 still = attitude.Turning(dense, dense, np.zeros_like(dense), np.ones_like(dense), face)
-                X = attitude.regressors(still, self.setup.base, self.setup.gravity, self.est.names)
+                X = design(self.setup, still, self.est.names)
+                if TILT in self.est.names:
+                    X[:, -1] = float(np.mean(self.X[rows, -1]))  # the table turns, the plotted one does not
                 s.shown_fit_x = np.degrees(dense).tolist()
                 s.shown_fit_y = (X @ self.est.beta / DPH).tolist()
             out.append(s)
@@ -286,7 +290,7 @@ class Findings:
         out = []
         if self.closed:
             rows = []
-            for j, name in enumerate(self.est.names):
+            for j, name in enumerate(n for n in self.est.names if n != TILT):
                 a, b = float(self.est.beta[j]) / DPH, self.closed[name] / DPH
                 unit = units.display(drift.surface_unit(name))
                 rows.append([name, a, b, a - b, float(self.est.u[j]) / DPH, unit])

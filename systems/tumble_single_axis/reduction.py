@@ -25,6 +25,7 @@ from gyrobench.reduction.checks import ReductionError, window_problems
 from gyrobench.reduction.result import BudgetLine, Coefficient, Result
 
 from . import budget, closed, diagnostics
+from .refusals import plan_problems, refusals, setup_problems
 
 __all__ = ["ReductionError", "TumbleSetup", "from_record", "reduce", "refusals"]
 
@@ -39,8 +40,9 @@ class TumbleSetup:
 
     k: torquer scale factor, rad/s/A.  base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes I, O, S in
     table axes.  modes: phase -> "rate" or "dwell" (None: by the direction of the output axis).  truth: simulated
-    coefficients, rad/s per g0^n.  fold: D_OO may be there and is folded into others.  specification: name -> limits in
-    surface units.  u_*: standard uncertainties of type B; u_nonlinearity: relative, at the largest current of the
+    coefficients, rad/s per g0^n.  fold: D_OO may be there and is folded into others.  tilt: the small angle of the
+    input axis towards the output axis is estimated too (D_O then rests on the dwells).  specification: name -> limits
+    in surface units.  u_*: standard uncertainties of type B; u_nonlinearity: relative, at the largest current of the
     record; quantum: resolution of the current reading.  polarity: "project" k i = omega_IA - omega_d, or "book"
     k i = omega_d - omega_IA.
     """
@@ -56,6 +58,7 @@ class TumbleSetup:
     truth: Mapping[str, float] | None = None
     terms: int = 9
     fold: bool = False
+    tilt: bool = False
     specification: Mapping[str, tuple[float | None, float | None]] | None = None
     u_axis: float = 0.0
     u_mount: float = 0.0
@@ -74,93 +77,13 @@ class TumbleSetup:
         return self.labels.get(phase, f"phase {phase}")
 
     def turns(self, phase: int) -> bool:
-        """True where the table turns: by ``modes``, or where the output axis is nearer to its axis than to the vertical."""
+        """True where the table turns: by ``modes``, or where the output axis is nearer to its axis than to the
+        vertical.
+        """
         if self.modes is not None and phase in self.modes:
             return self.modes[phase] == "rate"
         output = np.asarray(self.faces[phase])[1]
         return bool(abs(output[2]) >= abs(output @ (np.asarray(self.base) @ frames.U)))
-
-
-def refusals(latitude: float) -> list[str]:
-    """Why a tumble at ``latitude`` (rad) cannot give the nine coefficients, as sentences; empty when it can."""
-    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
-        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
-    size = abs(math.degrees(latitude))
-    if 5.0 <= size <= 85.0:
-        return []
-    faces, base = frames.tumble_faces(latitude), frames.polar_base(latitude)
-    angles = np.radians(np.arange(0.0, 360.0, 10.0))
-    rows = [frames.to_face(-frames.U, faces[m], base, a) for m in ("mount 1", "mount 2") for a in angles]
-    rows += [frames.to_face(-frames.U, faces[s], base, 0.0) for s in ("static 3", "static 4")]
-    design = regression.examine(drift.regressors(np.array(rows), drift.terms(9)), drift.terms(9))
-    where = f"latitude {math.degrees(latitude):.4g}° (5° to 85° north or south is possible): "
-    if design.rank < 9:
-        return [f"{where}rank {design.rank} of 9, the record does not see {'; '.join(design.lost)}"]
-    return [f"{where}condition {design.condition:.3g}, hardly seen is {design.weakest}"]
-
-
-def _setup_problems(s: TumbleSetup) -> list[str]:
-    found = refusals(s.latitude)
-    if s.terms not in drift.TERM_SETS:
-        found.append(f"{s.terms}-term model unknown; there are {', '.join(map(str, drift.TERM_SETS))}")
-    if not 9.7 <= s.gravity <= 9.9:
-        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
-    if not (math.isfinite(s.k) and s.k > 0.0):
-        found.append(f"scale factor k = {s.k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'")
-    if s.polarity not in ("project", "book"):
-        found.append(
-            f"polarity '{s.polarity}' unknown; there are 'project' (k i = ω_IA − ω_d) and 'book' (k i = ω_d − ω_IA)"
-        )
-    for name, matrix in [("table base", s.base), *((f"mount of {s.label(p)}", f) for p, f in s.faces.items())]:
-        try:
-            frames.check_rotation(matrix, name)
-        except ValueError as error:
-            found.append(str(error))
-    if s.truth and s.truth.get("D_OO", 0.0) != 0.0 and not s.fold:
-        found.append(
-            f"D_OO = {s.truth['D_OO'] / DPH:g} °/h/g² is simulated, but at constant |g| it cannot be told from D_F, "
-            "D_II and D_SS; set fold to accept the combinations D_F + γ² D_OO, D_II − D_OO, D_SS − D_OO"
-        )
-    if s.terms == 10 and not s.fold:
-        found.append(
-            "ten terms have rank 9 at constant |g|: the data do not see D_II + D_OO + D_SS − γ² D_F; reduce nine "
-            "terms, or set fold to report the combinations"
-        )
-    return found
-
-
-def _plan_problems(s: TumbleSetup, w: Mapping[str, Array]) -> list[str]:
-    """Missing phases, mounts and dwells, tables that stand still, windows too wide."""
-    phase = np.asarray(w["phase"]).astype(int)
-    there = set(phase.tolist())
-    found = [f"phase {p} ({s.label(p)}) is missing in the record" for p in s.faces if p not in there]
-    found += [f"phase {p} is in the record, but its mount is not given" for p in sorted(there - set(s.faces))]
-    rate = [p for p in s.faces if s.turns(p)]
-    dwell = [p for p in s.faces if p not in rate]
-    side = {np.sign(np.asarray(s.faces[p])[1, 2]) for p in rate}
-    if len(side) < 2:
-        found.append("only one mount: two are needed, output axis along +pole and −pole (D_I, D_IO and D_S, D_OS mix)")
-    up = {np.sign(np.asarray(s.faces[p])[1] @ (np.asarray(s.base) @ frames.U)) for p in dwell}
-    if len(up) < 2:
-        what = "no dwells" if not dwell else "only one dwell"
-        found.append(
-            f"{what} with the output axis vertical, up and down are needed: D_F cannot be told from D_II + D_SS"
-        )
-    width = np.asarray(w["angle_end"], dtype=float) - np.asarray(w["angle_start"], dtype=float)
-    for p in rate:
-        mine = np.abs(width[phase == p])
-        if mine.size == 0:
-            continue
-        if np.max(mine) < 1e-3:
-            found.append(f"phase {p} ({s.label(p)}): the table angle does not move, expected a turning table (rate 0?)")
-        elif np.max(mine) > 2.0 * math.pi / 5.0 * 1.001:
-            per = 2.0 * math.pi / float(np.max(mine))
-            found.append(f"phase {p} ({s.label(p)}): {per:.2g} windows a turn, at least 5 are needed for two harmonics")
-    for p in dwell:
-        mine = np.abs(width[phase == p])
-        if mine.size and np.max(mine) > 1e-2:
-            found.append(f"phase {p} ({s.label(p)}): the table turns by {math.degrees(np.max(mine)):.3g}° in a dwell")
-    return found
 
 
 def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
@@ -168,9 +91,9 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
 
     Raises ReductionError with everything that is wrong with setup or record.
     """
-    problems = _setup_problems(setup) + window_problems(windows)
+    problems = setup_problems(setup) + window_problems(windows)
     if not problems:
-        problems = _plan_problems(setup, windows)
+        problems = plan_problems(setup, windows)
     if problems:
         raise ReductionError(problems)
     phase = np.asarray(windows["phase"]).astype(int)
@@ -178,10 +101,12 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
     face = np.array([np.asarray(setup.faces[p], dtype=float) for p in phase.tolist()])
     turning = attitude.Turning(column["angle_start"], column["angle_end"], column["t_start"], column["t_end"], face)
     current = column["mean"] if setup.polarity == "project" else -column["mean"]
-    rate = attitude.input_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+    rate = attitude.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
     y = rate - setup.k * current
     names = drift.terms(9 if setup.terms == 10 else setup.terms)
-    X = attitude.regressors(turning, setup.base, setup.gravity, names)
+    if setup.tilt:
+        names = (*names, budget.TILT)
+    X = budget.design(setup, turning, names)
     try:
         est = correlated.fit(X, y, names, turning.t_start, turning.t_end)
     except regression.RegressionError as error:
@@ -191,9 +116,15 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         setup.gravity,
     )  # fmt: skip
     effects = budget.effects(setup, turning, current, names, est.beta, est.gain)
+    tilt_line = next(e for e in effects if e.source == budget.TOWARDS_OUTPUT)
+    j = names.index("D_O") if "D_O" in names else 0
+    if abs(float(tilt_line.change[j])) * tilt_line.size > float(est.u[j]):
+        warnings = ["The tilt of the input axis makes most of the uncertainty of D_O; the option tilt estimates it."]
+    else:
+        warnings = []
     found = diagnostics.Findings(setup, phase, turning, y, X, est, book, fits)
     coefficients = [_coefficient(setup, n, j, est, book, effects) for j, n in enumerate(names)]
-    warnings = list(est.warnings) + found.warnings
+    warnings += [*est.warnings, *found.warnings]
     if why:
         warnings.append(f"No closed formulas: {why}.")
     if est.design.condition > 100.0:
@@ -257,20 +188,22 @@ def _coefficient(
     contributions = [float(e.change[j]) * e.size for e in effects]
     u, U = uncertainty.combine(float(est.u[j]), float(est.half_width[j]), contributions)
     value, truth = float(est.beta[j]), None
-    if s.truth is not None:
+    unit, scale = _surface(name)
+    if s.truth is not None and name != budget.TILT:
         oo = s.truth.get("D_OO", 0.0)
         extra = {"D_F": oo * (s.gravity / frames.G0) ** 2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
-        truth = (s.truth.get(name, 0.0) + extra) / DPH
+        truth = (s.truth.get(name, 0.0) + extra) / scale
+    meaning = "tilt of the input axis towards the output axis" if name == budget.TILT else drift.MEANING[name]
     shown = FOLDED.get(name, name) if s.fold else name
     spec = s.specification or {}
     limit = spec.get(shown, spec.get(name))
-    estimate, u_s, U_s = value / DPH, u / DPH, U / DPH
-    u_a = float(est.u[j]) / DPH
+    estimate, u_s, U_s = value / scale, u / scale, U / scale
+    u_a = float(est.u[j]) / scale
     dof = float(est.dof[j])
     return Coefficient(
         name=shown,
-        meaning=drift.MEANING[name] + (", with D_OO folded in" if shown != name else ""),
-        unit=units.display(drift.surface_unit(name)),
+        meaning=meaning + (", with D_OO folded in" if shown != name else ""),
+        unit=unit,
         estimate=estimate,
         u=u_s,
         k=U / u if u > 0.0 else uncertainty.NORMAL,
@@ -279,7 +212,7 @@ def _coefficient(
         p=float(est.p[j]) if u_a > 0.0 else None,
         u_a=u_a,
         dof=dof if math.isfinite(dof) else None,
-        closed=book[name] / DPH if name in book else None,
+        closed=book[name] / scale if name in book else None,
         truth=truth,
         z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
         limit=limit,
@@ -287,18 +220,24 @@ def _coefficient(
     )
 
 
+def _surface(name: str) -> tuple[str, float]:
+    """Printed unit of an estimate and its SI value (coefficients are per multiple of g0, so theirs is in rad/s)."""
+    unit, per = ("arcsec", "arcsec") if name == budget.TILT else (drift.surface_unit(name), "deg/h")
+    return units.display(unit), units.factor(per)
+
+
 def _budget_lines(
     names: tuple[str, ...], s: TumbleSetup, est: correlated.Estimate, effects: list[budget.Effect]
 ) -> list[BudgetLine]:
     lines = []
     for j, name in enumerate(names):
-        unit = units.display(drift.surface_unit(name))
+        unit, scale = _surface(name)
         shown = FOLDED.get(name, name) if s.fold else name
-        u_a = float(est.u[j]) / DPH
+        u_a = float(est.u[j]) / scale
         note = "type A, from the residuals under the estimated noise"
         lines.append(BudgetLine("random drift and reading noise", u_a, unit, 1.0, "1", u_a, unit, shown, note))
         for e in effects:
-            change = abs(float(e.change[j])) / DPH
+            change = abs(float(e.change[j])) / scale
             if e.size > 0.0 and change * e.size > 1e-9 * u_a:
                 per = unit if e.unit == "1" else f"{unit}/{e.unit}"
                 lines.append(BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, unit, shown, e.note))
@@ -310,6 +249,8 @@ def _equation(names: tuple[str, ...]) -> str:
     parts = []
     for n in names:
         index = n[2:]
+        if n == budget.TILT:
+            continue
         if n == "D_F":
             parts.append("D_F")
         elif len(index) == 2 and index[0] == index[1]:
@@ -317,7 +258,10 @@ def _equation(names: tuple[str, ...]) -> str:
         else:
             symbol = f"D_{index}" if len(index) == 1 else f'D_"{index}"'
             parts.append(f"{symbol} {' '.join(axis[a] for a in index)}")
-    return 'omega_"IA" - k i = omega_d = ' + " + ".join(parts)
+    tilt = (
+        'omega_"IA" - k i = omega_d - epsilon_"IO" omega_"OA", quad ' if budget.TILT in names else 'omega_"IA" - k i = '
+    )
+    return tilt + "omega_d = " + " + ".join(parts)
 
 
 def _conventions(s: TumbleSetup) -> list[str]:
@@ -377,6 +321,7 @@ def setup_of(
         truth=truth or None,
         terms=int(options.get("terms", 9)),
         fold=bool(options.get("fold", False)),
+        tilt=bool(options.get("tilt", False)),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         instrument=str(meta.get("instrument", "")),

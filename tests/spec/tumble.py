@@ -31,6 +31,13 @@ def setup(latitude: float = 45.75, **changes: Any) -> Any:
     return reduction.TumbleSetup(**{**values, **changes})
 
 
+def in_face(local: np.ndarray, s: Any, phase: int, angle: np.ndarray) -> np.ndarray:
+    """A local vector in the face axes of ``phase`` at table angles (m,): (m, 3)."""
+    x, y, z = s.base @ local
+    c, n = np.cos(angle), np.sin(angle)
+    return np.stack([c * x + n * y, c * y - n * x, np.full_like(c, z)], axis=1) @ s.faces[phase].T
+
+
 def record(
     s: Any, truth: dict[str, float], turn: int = 72, dwell: int = 10, turns: int = 1, rate: float = -10.0,
     noise: Any = None, window: float = 119.67,
@@ -47,13 +54,14 @@ def record(
         for _ in range(turn * turns if name.startswith("mount") else dwell):
             length = 2.0 * math.pi / turn / abs(table) if name.startswith("mount") else window
             end = angle + table * length if name.startswith("mount") else angle
-            a = np.linspace(angle, end, 41)
-            w = np.ones(41)
+            a = np.linspace(angle, end, 201)
+            w = np.ones(201)
             w[1:-1:2], w[2:-1:2] = 4.0, 2.0
-            xyz = [frames.to_face(-frames.U * s.gravity / frames.G0, s.faces[p], s.base, v) for v in a]
-            rates = [frames.to_face(frames.earth_rate_local(s.latitude), s.faces[p], s.base, v)[0] for v in a]
-            omega_ia = np.array(rates) + s.faces[p][0, 2] * (end - angle) / length
-            i = (omega_ia - drift.drift(np.array(xyz), truth)) / s.k
+            xyz = in_face(-frames.U * s.gravity / frames.G0, s, p, a)
+            omega_ia = (
+                in_face(frames.earth_rate_local(s.latitude), s, p, a)[:, 0] + s.faces[p][0, 2] * (end - angle) / length
+            )
+            i = (omega_ia - drift.drift(xyz, truth)) / s.k
             rows.append([p, t, t + length, angle, end, float(w @ i / w.sum()), 0.0, 1000, 0])
             t, angle = t + length, end
         if name == "mount 1":

@@ -1,0 +1,474 @@
+"""TEST-TUMBLE1-SDF (spec d1, 4.3): recovery, errata, refusals, folding, budget."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench import drift, frames
+from gyrobench.reduction import harmonic
+from gyrobench.reduction.result import Result
+
+sys.path.insert(0, str(Path(__file__).parent))
+import tumble as T
+
+DPH = T.DPH
+NAMES = drift.terms(9)
+
+
+def random_truth(seed: int, names: tuple[str, ...] = NAMES) -> dict[str, float]:
+    return dict(zip(names, np.random.default_rng(seed).uniform(0.1, 1.0, len(names)) * DPH, strict=True))
+
+
+def white(size: float, seed: int = 1) -> Any:
+    """Noise of ``size`` deg/h in every window."""
+    rng = np.random.default_rng(seed)
+    return lambda t0, t1: rng.normal(size=t0.size) * size * DPH
+
+
+def message(windows: Any, setup: Any) -> str:
+    with pytest.raises(T.reduction.ReductionError) as error:
+        T.reduction.reduce(windows, setup)
+    return str(error.value)
+
+
+# ------------------------------------------------------------------------------------------ recovery
+@pytest.mark.parametrize("latitude", [12.0, 45.75, -33.0, 78.0])
+@pytest.mark.parametrize(("turn", "rate"), [(72, -10.0), (25, 7.0), (12, -10.0)])
+def test_least_squares_and_closed_formulas_recover_to_1e_9(latitude: float, turn: int, rate: float) -> None:
+    truth = random_truth(int(latitude) + turn + 90)
+    s = T.setup(latitude, truth=truth)
+    r = T.reduction.reduce(T.record(s, truth, turn=turn, rate=rate), s)
+    scale = max(abs(c.truth) for c in r.coefficients)
+    for c in r.coefficients:
+        assert abs(c.estimate - c.truth) < 1e-9 * scale, c.name
+        assert abs(c.closed - c.truth) < 1e-9 * scale, c.name
+    assert [c.name for c in r.coefficients] == list(NAMES)
+    assert r.rank == 9
+
+
+def test_averaging_windows_are_allowed_for() -> None:
+    """[AVG-SINC] 30 degree windows damp the second harmonic by 4.5 %; regressors at mid angle would show it."""
+    assert np.sinc(2 * math.radians(30) / (2 * math.pi)) == pytest.approx(0.9549, abs=1e-4)
+    truth = {**dict.fromkeys(NAMES, 0.0), "D_IS": DPH}
+    s = T.setup(truth=truth)
+    w = T.record(s, truth, turn=12)
+    assert T.reduction.reduce(w, s).coefficients[-1].estimate == pytest.approx(1.0, rel=1e-9)
+    middle = (w["angle_start"] + w["angle_end"]) / 2
+    w2 = {**w, "angle_start": middle - 1e-3, "angle_end": middle + 1e-3}
+    damped = next(c for c in T.reduction.reduce(w2, s).coefficients if c.name == "D_IS")
+    assert damped.estimate == pytest.approx(0.9549, abs=2e-3)
+
+
+def test_polarity_of_the_book() -> None:
+    """Book current k i = omega_d - omega_IA: the same coefficients from the negated current."""
+    truth = random_truth(4)
+    s = T.setup(truth=truth)
+    w = T.record(s, truth)
+    w["mean"] = -w["mean"]
+    r = T.reduction.reduce(w, T.setup(truth=truth, polarity="book"))
+    assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
+
+
+def test_uncertainties_follow_the_formulas_of_the_spec() -> None:
+    """[TUM1-UNC] sigma = sigma_s = 1, N = 36 at 45.75 deg: closed-form factors 0.239 0.333 0.685 1.512 0.707; LS D_y
+    0.160.
+
+    With one dwell window the statics carry sigma_s; least squares does not do worse than the closed formulas.
+    """
+    from gyrobench.reduction.regression import least_squares
+
+    s = T.setup(gravity=frames.G0)
+    phi = s.latitude
+    rows = [frames.to_face(-frames.U, s.faces[p], s.base, a) for p in (2, 4) for a in np.radians(np.arange(0, 360, 10))]
+    rows += [frames.to_face(-frames.U, s.faces[p], s.base, 0.0) for p in (1, 3)]
+    X = drift.regressors(np.array(rows), NAMES)
+    fit = least_squares(X, np.zeros(74), NAMES)
+    u = dict(zip(NAMES, np.sqrt(np.diag(fit.gain @ fit.gain.T)), strict=True))
+    c, s2 = math.cos(phi), math.sin(2 * phi)
+    assert u["D_I"] == pytest.approx(1 / (6 * c), rel=1e-6) and u["D_I"] == pytest.approx(0.239, abs=1e-3)
+    assert u["D_IO"] == pytest.approx(2 / (6 * s2), rel=1e-6) and u["D_IO"] == pytest.approx(0.333, abs=1e-3)
+    assert u["D_IS"] == pytest.approx(2 / (6 * c * c), rel=1e-6) and u["D_IS"] == pytest.approx(0.685, abs=1e-3)
+    assert u["D_II"] == pytest.approx(math.sqrt(6 / 36 + 2) / (2 * c * c), rel=1e-3)
+    assert u["D_F"] == pytest.approx(1 / math.sqrt(2), rel=1e-3)
+    assert u["D_O"] == pytest.approx(0.160, abs=1e-3)
+
+
+# ------------------------------------------------------------------------------------------ errata
+@pytest.fixture(scope="module")
+def amplitudes() -> tuple[dict[str, float], dict[str, float], float, float, dict[str, float]]:
+    """A0 A1 B1 A2 B2 of both mounts, the dwells and the truth, in deg/h, at 41 deg and g = g0."""
+    truth = random_truth(9)
+    s = T.setup(41.0, gravity=frames.G0, truth=truth)
+    w = T.record(s, truth)
+    y = -s.k * w["mean"] / DPH
+
+    def mount(p: int) -> dict[str, float]:
+        f = harmonic.fit(-w["angle_start"][w["phase"] == p], -w["angle_end"][w["phase"] == p], y[w["phase"] == p])
+        return dict(zip(f.names, f.beta.tolist(), strict=True))
+
+    y3, y4 = (float(y[w["phase"] == p].mean()) for p in (1, 3))
+    return mount(2), mount(4), y3, y4, {n: v / DPH for n, v in truth.items()}
+
+
+def test_corrected_formulas(amplitudes: Any) -> None:
+    """[TUM1-REDUCE] amplitudes as in spec d1 4.3 and their separation."""
+    one, two, y3, y4, D = amplitudes
+    phi = math.radians(41.0)
+    c, s, s2 = math.cos(phi), math.sin(phi), math.sin(2 * phi)
+    expected_one = {
+        "A0": D["D_F"] - D["D_O"] * s + 0.5 * (D["D_II"] + D["D_SS"]) * c * c,
+        "A1": -D["D_S"] * c + 0.5 * D["D_OS"] * s2, "B1": -D["D_I"] * c + 0.5 * D["D_IO"] * s2,
+        "A2": 0.5 * (D["D_SS"] - D["D_II"]) * c * c, "B2": 0.5 * D["D_IS"] * c * c,
+    }  # fmt: skip
+    expected_two = {
+        "A0": D["D_F"] + D["D_O"] * s + 0.5 * (D["D_II"] + D["D_SS"]) * c * c,
+        "A1": D["D_S"] * c + 0.5 * D["D_OS"] * s2, "B1": -D["D_I"] * c - 0.5 * D["D_IO"] * s2,
+        "A2": 0.5 * (D["D_SS"] - D["D_II"]) * c * c, "B2": -0.5 * D["D_IS"] * c * c,
+    }  # fmt: skip
+    assert one == pytest.approx(expected_one, abs=1e-11)
+    assert two == pytest.approx(expected_two, abs=1e-11)
+    assert T.closed.formulas(one, two, y3, y4, phi, frames.G0) == pytest.approx(D, abs=1e-10)
+
+
+def test_printed_formulas_fail(amplitudes: Any) -> None:
+    """E20, E21: harmonic subscripts.  E22: D_z = (A12-A21)/.., D_xz = 2 B22/..  E23: D_y without k."""
+    one, two, y3, y4, D = amplitudes
+    phi, k = math.radians(41.0), 17.2
+    c, s2 = math.cos(phi), math.sin(2 * phi)
+
+    def differs(a: float, b: float) -> bool:
+        return abs(a - b) > 1e-6 * max(abs(a), abs(b))
+
+    assert differs(-D["D_I"] * c + 0.5 * D["D_OS"] * s2, one["A1"])  # E20: D_x in the cosine of 3-14
+    assert differs(0.5 * D["D_II"] * c * c, one["B2"])  # E20: D_xx in the sine of the double angle
+    assert differs(-D["D_I"] * c + 0.5 * D["D_OS"] * s2, one["B1"])  # E21: D_yz in B11
+    assert differs(-0.5 * D["D_II"] * c * c, two["B2"])  # E21: D_xx in B22
+    assert differs(-0.5 * D["D_IS"] * c * c, one["B2"])  # E21: -1/2 in both B21 and B22
+    assert differs((two["A1"] - one["A2"]) / (2 * c), D["D_S"])  # E22
+    assert differs(2 * two["B2"] / (c * c), D["D_IS"])  # E22; 2 B21 and -2 B22 are right:
+    assert 2 * one["B2"] / (c * c) == pytest.approx(D["D_IS"], rel=1e-9)
+    assert -2 * two["B2"] / (c * c) == pytest.approx(D["D_IS"], rel=1e-9)
+    assert differs((y4 / k - y3 / k) / 2, D["D_O"])  # E23: currents without the scale factor
+    assert (y4 - y3) / 2 == pytest.approx(D["D_O"], rel=1e-9)
+
+
+# ------------------------------------------------------------------------------------------ D_OO
+def test_d_oo_is_refused_without_fold_and_folds_exactly_with_it() -> None:
+    """[TUM1-YY, RANK-1g-FOLD] D_F + D_OO gamma^2, D_II - D_OO, D_SS - D_OO; the others unbiased."""
+    truth = random_truth(2, drift.NAMES)
+    s = T.setup(truth=truth)
+    w = T.record(s, truth)
+    assert "cannot be told from D_F, D_II and D_SS; set fold" in message(w, s)
+    r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
+    g2 = (9.8 / frames.G0) ** 2
+    D = {n: v / DPH for n, v in truth.items()}
+    expected = {
+        "D_F + γ² D_OO": D["D_F"] + g2 * D["D_OO"], "D_I": D["D_I"], "D_O": D["D_O"], "D_S": D["D_S"],
+        "D_II − D_OO": D["D_II"] - D["D_OO"], "D_SS − D_OO": D["D_SS"] - D["D_OO"], "D_IO": D["D_IO"],
+        "D_OS": D["D_OS"], "D_IS": D["D_IS"],
+    }  # fmt: skip
+    assert {c.name: c.estimate for c in r.coefficients} == pytest.approx(expected, abs=1e-10)
+    assert {c.name: c.truth for c in r.coefficients} == pytest.approx(expected, abs=1e-10)
+    assert any("D_OO is folded" in text and "centrifuge" in text for text in r.warnings)
+
+
+def test_ten_terms() -> None:
+    truth = random_truth(2, drift.NAMES)
+    s = T.setup(terms=10)
+    assert "ten terms have rank 9" in message(T.record(s, truth), s)
+    r = T.reduction.reduce(T.record(s, truth), T.setup(terms=10, fold=True, truth=truth))
+    assert all(abs(c.estimate - c.truth) < 1e-10 for c in r.coefficients)
+
+
+def test_fewer_terms() -> None:
+    truth = {n: v for n, v in random_truth(3).items() if n in drift.terms(4)}
+    s = T.setup(terms=4, truth=truth)
+    r = T.reduction.reduce(T.record(s, truth), s)
+    assert [c.name for c in r.coefficients] == ["D_F", "D_I", "D_S", "D_IS"]
+    assert all(abs(c.estimate - c.truth) < 1e-10 for c in r.coefficients)
+    full = random_truth(3)
+    r = T.reduction.reduce(T.record(T.setup(), full), T.setup(terms=8, truth=full))
+    assert any("D_O is simulated but not in the 8-term model" in text for text in r.warnings)
+
+
+# ------------------------------------------------------------------------------------------ refusals
+def test_singular_latitudes_name_what_is_lost() -> None:
+    """[TUM1-SING] rank 7 at the equator (D_xy, D_yz lost), rank 2 at the poles; refused below 5 and above 85 deg."""
+    equator = T.reduction.refusals(0.0)[0]
+    assert "rank 7 of 9" in equator and "D_IO" in equator and "D_OS" in equator
+    for sign in (1, -1):
+        pole = T.reduction.refusals(sign * math.pi / 2)[0]
+        assert "rank 2 of 9" in pole and all(n in pole for n in ("D_I", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS"))
+    assert "hardly seen is" in T.reduction.refusals(math.radians(-4.9))[0]
+    assert "hardly seen is" in T.reduction.refusals(math.radians(85.1))[0]
+    assert "outside −90..90" in T.reduction.refusals(1.6)[0]
+    assert "outside" in T.reduction.refusals(math.nan)[0]
+    assert T.reduction.refusals(math.radians(5.0)) == T.reduction.refusals(math.radians(-85.0)) == []
+    s = T.setup()
+    assert "rank 7 of 9" in message(T.record(s, random_truth(1)), T.setup(0.0))
+
+
+def bad(change: Any) -> str:
+    s = T.setup()
+    w = T.record(s, random_truth(1), turn=12, dwell=3)
+    change(w)
+    return message(w, s)
+
+
+def cut(w: dict[str, np.ndarray], keep: np.ndarray) -> None:
+    for name in w:
+        w[name] = w[name][keep]
+
+
+def put(column: str, row: int, value: float) -> Any:
+    return lambda w: w[column].__setitem__(row, value)
+
+
+@pytest.mark.parametrize(("change", "text"), [
+    (put("mean", 7, math.nan), "column mean: non-finite number in row 8"),
+    (put("angle_end", 3, math.inf), "column angle_end: non-finite number in row 4"),
+    (lambda w: w.pop("mean"), "column mean is missing"),
+    (lambda w: cut(w, np.arange(0)), "no windows"),
+    (lambda w: cut(w, np.r_[0, 1, 1, 2:30]), "duplicate windows: row 3"),
+    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*row 3"),
+    (put("t_end", 4, 0.0), "windows without length.*row 5"),
+    (put("flagged", 9, 3), "flagged windows .saturated torquer.* in row 10"),
+    (lambda w: cut(w, w["phase"] != 1), "phase 1 .static 3. is missing"),
+    (lambda w: cut(w, w["phase"] != 4), "phase 4 .mount 2. is missing"),
+    (lambda w: w.__setitem__("phase", np.where(w["phase"] == 4, 9, w["phase"])), "phase 9 is in the record"),
+    (lambda w: w.__setitem__("angle_end", w["angle_start"]), "does not move, expected a turning table"),
+])  # fmt: skip
+def test_bad_records(change: Any, text: str) -> None:
+    import re
+
+    assert re.search(text, bad(change)), bad(change)
+
+
+def test_few_windows_a_turn() -> None:
+    s = T.setup()
+    w = T.record(s, random_truth(1), turn=4, turns=5)
+    assert "4 windows a turn, at least 5" in message(w, s)
+
+
+def test_one_mount_or_no_dwells() -> None:
+    s = T.setup()
+    w = T.record(s, random_truth(1), turn=36)
+    no_dwell = T.setup(faces={p: f for p, f in s.faces.items() if p in (2, 4)})
+    keep = {n: v[np.isin(w["phase"], (2, 4))] for n, v in w.items()}
+    assert "no dwells with the output axis vertical" in message(keep, no_dwell)
+    assert "D_F cannot be told from D_II + D_SS" in message(keep, no_dwell)
+    one = T.setup(faces={p: f for p, f in s.faces.items() if p != 4})
+    keep = {n: v[w["phase"] != 4] for n, v in w.items()}
+    assert "only one mount" in message(keep, one)
+
+
+@pytest.mark.parametrize(("changes", "text"), [
+    ({"terms": 7}, "7-term model unknown; there are 3, 4, 5, 8, 9, 10"),
+    ({"k": 0.0}, "scale factor k = 0"), ({"k": math.nan}, "scale factor k = nan"),
+    ({"gravity": 980.0}, "outside 9.7..9.9"), ({"polarity": "ieee"}, "polarity 'ieee' unknown"),
+    ({"base": np.diag([1.0, 1.0, -1.0])}, "table base: determinant is -1"),
+])  # fmt: skip
+def test_bad_setup(changes: dict[str, Any], text: str) -> None:
+    s = T.setup()
+    assert text in message(T.record(s, random_truth(1), turn=12, dwell=3), T.setup(**changes))
+
+
+def test_mount_that_is_no_rotation() -> None:
+    s = T.setup()
+    faces = {**s.faces, 2: np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])}
+    assert "mount of mount 1: determinant is -1" in message(T.record(s, random_truth(1), turn=12), T.setup(faces=faces))
+
+
+def test_all_problems_at_once() -> None:
+    s = T.setup()
+    text = message({"phase": np.array([1])}, T.setup(0.0, terms=7, k=-1.0))
+    assert all(part in text for part in ("rank 7", "7-term", "k = -1", "is missing"))
+    assert s.turns(2) and not s.turns(1)
+    assert T.setup(modes=None).turns(2) and not T.setup(modes=None).turns(3)
+
+
+def test_partial_turns_have_no_closed_formulas() -> None:
+    truth = random_truth(6)
+    s = T.setup(truth=truth)
+    w = T.record(s, truth)
+    keep = np.ones(w["phase"].size, dtype=bool)
+    keep[np.flatnonzero(w["phase"] == 2)[-9:]] = False
+    r = T.reduction.reduce({n: v[keep] for n, v in w.items()}, s)
+    assert all(c.closed is None for c in r.coefficients)
+    assert any("covers 315 deg, no whole turns" in text for text in r.warnings)
+    assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
+
+
+def test_other_attitudes_have_no_closed_formulas() -> None:
+    """Mounts turned by 20 degrees about the input axis: general attitudes go by least squares."""
+    truth = random_truth(6)
+    tilt = frames.rotation([1, 0, 0], math.radians(20)).T
+    s0 = T.setup()
+    s = T.setup(truth=truth, faces={p: tilt @ f for p, f in s0.faces.items()})
+    r = T.reduction.reduce(T.record(s, truth), s)
+    assert all(abs(c.estimate - c.truth) < 1e-8 for c in r.coefficients)
+    assert r.coefficients[0].closed is None and any("attitudes: least squares only" in x for x in r.warnings)
+
+
+# ------------------------------------------------------------------------------------------ the rest of a result
+def test_sensitivities_of_the_spec() -> None:
+    """[TUM1-SENS-IA] eps W sin(phi)/gamma in D_O by the closed formulas; [TUM1-SENS-AXIS] W delta/(gamma cos phi) in
+    D_I (the axis tilts about east) and 2 W delta/(gamma^2 sin 2 phi) in D_OS (about p x east)."""
+    truth = dict.fromkeys(NAMES, 0.0)
+    s = T.setup(gravity=frames.G0, truth=truth)
+    phi, eps, W = s.latitude, 1e-4, frames.EARTH_RATE / DPH
+
+    def closed(real: Any) -> dict[str, float]:
+        r = T.reduction.reduce(T.record(real, truth), s)
+        return {c.name: c.closed for c in r.coefficients}
+
+    tilt = frames.rotation([0, 0, 1], eps).T
+    found = closed(T.setup(gravity=frames.G0, faces={p: tilt @ f for p, f in s.faces.items()}))
+    assert abs(found.pop("D_O")) == pytest.approx(eps * W * math.sin(phi), rel=1e-6)
+    assert max(map(abs, found.values())) < 1e-6
+    off = T.setup(gravity=frames.G0)
+    for axis, name, size in ((0, "D_I", W / math.cos(phi)), (1, "D_OS", 2 * W / math.sin(2 * phi))):
+        tilted = off.base @ frames.rotation(off.base[axis], eps).T
+        assert abs(closed(T.setup(gravity=frames.G0, base=tilted))[name]) == pytest.approx(eps * size, rel=1e-3)
+
+
+def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
+    """Each line's sensitivity equals the change of the estimates when the record is made with that error in it."""
+    truth = random_truth(8)
+    sizes = {"u_axis": 1e-5, "u_mount": 1e-5, "u_scale_factor": 1e-4, "u_nonlinearity": 1e-4, "u_current": 1e-9}
+    s = T.setup(truth=truth, **sizes)
+    w = T.record(s, truth, noise=white(1e-6))
+    r = T.reduction.reduce(w, s)
+    base = {c.name: c.estimate for c in r.coefficients}
+
+    def change(windows: Any) -> dict[str, float]:
+        found = T.reduction.reduce(windows, s)
+        return {c.name: c.estimate - base[c.name] for c in found.coefficients}
+
+    line = {(b.source, b.coefficient): b for b in r.budget}
+    gained = change({**w, "mean": w["mean"] * (1 + 1e-4)})
+    assert line["torquer scale factor", "D_I"].contribution == pytest.approx(abs(gained["D_I"]), rel=1e-3)
+    offset = change({**w, "mean": w["mean"] + 1e-9})
+    assert line["offset of the current reading", "D_F"].contribution == pytest.approx(abs(offset["D_F"]), rel=1e-3)
+    tilted = T.setup(base=s.base @ frames.rotation(s.base[0], 1e-5).T)
+    off = change(T.record(tilted, truth, noise=white(1e-6)))
+    mine = line["table axis off the pole, about east", "D_I"]
+    assert mine.contribution == pytest.approx(abs(off["D_I"]), rel=1e-3)
+    tilt = frames.rotation([0, 0, 1], 1e-9).T  # small against the noise, else it would be taken for slow noise
+    turned = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
+    off = change(T.record(turned, truth, noise=white(1e-6)))
+    assert line["input axis towards output axis", "D_O"].sensitivity == pytest.approx(abs(off["D_O"]) / 1e-9, rel=2e-2)
+    for c in r.coefficients:
+        total = math.sqrt(sum(b.contribution**2 for b in r.budget if b.coefficient == c.name))
+        assert c.u == pytest.approx(total, rel=1e-9)
+        assert c.u > c.u_a
+
+
+def test_tilt_of_the_input_axis_can_be_estimated() -> None:
+    """Both mounts see it with the table rate, the dwells with Earth rate alone: a tenth unknown, and D_O unharmed."""
+    truth, eps = random_truth(8), 1e-4
+    s = T.setup(truth=truth, tilt=True, u_mount=1e-4)
+    tilt = frames.rotation([0, 0, 1], eps).T
+    tilted = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
+    r = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), s)
+    found = {c.name: c for c in r.coefficients}
+    assert found["ε_IO"].estimate == pytest.approx(math.degrees(eps) * 3600, rel=1e-3) and found["ε_IO"].unit == "″"
+    assert all(abs(c.estimate - c.truth) < 1e-4 for c in r.coefficients if c.truth is not None)
+    assert not [b for b in r.budget if b.source == "input axis towards output axis" and b.coefficient == "D_O"]
+    loose = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
+    assert any("option tilt" in text for text in loose.warnings)
+    assert abs(loose.coefficients[2].z) < 2
+
+
+def test_result_is_whole_and_json() -> None:
+    s = T.setup(truth=drift.STANDARD, specification={"D_F": (-0.5, 0.5), "D_I": (None, -1.0), "D_S": (-0.701, None)})
+    r = T.reduction.reduce(T.record(s, drift.STANDARD, turns=2, noise=white(0.003)), s)
+    text = json.dumps(r.as_dict(), allow_nan=False)
+    assert Result.from_dict(json.loads(text)).coefficients[0].estimate == r.coefficients[0].estimate
+    verdicts = {c.name: c.verdict for c in r.coefficients}
+    assert verdicts["D_F"] == "pass" and verdicts["D_I"] == "fail" and verdicts["D_II"] == "no specification given"
+    assert r.verdict == "fail"
+    assert (
+        len(r.series) == 4
+        and len(r.series[1].x) == 144
+        and len(r.series[1].shown_fit_x) == len(r.series[1].shown_fit_y)
+    )
+    assert {t.name for t in r.tests} >= {"Ljung-Box, residuals", "turn to turn", "harmonics 3 and higher"}
+    assert r.allan["tau"] and r.psd["f"] and r.acf["rho"][0] == pytest.approx(1.0)
+    assert r.repeatability["p"] > 1e-3
+    assert len(r.tables) == 2 and r.tables[1]["rows"][0][:2] == ["mount 1", 1]
+    assert len(r.summary) == 3
+    for c in r.coefficients:
+        assert c.interval[1] - c.interval[0] == pytest.approx(2 * c.k * c.u)
+        assert abs(c.estimate - c.closed) < 5 * c.u
+    assert r.correlation[0][0] == 1.0 and len(r.correlation) == 9
+
+
+def test_model_errors_are_found() -> None:
+    """A third harmonic, and a drift that changes between turns, show in their tests and nowhere else."""
+    s = T.setup()
+    w = T.record(s, drift.STANDARD, turns=2, noise=white(0.003))
+    mount = np.isin(w["phase"], (2, 4))
+    angle = (w["angle_start"] + w["angle_end"]) / 2
+    third = {**w, "mean": w["mean"] + np.where(mount, 0.003 * DPH / s.k * np.cos(3 * angle), 0.0)}
+    p = {t.name: t.p for t in T.reduction.reduce(third, s).tests}
+    assert p["harmonics 3 and higher"] < 1e-3 < p["turn to turn"]
+    two = np.flatnonzero(w["phase"] == 2)[72:]
+    changed = np.array(w["mean"])
+    changed[two] += 0.005 * DPH / s.k * np.sin(2 * angle[two])
+    p = {t.name: t.p for t in T.reduction.reduce({**w, "mean": changed}, s).tests}
+    assert p["turn to turn"] < 1e-2 < p["harmonics 3 and higher"]
+
+
+def test_correlated_noise_is_seen_and_said() -> None:
+    from gyrobench.reduction import noise
+
+    def markov(t0: np.ndarray, t1: np.ndarray) -> np.ndarray:
+        root = np.linalg.cholesky(noise.process_covariance(t0, t1, 360.0))
+        return root @ np.random.default_rng(3).standard_normal(t0.size) * 0.005 * DPH
+
+    s = T.setup(truth=drift.STANDARD)
+    w = T.record(s, drift.STANDARD, noise=markov)
+    r = T.reduction.reduce(w, s)
+    p = {t.name: t.p for t in r.tests}
+    assert p["Ljung-Box, residuals"] < 1e-6 < 1e-2 < p["Ljung-Box, whitened residuals"]
+    assert r.noise["weight of white noise alone"] < 1e-3
+    low, high = r.noise["correlation time, 90 % range / s"]
+    assert low < 360.0 < high
+    assert "correlated over about" in r.summary[2]
+    quiet = T.reduction.reduce(T.record(s, drift.STANDARD, noise=white(0.005)), s)
+    assert r.coefficients[0].u > 1.5 * quiet.coefficients[0].u
+
+
+def test_from_a_run() -> None:
+    """The setup comes from run.json: options, plan, gyro parameters; an unfinished run says so."""
+    from gyrobench.system.record import Record
+
+    system = T.system.with_values({"dwell": 600.0, "windows": 36})
+    plan = system.plan().rows()
+    faces = frames.tumble_faces(system["latitude"])
+    parameters = {"gyro.k": T.K, **{f"gyro.{n}": v for n, v in drift.STANDARD.items()}}
+    meta = {
+        "options": dict(system.values),
+        "plan": plan,
+        "parameters": parameters,
+        "complete": False,
+        "stopped_at": 9.0,
+    }
+    s = T.reduction.setup_of(meta)
+    assert s.gravity == pytest.approx(frames.normal_gravity(system["latitude"]))
+    assert {p: s.turns(p) for p in s.faces} == {r["phase"]: r["mode"] == "rate" for r in plan}
+    assert s.faces[2] == pytest.approx(faces["mount 1"])
+    r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, meta))
+    assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
+    assert "before its plan was done" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
+    del meta["parameters"]["gyro.k"]
+    with pytest.raises(T.reduction.ReductionError, match="scale factor unknown"):
+        T.reduction.setup_of(meta)
