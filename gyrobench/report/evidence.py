@@ -151,17 +151,25 @@ def estimates(doc: Json) -> list[Any]:
             half=True,
         ),
     )
-    return blocks + generic(
-        doc, ("harmonics",), "Harmonics of the record. Those the model does not hold should be noise.", by_u=True
-    )
+    caption = "Harmonics of the record. Those the model does not hold should be noise."
+    return blocks + _method_tables(doc) + generic(doc, ("harmonics",), caption, by_u=True)
 
 
 def repeatability(doc: Json) -> list[Any]:
-    blocks = generic(doc, ("repeatability",), "Repeatability.")
-    blocks += generic(
-        doc, ("step_check",), "Step check: the same run with half the step; change of each coefficient against u."
-    )
-    return blocks
+    return generic(doc, ("repeatability",), "Repeatability.") + _step(doc)
+
+
+def _step(doc: Json) -> list[Any]:
+    """The coupling error: what halving the step changes."""
+    check = doc["step_check"]
+    if not check.get("rows"):
+        unchecked = Text("The step was not checked in this run (option --check-step).", quiet=True)
+        return [unchecked] if doc["simulated"] else []
+    step = write_number(check.get("step"), significant=6).text
+    worst = write_number(check.get("worst"), significant=2).text
+    caption = "Step check: change of each coefficient when the step is halved, noise off; ratio: change over u."
+    table = generic(doc, ("step_check", "rows"), caption, significant=2)
+    return [Text(f"Halving the step of {step} s changes no coefficient by more than {worst} of its u."), *table]
 
 
 def _method_tables(doc: Json) -> list[Any]:

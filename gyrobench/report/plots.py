@@ -258,14 +258,12 @@ def plain_log(ax: Any, ratio: float) -> None:
 
 def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: str) -> str:
     """Correlation of the estimates, lower triangle, in hundredths."""
-    from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.patches import Rectangle
 
     n = len(names)
     if n < 2 or len(matrix) != n:
         return ""
-    colours = LinearSegmentedColormap.from_list("signed", [VERMILION, "#fefefe", BLUE])
-    side = min(WIDE, max(HALF, (30 + 9 * n) / 25.4))
+    side = HALF if n < 11 else WIDE
     fig, axes = figure(side, 14 + 6.4 * n)
     ax = axes[0, 0]
     ax.grid(False)
@@ -274,11 +272,10 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
             r = matrix[i][j]
             if r is None:
                 continue
-            face = colours(0.5 + 0.5 * max(-1.0, min(1.0, r)))
-            ax.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, facecolor=face, edgecolor="none"))
-            dark = 0.299 * face[0] + 0.587 * face[1] + 0.114 * face[2] < 0.52
+            colour, depth = (BLUE if r > 0.0 else VERMILION), 0.6 * min(1.0, abs(r))
+            ax.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, facecolor=colour, alpha=depth, linewidth=0))
             text = f"{r:.2f}".replace("-", "−") if abs(r) >= 0.005 else "0"
-            ax.text(j, i, text, ha="center", va="center", color="#fffffe" if dark else "#000001", fontsize=8)
+            ax.text(j, i, text, ha="center", va="center", color=INK, fontsize=7 if n < 11 else 8)
     ax.set_xlim(-0.5, n - 1.5)
     ax.set_ylim(n - 0.5, 0.5)
     ax.set_xticks(range(n - 1), [short(m, 14) for m in names[:-1]], rotation=0 if max(map(len, names)) < 6 else 40)

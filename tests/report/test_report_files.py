@@ -313,3 +313,45 @@ def test_same_result_same_bytes(tmp_path):
     b = report.write(tumble(windows=12), tmp_path / "b", formats=("json", "html"))
     for kind in a:
         assert Path(a[kind]).read_bytes() == Path(b[kind]).read_bytes()
+
+
+def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
+    r = tumble(windows=12)
+    r.tables = [
+        {
+            "title": "Least squares and closed formulas",
+            "caption": "From the same windows",
+            "columns": ["coefficient", "least squares", "difference", "u", "turn / (°/h)"],
+            "rows": [["D_F", 0.29761, 1.2345e-5, 0.0025, 3]],
+        }
+    ]
+    w = Written(report.write(r, tmp_path, formats=("json", "html")))
+    texts = {p: t for p, _, t in w.numbers()}
+    assert texts["/tables/0/rows/0/1"] == "0.2976"  # to the second digit of u
+    assert texts["/tables/0/rows/0/2"] == "1.2·10⁻⁵"
+    assert "/step_check/rows/3/ratio" in texts
+    assert "Halving the step of 0.0005 s changes no coefficient by more than 0.0001 of its u." in w.html
+    r.step_check = {}
+    w = Written(report.write(r, tmp_path, formats=("json", "html")))
+    assert "The step was not checked in this run" in w.html
+
+
+def test_wiring_drawing_stands_alone():
+    """The wiring drawing also stands alone, from the description of a system."""
+    from gyrobench.report.drawing import system
+
+    description = {
+        "wires": [{"wire": "a.x[1] -> b.y[1]", "connected": True}, {"wire": "b.z -> a.w", "connected": True}]
+    }
+    svg = system(["a", "b"], description, "s")
+    assert svg.startswith("<svg") and svg.rstrip().endswith("</svg>")
+    assert "xmlns=" in svg
+
+
+def test_delays_and_cuts_are_said(tmp_path):
+    r = tumble(windows=12)
+    r.provenance["cuts"] = ["rebalance.i -> gyro.i: one step delay (no output depends on it at once)"]
+    r.provenance["delays"] = {"rebalance.i -> gyro.i": 0.001, "table.angle -> sampler.angle": 0.002}
+    w = Written(report.write(r, tmp_path, formats=("json", "html")))
+    assert "Cut at rebalance.i → gyro.i: one step delay (no output depends on it at once), 0.001 s." in w.html
+    assert "Delay on table.angle → sampler.angle: 0.002 s." in w.html
