@@ -32,7 +32,7 @@ static double seconds(void) {
 enum { REAL = 0, INTEGER = 1, BOOLEAN = 2 };
 enum { MORE = 0, DONE = 1, FULL = 2, FAILED = 3 };
 enum { CALL_SET = 0, CALL_STEP = 1, CALL_GET = 2 };
-enum { TIMED_EVERY = 1009 };
+enum { TIMED_EVERY = 1009, TIMED_FIRST = 504 };
 
 typedef int (*step_function)(void *, double, double, int);
 typedef int (*real_function)(void *, const unsigned int *, size_t, double *);
@@ -154,7 +154,7 @@ EXPORT int gyrobench_run(run *r, int64_t k_end) {
     const int64_t n = r->n_parts;
     const int channels = r->channel.n > 0;
     int64_t until_row = r->every - r->k % r->every;           /* steps to the next row of the channels */
-    int64_t until_timed = (TIMED_EVERY - r->k % TIMED_EVERY) % TIMED_EVERY;
+    int64_t until_timed = (TIMED_FIRST + TIMED_EVERY - r->k % TIMED_EVERY) % TIMED_EVERY;
     while (r->k < k_end) {
         if (r->channel.rows == r->channel.capacity || r->window.rows == r->window.capacity) return FULL;
         const double t = r->t0 + (double)r->k * r->h;

@@ -230,3 +230,17 @@ def test_many_rows_do_not_overflow_the_blocks(make: Make) -> None:
 
     found = run(Dense(), **ring(make))
     np.testing.assert_array_equal(found.channels["time"], np.arange(50001) * 0.01)
+
+
+def test_python_and_native_parts_give_the_same_record(small: System) -> None:
+    native = run(small, values=QUICK, seed=3)
+    python = run(small, values=QUICK, seed=3, target="python", engine="reference")
+    assert native.same_data(python)
+    assert python.meta["parts"]["gyro"]["target"] == "python"
+
+
+def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, make: Make) -> None:
+    with pytest.raises(RunError, match=r"rebalance: doStep failed at t = 0.15\d* s.*\n.*rebalance said: .*u") as caught:
+        run(small, parts={"gyro": make("faulty")}, values={"gyro.fault": 4, "gyro.at": 150, "rebalance.K_p": 0.0})
+    assert caught.value.record is not None
+    assert not caught.value.record.complete
