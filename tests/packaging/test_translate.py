@@ -103,7 +103,9 @@ def test_refused_with_file_line_and_what_to_write(written: Written, tmp_path: Pa
 
 
 def test_methods_have_plain_arguments(written: Written) -> None:
-    body = '    y = Output("1")\n    def rate(self, a, b=1.0):\n        return a\n    def outputs(self):\n        pass\n'
+    body = (
+        '    y = Output("1")\n    def rate(self, a, b=1.0):\n        return a\n    def outputs(self):\n        pass\n'
+    )
     with pytest.raises(SubsetError, match="takes plain arguments without defaults"):
         native.c_source(written("one", body), "guid")
     body = '    y = Output("1")\n    def rate(self, a):\n        if a > 0.0:\n            return a\n'
