@@ -87,6 +87,17 @@ def resolve(
     for slot, binding in assembly.bindings.items():
         if "seed" in binding.parameters:
             chosen[f"{slot}.seed"] = slot_seed(seed, slot)
+    variables = {
+        slot: {b.variable: (e, b) for e, b in (*binding.inputs.items(), *binding.parameters.items())}
+        for slot, binding in (assembly.bindings.items() if system.raw else ())
+    }
+    for name, value in system.raw.items():
+        slot, _, variable = name.partition(".")
+        if variable in variables[slot]:
+            element, known = variables[slot][variable]
+            chosen[f"{slot}.{element}"] = value * known.gain if known.kind == "Real" else value
+        else:
+            notes.append(f"{name}: no parameter or input of that name; not set")
     for name, value in system.flat_parameters().items():
         slot, _, parameter = name.partition(".")
         if slot not in assembly.bindings:

@@ -122,14 +122,19 @@ class _Layer:
         if ua not in ("", "1") and ub not in ("", "1") and not units.same_dimension(ua, ub):
             self.problems.append(f"{wire}: {ua} into {ub}: the dimensions differ")
             return
+        factor = self.system.factors.get(wire, 1.0)
+        source = self.bindings[a].socket.connector(x.split("[")[0])
+        whole = source is not None and source.whole
         for index, out in outputs.items():
             inp = inputs[index]
-            if inp.kind != "Real" and out.kind != inp.kind and out.gain != inp.gain:
-                self.problems.append(f"{wire}: a factor into the {inp.kind} input {inp.variable} is not possible")
+            gain = factor if out.gain == inp.gain else factor * out.gain / inp.gain
+            if inp.kind != "Real" and (gain != 1.0 or (out.kind == "Real" and not whole)):
+                self.problems.append(
+                    f"{wire}: {out.kind} with factor {gain:g} into the {inp.kind} input {inp.variable}"
+                )
             other = self.taken.setdefault((b, inp.element), wire)
             if other != wire:
                 self.problems.append(f"{wire}: {b}.{inp.element} is already fed by {other}")
-            gain = 1.0 if out.gain == inp.gain else out.gain / inp.gain
             self.connections.append(Connection(a, out, b, inp, gain, wire))
 
     def unfed(self) -> None:

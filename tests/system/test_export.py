@@ -12,10 +12,11 @@ import pytest
 
 from gyrobench.system.container import export_container
 from gyrobench.system.record import Record
-from gyrobench.system.run import run
+from gyrobench.system.run import Session, run
 from gyrobench.system.series import record_from_series
 from gyrobench.system.ssp import ExportError, export_ssp
-from gyrobench.system.system import System
+from gyrobench.system.ssp_read import read_ssp
+from gyrobench.system.system import RefusedError, System
 
 Make = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
@@ -65,6 +66,31 @@ def test_ssp_is_valid_and_reproducible(small: System, archive: Path, tmp_path: P
     export_ssp(small, tmp_path / "again.ssp", values=QUICK)
     assert (tmp_path / "again.ssp").read_bytes() == archive.read_bytes()
     assert b"Annotation" not in zipfile.ZipFile(archive).read("SystemStructure.ssd")
+
+
+def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path) -> None:
+    # the archive names no windows and no done output, so it runs to its stop time; the channels are comparable
+    system = read_ssp(archive, step=1e-3)
+    ours, theirs = run(small, values=QUICK), run(system)
+    assert theirs.meta["order"] == ours.meta["order"]
+    assert theirs.meta["delays"].keys() >= {"rebalance.i -> gyro.i"}
+    assert theirs.channels["gyro.u"][0] == ours.channels["gyro.u"][0]
+    common = np.searchsorted(ours.channels["time"], theirs.channels["time"])
+    inside = common < len(ours.channels["time"])
+    np.testing.assert_array_equal(theirs.channels["gyro.u"][inside], ours.channels["gyro.u"][common[inside]])
+    # factors survive the way out and back
+    parts = {"gyro": make("vendor_gyro")}
+    export_ssp(small, tmp_path / "v.ssp", parts=parts, maps=MAPPED, values={"dwell": 0.2})
+    with Session(small, parts, MAPPED) as a, Session(read_ssp(tmp_path / "v.ssp", 1e-3)) as b:
+        gains = [{(c.source, c.output.variable, c.target, c.input.variable): c.gain for c in s.assembly.connections}
+                 for s in (a, b)]  # fmt: skip
+        assert gains[0] == pytest.approx(gains[1], rel=1e-15)
+
+
+def test_ssp_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "bad.ssp").write_text("no archive")
+    with pytest.raises(RefusedError, match=r"bad\.ssp refuses to run:\n  - not an SSP archive"):
+        read_ssp(tmp_path / "bad.ssp", 1e-3)
 
 
 def test_ssp_in_fmpy(small: System, archive: Path) -> None:
