@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
@@ -46,7 +47,7 @@ def _head(doc: Json) -> list[tuple[str, str]]:
     site = ", ".join(f"{words(k)[0]} {_plain(v)}{_unit(k)}" for k, v in doc["site"].items() if v is not None)
     rows = [
         ("Report", doc["report_id"]),
-        ("Date", str(run.get("date") or "not recorded")),
+        ("Date", _date(str(run.get("date") or "not recorded"))),
         ("Instrument", doc["instrument"] or "not named"),
         ("Site", site or "not stated"),
         ("Operator", str(run.get("operator") or "not recorded")),
@@ -54,6 +55,12 @@ def _head(doc: Json) -> list[tuple[str, str]]:
         ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
     ]
     return rows
+
+
+def _date(text: str) -> str:
+    """ "2026-03-14T09:30:00Z" for people; other texts stay as they are."""
+    match = re.fullmatch(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d)[\d:.]*(Z|\+00:00)", text)
+    return f"{match[1]} {match[2]} UTC" if match else text
 
 
 def _plain(value: Any) -> str:
