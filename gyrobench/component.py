@@ -208,6 +208,7 @@ class Component:
     def get_state(self) -> dict[str, Any]:
         """Everything that decides the future, as plain numbers (exact through JSON)."""
         return {
+            "part": f"{type(self).__name__} {self.version}",
             "v": [self._at(s) for s in self.layout],
             "noise": [getattr(self.noise, n.name) for n in self.noises],
             "t": self.t,
@@ -220,6 +221,8 @@ class Component:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
+        if state["part"] != f"{type(self).__name__} {self.version}":
+            raise PartError(f"{self.instance}: a state of {state['part']} is not one of this part")
         for s, x in zip(self.layout, state["v"], strict=True):
             self._put(s, x)
         for n, x in zip(self.noises, state["noise"], strict=True):

@@ -218,19 +218,19 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 }
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     (void)c; (void)state;
-    *size = sizeof(Numbers);
+    *size = sizeof(Saved);
     return fmi2OK;
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-    if (size < sizeof(Numbers)) return wrong((Instance *)c, "fmi2SerializeFMUstate: the buffer is too small");
-    memcpy(bytes, state, sizeof(Numbers));
+    if (size < sizeof(Saved)) return wrong((Instance *)c, "fmi2SerializeFMUstate: the buffer is too small");
+    save((const Numbers *)state, (char *)bytes);
     return fmi2OK;
 }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
-    if (size < sizeof(Numbers)) return wrong((Instance *)c, "fmi2DeSerializeFMUstate: too few bytes");
+    if (!saved_here(bytes, size)) return wrong((Instance *)c, "these bytes are not a state of this FMU");
     if (!*state) *state = malloc(sizeof(Numbers));
     if (!*state) return wrong((Instance *)c, "fmi2DeSerializeFMUstate: out of memory");
-    memcpy(*state, bytes, sizeof(Numbers));
+    memcpy(*state, bytes + offsetof(Saved, n), sizeof(Numbers));
     return fmi2OK;
 }
 

@@ -131,7 +131,7 @@ def write_reference(
             given = old.inputs[s.name]
         if given is None:
             given = signal(s, place, time[-1])
-        inputs[s.name] = [given(t) for t in time] if callable(given) else [float(x) for x in given]
+        inputs[s.name] = [float(x) for x in (map(given, time) if callable(given) else given)]
     values = dict(parameters if parameters is not None else old.parameters if old else {})
     starts = {s.name: s.start for s in cls.layout}
     values = {n: float(x) for n, x in values.items() if float(x) != starts[n]}

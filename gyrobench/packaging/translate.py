@@ -203,7 +203,6 @@ class Method(Expressions):
         return f"static inline {number} {self.name}{suffix}(Part *part{seed}{args})"
 
 
-
 def method_names(source: Source) -> list[str]:
     return ["start", "flow", "outputs", *(n for n, _ in source.cls.ticks)]
 

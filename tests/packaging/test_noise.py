@@ -101,7 +101,7 @@ def test_density_is_independent_of_the_step(instance: Callable) -> None:
     for h in (1e-3, 2.5e-3):
         n = 1 << 15
         x = series(instance("noisy", "native", toy=True), h, n)
-        f, p = scipy.signal.welch(x[:, 0], fs=1.0 / h, nperseg=256, detrend=False)
+        _, p = scipy.signal.welch(x[:, 0], fs=1.0 / h, nperseg=256, detrend=False)
         assert np.mean(p[1:-1]) == pytest.approx(2 * 0.2**2, rel=4 * math.sqrt(2.0 / n))
         low, high = p[1:64].mean(), p[64:-1].mean()
         assert low / high == pytest.approx(1.0, abs=0.05)  # white
