@@ -22,7 +22,7 @@ from gyrobench.system.parts import resolve_parts, sha256
 from gyrobench.system.program import build_program
 from gyrobench.system.record import Record, rows_to_columns
 from gyrobench.system.slave import LocalSlave, PartFailure, Slave
-from gyrobench.system.system import System, load_system
+from gyrobench.system.system import RefusedError, System, load_system
 from gyrobench.system.values import ValueProblem
 from gyrobench.system.wiring import Assembly, assemble
 
@@ -40,6 +40,12 @@ class RunError(Exception):
 
 class RunInterrupted(RunError):
     """The user stopped the run."""
+
+
+class PartRefusal(RunError):
+    """A part refuses its parameters, before the first step."""
+
+    exit_code = 2
 
 
 class Session:
@@ -148,6 +154,8 @@ class Session:
             raise ValueProblem(f"step = {system.step} s: must be > 0")
         system.refuse()
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
+        if problems := system.check_parameters(parameters):
+            raise RefusedError(system.name, problems)
         meta = self._meta(system, seed, parameters, notes)
         every = max(1, round(system.channel_period / system.step))
         self.program.out[:] = 0.0
@@ -175,7 +183,8 @@ class Session:
             for slave in self.slaves.values():
                 slave.free()
         if state is None:
-            raise RunError(str(problem))
+            said = isinstance(problem, PartFailure) and problem.messages and "(Error)" in problem.status
+            raise (PartRefusal if said else RunError)(str(problem))
         return self._finish(state, system, meta, out, problem)
 
     def _finish(

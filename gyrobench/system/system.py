@@ -79,11 +79,12 @@ class Option:
         """The SI value; raises ValueProblem for a wrong dimension or a broken bound."""
         unit = "1" if isinstance(self.unit, type) else self.unit
         number = parse(name, value, unit, self.kind)
+        shown = "" if unit == "1" else f" {unit}"
         if not isinstance(number, str | list):
             if self.min is not None and not number >= self.min:
-                raise ValueProblem(f"{name} = {number:g}: must be >= {self.min:g} {unit}")
+                raise ValueProblem(f"{name} = {number:g}: must be >= {self.min:g}{shown}")
             if self.max is not None and not number <= self.max:
-                raise ValueProblem(f"{name} = {number:g}: must be <= {self.max:g} {unit}")
+                raise ValueProblem(f"{name} = {number:g}: must be <= {self.max:g}{shown}")
         return number
 
 
@@ -167,6 +168,10 @@ class System:
 
     def check(self) -> list[str]:
         """What makes a run with these values impossible or meaningless (the run is refused), as sentences."""
+        return []
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        """As :meth:`check`, knowing every parameter of every part: {"slot.name": SI value, arrays nested}."""
         return []
 
     def warnings(self) -> list[str]:
