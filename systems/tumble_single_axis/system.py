@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench import frames
+import numpy as np
+
+from gyrobench import drift, frames, units
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.record import Record
@@ -18,6 +20,7 @@ from . import measured
 Specification = Mapping[str, tuple[float | None, float | None]]
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
+STEP_MAX = 5e-3  # s
 
 
 class TumbleSingleAxis(System):
@@ -118,9 +121,39 @@ class TumbleSingleAxis(System):
         from .reduction import refusals
 
         found = refusals(self["latitude"])
+        if self["terms"] not in drift.TERM_SETS:
+            found.append(f"terms = {self['terms']}: no such model; there are 3, 4, 5, 8 and 9 terms")
+        if self.step > STEP_MAX:
+            found.append(
+                f"step = {self.step:g} s: the rebalance loop exchanges once a step and needs at most {STEP_MAX:g} s"
+            )
         if not self["rate"] > 0.0:
             found.append(
                 "rate = 0: the table does not turn, so no coefficient can be separated; the book turns at 10 ERU"
+            )
+        return found
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        found = []
+        faces = parameters.get("sequencer.faces", [])
+        matrices = {
+            f"sequencer.faces, {name}": np.reshape(f, (3, 3)) for name, f in zip(self.faces(), faces, strict=False)
+        }
+        matrices |= {n: parameters[n] for n in ("gyro.mount", "table.base") if n in parameters}
+        for name, matrix in matrices.items():
+            try:
+                frames.check_rotation(matrix, name)
+            except ValueError as error:
+                found.append(str(error))
+        terms = parameters.get("gyro.terms", 9)
+        if terms not in drift.TERM_SETS:
+            known = ", ".join(str(t) for t in drift.TERM_SETS)
+            found.append(f"gyro.terms = {terms:g}: no such model; the gyro has {known} terms")
+        square = parameters.get("gyro.D_OO", 0.0) / units.factor("deg/h")
+        if square and not self["fold"]:
+            found.append(
+                f"gyro.D_OO = {square:g} deg/h/g2: at constant |g| it cannot be told from D_F, D_II and D_SS; set "
+                "fold=true to accept the combinations D_F + γ² D_OO, D_II − D_OO, D_SS − D_OO"
             )
         return found
 
