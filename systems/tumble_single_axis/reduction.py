@@ -324,6 +324,7 @@ def setup_of(
         tilt=bool(options.get("tilt", False)),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
+        polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
         **{n: float(options.get(n, 0.0)) for n in sizes},
     )

@@ -380,11 +380,13 @@ def test_tilt_of_the_input_axis_can_be_estimated() -> None:
     r = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), s)
     found = {c.name: c for c in r.coefficients}
     assert found["ε_IO"].estimate == pytest.approx(math.degrees(eps) * 3600, rel=1e-3) and found["ε_IO"].unit == "″"
-    assert all(abs(c.estimate - c.truth) < 1e-4 for c in r.coefficients if c.truth is not None)
-    assert not [b for b in r.budget if b.source == "input axis towards output axis" and b.coefficient == "D_O"]
+    assert all(abs(c.estimate - c.truth) < 5e-4 for c in r.coefficients if c.truth is not None)  # eps times D
+    size = {b.coefficient: b.contribution for b in r.budget if b.source == "input axis towards output axis"}
+    assert size["D_O"] < 1e-4 * 1.01  # only eps D_I, no rate any more
     loose = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
-    assert any("option tilt" in text for text in loose.warnings)
-    assert abs(loose.coefficients[2].z) < 2
+    assert abs(loose.coefficients[2].z) < 2  # the steps between the mounts are taken for slow noise
+    plain = T.reduction.reduce(T.record(s, truth, noise=white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
+    assert any("option tilt" in text for text in plain.warnings)
 
 
 def test_result_is_whole_and_json() -> None:

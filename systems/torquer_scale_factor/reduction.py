@@ -1,0 +1,267 @@
+"""Scale factor and linearity of a torquer from servo-table rates.  [TEST-TORQUER; eq. A3-1..A3-6 with E48, E49]
+
+For each current i the table follows the gyro's precession over the same angle range with +i and with -i; r_plus and
+r_minus are the magnitudes of its rate:
+
+    omega = (r_plus + r_minus)/2      free of the constant drift  [SF-APP1]
+    K_n = omega/i  (E48: no minus)    K = mean K_n      linearity_n = (K_n - K)/K
+    drift_n = (r_plus - r_minus)/2
+
+Noise: the angle marks have a constant error, so over an angle range Theta the rate has one proportional to i/Theta
+and K_n one proportional to 1/Theta.  Least squares weighs K_n with Theta^2 (alike when no ranges are given), first
+with one constant, then with K_1 + K_3 i^2, the cubic torquer.  Not modelled: heating by the current, drift that
+changes between the two senses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench import units
+from gyrobench.reduction import regression, uncertainty
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH, MA, KU = units.factor("deg/h"), 1e-3, units.factor("deg/h/mA")
+UNIT = "°/h/mA"
+
+
+@dataclass(frozen=True)
+class TorquerSetup:
+    """u_current: relative standard uncertainty of the ammeter.  latitude only for the report.  limits: surface
+    units.
+    """
+
+    u_current: float = 0.0
+    specification: Limits | None = None
+    instrument: str = ""
+    simulated: bool = False
+
+
+def problems(rows: Mapping[str, Array]) -> list[str]:
+    """What is wrong with the rows current (A), rate_plus, rate_minus (rad/s), range_plus, range_minus (rad,
+    optional).
+    """
+    need = ("current", "rate_plus", "rate_minus")
+    missing = [n for n in need if n not in rows]
+    if missing:
+        text = f"column {', '.join(missing)} is missing; each current needs current, rate_plus and rate_minus"
+        if {"rate_plus", "rate_minus"} & set(missing):
+            text += ": one sense alone cannot tell scale factor from drift"
+        return [text]
+    found = []
+    columns = [n for n in (*need, "range_plus", "range_minus") if n in rows]
+    data = {n: np.asarray(rows[n], dtype=float) for n in columns}
+    if len({v.size for v in data.values()}) > 1:
+        return ["columns of different length"]
+    for n, v in data.items():
+        for k in np.flatnonzero(~np.isfinite(v)):
+            found.append(f"row {k + 1}: {n} is no finite number" + (" (both senses are needed)" if "rate" in n else ""))
+    if found:
+        return found
+    i = data["current"]
+    for k in np.flatnonzero(i <= 0.0):
+        found.append(f"row {k + 1}: current {i[k] / MA:g} mA: give the magnitude, larger than zero")
+    for n in ("rate_plus", "rate_minus"):
+        for k in np.flatnonzero(data[n] <= 0.0):
+            found.append(
+                f"row {k + 1}: {n} = {data[n][k] / DPH:g} °/h: give magnitudes; a rate of the wrong sense is a drift "
+                "larger than the precession or crossed wires"
+            )
+    if ("range_plus" in data) != ("range_minus" in data):
+        found.append("range_plus and range_minus belong together: the angle range of each sense")
+    elif "range_plus" in data:
+        a, b = data["range_plus"], data["range_minus"]
+        for k in np.flatnonzero((np.abs(a - b) > 0.01 * np.maximum(np.abs(a), np.abs(b))) | (a <= 0.0) | (b <= 0.0)):
+            found.append(
+                f"row {k + 1}: ranges {math.degrees(a[k]):g}° and {math.degrees(b[k]):g}°: both senses need the same "
+                "angle range, or the drift does not cancel"
+            )
+    if i.size < 3:
+        found.append(f"{i.size} currents: at least 3 are needed for a linearity")
+    elif np.unique(i).size < i.size:
+        found.append("the same current twice: average repeated measurements first")
+    return found
+
+
+def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Result:
+    """Scale factor, linearity and drift of a torquer; raises ReductionError with everything that is wrong."""
+    s = setup or TorquerSetup()
+    wrong = problems(rows)
+    if wrong:
+        raise ReductionError(wrong)
+    i, plus, minus = (np.asarray(rows[n], dtype=float) for n in ("current", "rate_plus", "rate_minus"))
+    theta = np.asarray(rows["range_plus"], dtype=float) if "range_plus" in rows else np.ones_like(i)
+    K_n, half = (plus + minus) / 2.0 / i, (plus - minus) / 2.0
+    n, w = i.size, (theta / theta.max()) ** 2
+    one = np.ones((n, 1))
+    line = regression.least_squares(one, K_n, ("K",), w)
+    full = i.max()
+    curve = np.column_stack([one, (i / full) ** 2])
+    cubic = regression.least_squares(curve, K_n, ("K_1", "K_3"), w)
+    offset = regression.least_squares(one, half, ("drift",), w / (i / full) ** 2)
+    mean = float(K_n.mean())
+    s_mean, dof_mean = _scatter_beside_mean(K_n, w, line)
+    u_mean = s_mean * math.sqrt(float(np.sum(1.0 / w))) / n
+    pooled = math.sqrt((offset.s**2 * (n - 1) + (line.s * full) ** 2 * (n - 1)) / (2 * (n - 1)))
+    u_drift = pooled / math.sqrt(float(np.sum(w / (i / full) ** 2)))
+    k = int(np.argmax(np.abs(K_n - mean)))
+    worst = float((K_n[k] - mean) / mean)
+    u_worst = line.s / math.sqrt(float(w[k])) / mean
+    cubic_size = float(cubic.beta[1] / cubic.beta[0])
+    u_cubic = float(cubic.u[1] / abs(cubic.beta[0]))
+    make = _Maker(s)
+    coefficients = [
+        make("K", "scale factor, mean of the K_n of all currents", UNIT, mean / KU, u_mean / KU, dof_mean, True),
+        make("K_LS", "scale factor, least squares weighted by the angle range", UNIT, float(line.beta[0]) / KU,
+             float(line.u[0]) / KU, n - 1, True),
+        make("K_1", "scale factor at zero current of the cubic torquer", UNIT, float(cubic.beta[0]) / KU,
+             float(cubic.u[0]) / KU, n - 2, True),
+        make("K_3/K_1", f"relative change of the scale factor from 0 to {full / MA:g} mA, as i²", "%",
+             cubic_size * 100.0, u_cubic * 100.0, n - 2),
+        make("linearity", f"largest departure (K_n − K)/K, at {i[k] / MA:g} mA", "%", worst * 100.0, u_worst * 100.0,
+             n - 1),
+        make("drift", "drift along the torqued axis, half the difference of the two senses", "°/h",
+             float(offset.beta[0]) / DPH, u_drift / DPH, 2 * (n - 1)),
+    ]  # fmt: skip
+    f = ((line.s**2 * (n - 1)) - (cubic.s**2 * (n - 2))) / cubic.s**2 if cubic.s > 0.0 else 0.0
+    p = float(special.fdtrc(1, n - 2, max(f, 0.0))) if cubic.s > 0.0 else None
+    seen = p is not None and p < 0.05
+    warnings = []
+    if np.all(half == 0.0):
+        warnings.append(
+            "Both senses have equal rates in every row: computed, not measured; the drift is then no finding."
+        )
+    if "range_plus" not in rows:
+        warnings.append("No angle ranges given: all currents weigh alike in the least squares.")
+    gain = np.vstack([np.full(n, 1.0 / n), line.gain, cubic.gain[0], cubic.gain[1], np.zeros(n), np.zeros(n)])
+    gain[4, :] = -1.0 / n
+    gain[4, k] += 1.0
+    covariance = (gain / w) @ gain.T
+    covariance[5, 5] = 1.0
+    return Result(
+        system="torquer_scale_factor",
+        title="Scale factor and linearity of a torquer",
+        method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
+        sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; 000_791234d3afc34a0c.txt eq. A3-1..A3-6, corrected by E48, E49"],
+        equation='K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n',
+        conventions=[
+            "Positive current makes positive precession: K = ω/i (the book's A3-5 prints a minus that its own table "
+            "does not have).",
+            "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
+            "Noise of K_n is proportional to 1/angle range (constant error of the angle marks).",
+        ],
+        coefficients=coefficients,
+        series=[
+            Series(
+                label="scale factor of each current", x=(i / MA).tolist(), x_name="current", x_unit="mA",
+                y=(K_n / KU).tolist(), fit=(cubic.fitted / KU).tolist(), residual=(cubic.residual / KU).tolist(),
+                y_name="scale factor", y_unit=UNIT, t=np.arange(n, dtype=float).tolist(),
+                shown_fit_x=np.linspace(0.0, full / MA, 101).tolist(),
+                shown_fit_y=((cubic.beta[0] + cubic.beta[1] * np.linspace(0.0, 1.0, 101) ** 2) / KU).tolist(),
+            )
+        ],
+        correlation=regression.correlation(covariance).tolist(),
+        condition=regression.examine(curve * np.sqrt(w)[:, None], ("K_1", "K_3")).condition,
+        rank=2,
+        dof=float(n - 2),
+        noise={"model": "white, K_n with a standard deviation proportional to 1/angle range",
+               "standard deviation of K_n at the widest range / (°/h/mA)": line.s / KU},
+        tests=[
+            Test("cubic term", f, p, "curvature of the torquer",
+                 "the scale factor depends on the current" if seen else "no curvature beyond the scatter")
+        ],
+        residual_std=cubic.s / KU,
+        residual_unit=UNIT,
+        budget=_budget(s, mean, u_mean),
+        tables=[_table(i, plus, minus, K_n, half, mean)],
+        warnings=warnings,
+        summary=[
+            f"Scale factor K = {mean / KU:.3f} °/h/mA from {n} currents, {i.min() / MA:g} to {full / MA:g} mA.",
+            f"Linearity: within {abs(worst) * 100:.3f} %, worst at {i[k] / MA:g} mA.",
+            f"Drift along the axis {coefficients[-1].estimate:.3g} °/h.",
+        ],
+        decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        instrument=s.instrument,
+        simulated=s.simulated,
+    )  # fmt: skip
+
+
+def _scatter_beside_mean(K_n: Array, w: Array, line: regression.Fit) -> tuple[float, int]:
+    """Standard deviation of unit weight from what neither weighted nor plain mean takes up, so that the t of the
+    plain mean is a t; with its degrees of freedom."""
+    if np.ptp(w) < 1e-9:
+        return line.s, line.dof
+    fit = regression.least_squares(np.column_stack([np.ones_like(w), 1.0 / w]), K_n, ("K", "1/w"), w)
+    return fit.s, fit.dof
+
+
+class _Maker:
+    """Coefficients in surface units from an estimate with its type A uncertainty and degrees of freedom."""
+
+    def __init__(self, setup: TorquerSetup) -> None:
+        self.setup = setup
+
+    def __call__(
+        self, name: str, meaning: str, unit: str, value: float, u_a: float, dof: float, scale: bool = False
+    ) -> Coefficient:
+        half_a = float(special.stdtrit(dof, 0.975)) * u_a
+        b = [abs(value) * self.setup.u_current] if scale else []
+        u, U = uncertainty.combine(u_a, half_a, b)
+        limit = (self.setup.specification or {}).get(name)
+        t = value / u_a if u_a > 0.0 else None
+        return Coefficient(
+            name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=U / u if u > 0.0 else uncertainty.NORMAL,
+            interval=(value - U, value + U), t=t,
+            p=float(2.0 * special.stdtr(dof, -abs(t))) if t is not None else None, u_a=u_a, dof=float(dof),
+            limit=limit, verdict=uncertainty.verdict(value, U, limit),
+        )  # fmt: skip
+
+
+def _budget(s: TorquerSetup, mean: float, u_mean: float) -> list[BudgetLine]:
+    a, size = u_mean / KU, mean / KU
+    lines = [
+        BudgetLine("scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", "type A, with the linearity error in it")
+    ]
+    if s.u_current > 0.0:
+        lines.append(BudgetLine("ammeter", s.u_current, "1", size, UNIT, size * s.u_current, UNIT, "K", "relative"))
+    return lines
+
+
+def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: float) -> dict[str, Any]:
+    printed = round(mean / KU, 3)
+    rows = [
+        [float(i[k] / MA), float(plus[k] / DPH), float(minus[k] / DPH), float(K_n[k] / KU),
+         float((K_n[k] - mean) / mean * 100.0), float((K_n[k] / KU - printed) / printed * 100.0), float(half[k] / DPH)]
+        for k in range(i.size)
+    ]  # fmt: skip
+    return {
+        "title": "Scale factor and linearity",
+        "caption": f"Linearity against K = {mean / KU:.6g} and, as in the book, against {printed:.3f} °/h/mA",
+        "columns": ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
+                    "linearity, K rounded / %", "drift / (°/h)"],
+        "rows": rows,
+    }  # fmt: skip
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a record of measured data (columns as windows) with its circumstances as provenance."""
+    options = record.meta.get("options", {})
+    setup = TorquerSetup(
+        u_current=float(options.get("u_current", 0.0)),
+        specification=specification,
+        instrument=str(record.meta.get("instrument", "")),
+    )
+    result = reduce(record.windows, setup)
+    result.provenance = dict(record.meta)
+    return result
