@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+import hashlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +14,17 @@ ROOMS = ("components", "systems", "reports")
 
 class BenchError(Exception):
     """There is no such bench, part or system; the text lists what there is."""
+
+
+class UsageError(Exception):
+    """The user asks for something that does not exist or does not fit; the text says what would."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Names like ``name`` (a misprint), else all there are, as the end of a message."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known) or 'none'}"
 
 
 def standard_folder() -> Path:
@@ -38,17 +52,31 @@ class Bench:
             return Bench(folder.resolve())
         for here in (Path.cwd(), *Path.cwd().parents):
             if all((here / room).is_dir() for room in ROOMS):
-                return Bench(here)
+                return Bench(here.resolve())
         return Bench(standard_folder())
 
     @property
-    def own(self) -> bool:
-        """False for the bench inside an installed wheel, which is not written to."""
-        return self.folder != Path(__file__).parent / "_bench"
+    def packed(self) -> bool:
+        """True for the bench inside an installed wheel, which is not written to."""
+        return self.folder.resolve() == (Path(__file__).parent / "_bench").resolve()
+
+    @property
+    def home(self) -> Path:
+        """Where results go: the bench the user stands in, else the working folder."""
+        here = Path.cwd()
+        return self.folder if not self.packed and here.is_relative_to(self.folder) else here
 
     @property
     def fmus(self) -> Path:
-        return self.folder / "fmus" if self.own else Path.cwd() / "fmus"
+        """FMUs that were built on the way, for a run; those of the packed bench stay out of the user's folders."""
+        if not self.packed:
+            return self.folder / "fmus"
+        return self.cache / f"fmus-{hashlib.sha256(str(self.folder).encode()).hexdigest()[:8]}"
+
+    @property
+    def products(self) -> Path:
+        """What was asked for by name, to be taken elsewhere: FMUs, SSP archives, containers."""
+        return self.home / "fmus"
 
     @property
     def cache(self) -> Path:
@@ -57,7 +85,8 @@ class Bench:
 
     @property
     def out(self) -> Path:
-        return (self.folder if self.own else Path.cwd()) / "reports" / "out"
+        """Records and reports: ``reports/out``."""
+        return self.home / "reports" / "out"
 
     def _listing(self, room: str, file: str) -> dict[str, Path]:
         found: dict[str, Path] = {}
@@ -72,16 +101,23 @@ class Bench:
     def systems(self) -> dict[str, Path]:
         return self._listing("systems", "system.py")
 
+    def specifications(self) -> dict[str, Path]:
+        """Acceptance specifications: name -> file."""
+        found: dict[str, Path] = {}
+        for root in (standard_folder(), self.folder):
+            found.update({f.stem: f for f in sorted((root / "reports" / "specs").glob("*.toml"))})
+        return found
+
     def part_folder(self, name: str) -> Path:
-        """Raises BenchError, naming the parts there are."""
-        found = self.parts()
-        if name not in found:
-            raise BenchError(f"no part {name!r} in {self.folder}; there are: {', '.join(found)}")
-        return found[name]
+        """Raises BenchError, naming the parts that are like it."""
+        return self._folder("part", name, self.parts())
 
     def system_folder(self, name: str) -> Path:
-        """Raises BenchError, naming the systems there are."""
-        found = self.systems()
+        """Raises BenchError, naming the systems that are like it."""
+        return self._folder("system", name, self.systems())
+
+    @staticmethod
+    def _folder(kind: str, name: str, found: dict[str, Path]) -> Path:
         if name not in found:
-            raise BenchError(f"no system {name!r} in {self.folder}; there are: {', '.join(found)}")
+            raise BenchError(f"no {kind} '{name}'; {nearest(name, found)}")
         return found[name]

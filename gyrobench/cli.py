@@ -10,21 +10,37 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import Bench
+from gyrobench.bench import Bench, UsageError
+from gyrobench.explain import explain
 
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="FMI co-simulation bench for inertial instruments: test methods as systems of FMUs, ending in a report.",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Machine-readable output.")]
+System = Annotated[str, typer.Argument(metavar="SYSTEM", help="Name of a system, see gyrobench list.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON on standard output, and nothing else there.")]
 Set = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Option or slot.parameter; may carry a unit.")
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  Repeatable.",
+    ),
 ]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder to write to.")]
+Part = Annotated[
+    list[str] | None, typer.Option("--part", metavar="SLOT=FMU|PART", help="Another part, or an FMU file, in a slot.")
+]
+Map = Annotated[
+    list[str] | None, typer.Option("--map", metavar="SLOT=FILE", help="Names and units of a foreign FMU (.toml).")
+]
+Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0)]
+Spec = Annotated[str | None, typer.Option("--spec", metavar="NAME|FILE", help="Acceptance specification to judge by.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 
 
 class Engine(StrEnum):
@@ -42,225 +58,296 @@ class Form(StrEnum):
     container = "container"
 
 
-class UsageError(Exception):
-    """The command line asks for something that does not exist or does not fit."""
-
-
 def say(text: str = "") -> None:
     typer.echo(text)
 
 
-def pairs(values: list[str] | None, option: str) -> dict[str, str]:
-    """``["a.b=1"]`` -> ``{"a.b": "1"}``.  Raises UsageError for an entry without ``=``."""
-    found = {}
+def pairs(values: list[str] | None, option: str, example: str) -> dict[str, str]:
+    """``["a.b=1"]`` -> ``{"a.b": "1"}``.  Raises UsageError for an entry without ``=`` and for a name given twice."""
+    found: dict[str, str] = {}
     for v in values or []:
-        name, sign, value = v.partition("=")
-        if not sign or not name.strip() or not value.strip():
-            raise UsageError(f"{option} {v}: write NAME=VALUE, for example {option} latitude=45.75deg")
-        found[name.strip()] = value.strip()
+        name, sign, value = (x.strip() for x in v.partition("="))
+        if not (sign and name and value):
+            raise UsageError(f"{option} {v}: write NAME=VALUE, for example {option} {example}")
+        if name in found:
+            raise UsageError(f"{option} {name}: given twice, {found[name]} and {value}")
+        found[name] = value
     return found
+
+
+def settings(values: list[str] | None) -> dict[str, str]:
+    return pairs(values, "--set", "latitude=45.75deg")
+
+
+def swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict[str, str], dict[str, Path]]:
+    """Parts and mapping files by slot.  Raises UsageError for a mapping file that is not there."""
+    parts = pairs(part, "--part", "gyro=vendor.fmu")
+    maps = {k: Path(v) for k, v in pairs(mapping, "--map", "gyro=vendor.toml").items()}
+    for slot, file in maps.items():
+        if not file.is_file():
+            raise UsageError(f"--map {slot}={file}: no such file")
+    return parts, maps
+
+
+def judge(verdict: str, strict: bool) -> None:
+    if strict and verdict == "fail":
+        raise typer.Exit(1)
+
+
+def version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError
+        from importlib.metadata import version as installed
+
+        try:
+            say(f"gyrobench {installed('gyrobench')}")
+        except PackageNotFoundError:
+            say("gyrobench, not installed")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    show_version: Annotated[bool, typer.Option("--version", callback=version, is_eager=True, help="Version.")] = False,
+) -> None:
+    """FMI co-simulation bench for inertial instruments: test methods as systems of FMUs, ending in a report.
+
+    \b
+    Start here:
+      gyrobench list
+      gyrobench show tumble_single_axis
+      gyrobench run tumble_single_axis
+      gyrobench COMMAND --help
+
+    Exit codes: 0 done, 1 a verdict or a validation fails, 2 refused as it was asked for, 3 a run failed,
+    130 interrupted.
+    """
 
 
 @app.command("list")
 def list_command(as_json: Json = False) -> None:
-    """Parts, systems and sockets, with what they are.  Example: gyrobench list --json"""
+    """Parts, systems, sockets, specifications.
+
+    \b
+    Example: gyrobench list
+    """
     from gyrobench.listing import listing
 
     found = listing(Bench.find())
     if as_json:
         say(json.dumps(found, indent=2, ensure_ascii=False))
         return
+    width = max((len(r["name"]) for rows in found.values() for r in rows), default=0)
     for title, rows in found.items():
-        if not rows:
-            continue
-        say(title)
-        width = max(len(r["name"]) for r in rows)
+        if rows:
+            say(title)
         for r in rows:
             say(f"  {r['name']:<{width}}  {r['what']}" + (f"  [{', '.join(r['spec'])}]" if r.get("spec") else ""))
 
 
 @app.command()
 def show(
-    system: Annotated[str, typer.Argument(help="Name of a system.")],
+    system: System,
     values: Set = None,
-    picture: Annotated[Path | None, typer.Option(help="Write the wiring as a picture (.svg).")] = None,
+    part: Part = None,
+    mapping: Map = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw the wiring.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Slots, wiring, execution order, cuts and delays, plan.  Example: gyrobench show tumble_single_axis"""
+    """Wiring, plan and options of a system.
+
+    Slots, wires, execution order, cuts and delays, plan, options; nothing runs.
+
+    \b
+    Example: gyrobench show tumble_single_axis --picture wiring.svg
+    """
     from gyrobench import work
 
-    work.show(system, pairs(values, "--set"), picture, as_json)
+    work.show(system, settings(values), *swaps(part, mapping), picture, as_json)
 
 
 @app.command()
 def build(
-    parts: Annotated[list[str] | None, typer.Argument(help="Names of parts.")] = None,
+    parts: Annotated[list[str] | None, typer.Argument(metavar="[PART]...", help="Names of parts.")] = None,
     every: Annotated[bool, typer.Option("--all", help="Every part of the bench.")] = False,
     target: Annotated[
-        Target, typer.Option(help="native: C, no needs; python: runs where Python runs.")
+        Target, typer.Option(help="native: C, needs nothing where it runs; python: needs Python and numpy there.")
     ] = Target.native,
-    fmi: Annotated[int, typer.Option(help="2 or 3.", min=2, max=3)] = 2,
+    fmi: Annotated[int, typer.Option(metavar="2|3", help="FMI version.", min=2, max=3)] = 2,
     platform: Annotated[
-        list[str] | None, typer.Option(help="linux64, win64, darwin64, aarch64-linux, aarch64-darwin.")
+        list[str] | None,
+        typer.Option(metavar="NAME", help="linux64, win64, darwin64, aarch64-linux, aarch64-darwin.  Repeatable."),
     ] = None,
     out: Out = None,
 ) -> None:
-    """Parts to FMUs.  Example: gyrobench build floated_gyro --target python"""
+    """Builds parts into FMUs.
+
+    \b
+    Example: gyrobench build floated_gyro --target python
+    """
     from gyrobench import packaging
     from gyrobench.packaging.compiler import PLATFORMS
 
     bench = Bench.find()
-    names = list(bench.parts()) if every else list(parts or [])
+    names = list(dict.fromkeys([*(parts or []), *(bench.parts() if every else ())]))
     if not names:
-        raise UsageError(f"name a part, or --all; parts: {', '.join(bench.parts())}")
+        raise UsageError(f"name a part, or say --all; parts: {', '.join(bench.parts())}")
+    for name in names:
+        bench.part_folder(name)
     wrong = [p for p in platform or [] if p not in PLATFORMS]
     if wrong:
         raise UsageError(f"--platform {wrong[0]}: one of {', '.join(PLATFORMS)}")
     for name in names:
-        say(str(packaging.build(name, target.value, fmi, out, bench.folder, tuple(platform or ()))))
+        path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
+        say(str(path))
 
 
 @app.command()
 def run(
-    system: Annotated[str, typer.Argument(help="Name of a system.")],
-    part: Annotated[
-        list[str] | None, typer.Option("--part", metavar="SLOT=FMU|PART", help="Another part in a slot.")
-    ] = None,
-    mapping: Annotated[
-        list[str] | None, typer.Option("--map", metavar="SLOT=FILE", help="Mapping file of a foreign FMU.")
-    ] = None,
+    system: System,
     values: Set = None,
-    seed: Annotated[int, typer.Option(help="Seed of all noise.", min=0)] = 1,
-    engine: Annotated[Engine | None, typer.Option(help="Default: native where a C compiler is.")] = None,
-    step: Annotated[str | None, typer.Option(help="Communication step, for example 1ms.")] = None,
-    out: Out = None,
-    spec: Annotated[Path | None, typer.Option(help="Acceptance specification (.toml).")] = None,
+    part: Part = None,
+    mapping: Map = None,
+    seed: Seed = 1,
+    engine: Annotated[Engine | None, typer.Option(help="Default: native where there is a C compiler.")] = None,
+    step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
     check_step: Annotated[
-        bool, typer.Option("--check-step", help="Halve the step once and report the change.")
+        bool, typer.Option("--check-step", help="Halve the step once, noise off, and report the change.")
     ] = False,
     isolate: Annotated[
-        list[str] | None, typer.Option("--isolate", metavar="SLOT", help="Run this slot in a process of its own.")
+        list[str] | None,
+        typer.Option("--isolate", metavar="SLOT", help="Run this slot in a process of its own.  Repeatable."),
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")] = False,
+    spec: Spec = None,
+    strict: Strict = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace another run in --out.")] = False,
     as_json: Json = False,
 ) -> None:
     """Runs a system: record, reduction, report.
 
-    Example: gyrobench run tumble_single_axis --set latitude=45.75deg --set gyro.D_I=0.9deg/h/g --seed 7
+    \b
+    Examples:
+      gyrobench run tumble_single_axis --set latitude=45.75deg --set gyro.D_I=0.9deg/h/g --seed 7
+      gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml --isolate gyro
+      gyrobench run tumble_single_axis --spec floated_gyro --strict
     """
     from gyrobench import work
 
+    parts, maps = swaps(part, mapping)
     job = work.Job(
         system=system,
-        parts=pairs(part, "--part"),
-        maps={k: Path(v) for k, v in pairs(mapping, "--map").items()},
-        values=pairs(values, "--set"),
+        parts=parts,
+        maps=maps,
+        values=settings(values),
         seed=seed,
         engine=engine.value if engine else None,
         step=step,
         out=out,
+        force=force,
         spec=spec,
         check_step=check_step,
         isolate=tuple(isolate or ()),
     )
-    verdict = work.run(job, as_json)
-    if strict and verdict == "fail":
-        raise typer.Exit(1)
+    judge(work.run(job, as_json), strict)
 
 
 @app.command()
 def reduce(
-    system: Annotated[str, typer.Argument(help="Name of a system.")],
-    data: Annotated[Path | None, typer.Option(help="Measured record (.csv).")] = None,
+    system: System,
+    data: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Measured record.")] = None,
     values: Set = None,
     template: Annotated[
-        bool, typer.Option("--template", help="Print an empty table with the columns that are needed.")
+        bool, typer.Option("--template", help="Print an empty record: columns, units and what to state.")
     ] = False,
-    spec: Annotated[Path | None, typer.Option(help="Acceptance specification (.toml).")] = None,
+    spec: Spec = None,
+    strict: Strict = False,
     out: Out = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Measured data, same mathematics, same report.
+    """Reduces measured data to the same report.
 
-    Example: gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
+    \b
+    Examples:
+      gyrobench reduce tumble_single_axis --template > record.csv
+      gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
     """
     from gyrobench import work
 
     if template:
-        say(work.template(system))
+        say(work.template(system).rstrip("\n"))
         return
     if data is None:
-        raise UsageError("name the record: --data FILE.csv (or --template for its columns)")
-    verdict = work.reduce(system, data, pairs(values, "--set"), spec, out, as_json)
-    if strict and verdict == "fail":
-        raise typer.Exit(1)
+        raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
+    judge(work.reduce(system, data, settings(values), spec, out, as_json), strict)
 
 
 @app.command()
 def report(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
-    spec: Annotated[Path | None, typer.Option(help="Acceptance specification (.toml).")] = None,
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    spec: Spec = None,
+    strict: Strict = False,
+    as_json: Json = False,
 ) -> None:
     """Reduces the record of a run again and writes its report.
 
-    Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d
+    \b
+    Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
     """
     from gyrobench import work
 
-    work.report(run_folder, spec)
+    judge(work.report(folder, spec, as_json), strict)
 
 
 @app.command()
 def compare(
-    runs: Annotated[
-        list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of runs; the first is the baseline.")
-    ],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders; the first is the baseline.")],
     out: Out = None,
+    as_json: Json = False,
 ) -> None:
-    """Reports side by side.  Example: gyrobench compare RUN1 RUN2 --out comparison"""
+    """Lays the reports of several runs side by side.
+
+    \b
+    Example: gyrobench compare reports/out/tumble_single_axis/1a2b3c4d vendor --out comparison
+    """
     from gyrobench import work
 
-    work.compare(runs, out)
+    work.compare(runs, out, as_json)
 
 
 @app.command()
 def export(
-    system: Annotated[str, typer.Argument(help="Name of a system.")],
-    to: Annotated[
-        Form, typer.Option("--to", help="ssp: one archive of FMUs and wiring; container: one FMU.")
-    ] = Form.ssp,
+    system: System,
+    to: Annotated[Form, typer.Option("--to", help="ssp: FMUs and wiring in one archive; container: one FMU.")],
     values: Set = None,
-    part: Annotated[
-        list[str] | None, typer.Option("--part", metavar="SLOT=FMU|PART", help="Another part in a slot.")
-    ] = None,
-    mapping: Annotated[
-        list[str] | None, typer.Option("--map", metavar="SLOT=FILE", help="Mapping file of a foreign FMU.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all noise.", min=0)] = 1,
-    out: Annotated[Path | None, typer.Option("--out", help="File to write.")] = None,
+    part: Part = None,
+    mapping: Map = None,
+    seed: Seed = 1,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")] = None,
 ) -> None:
-    """A system for other tools.  Example: gyrobench export tumble_single_axis --to ssp"""
+    """Writes a system for other tools.
+
+    The plan of the test and all values are in it.
+
+    \b
+    Example: gyrobench export tumble_single_axis --to ssp --set windows=36
+    """
     from gyrobench import work
 
-    say(
-        str(
-            work.export(
-                system,
-                to.value,
-                pairs(values, "--set"),
-                pairs(part, "--part"),
-                {k: Path(v) for k, v in pairs(mapping, "--map").items()},
-                seed,
-                out,
-            )
-        )
-    )
+    say(str(work.export(system, to.value, settings(values), *swaps(part, mapping), seed, out)))
 
 
 @app.command()
-def validate(file: Annotated[str, typer.Argument(help="An FMU, or the name of a part.")]) -> None:
-    """Checks an FMU against FMI, its units, and its reference run.  Example: gyrobench validate fmus/site.fmu"""
+def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An FMU, or the name of a part.")]) -> None:
+    """Checks an FMU.
+
+    Against FMI, its units, and its reference run.
+
+    \b
+    Example: gyrobench validate fmus/site.fmu
+    """
     from gyrobench.packaging.validate import validate as check
 
     problems = check(file)
@@ -273,12 +360,19 @@ def validate(file: Annotated[str, typer.Argument(help="An FMU, or the name of a 
 
 @app.command()
 def init(
-    name: Annotated[Path, typer.Argument(help="Folder to make.")],
+    name: Annotated[Path, typer.Argument(metavar="NAME", help="Folder to make.")],
     copy: Annotated[
-        list[str] | None, typer.Option("--copy", metavar="PART", help="Copy this part to change it.")
+        list[str] | None,
+        typer.Option("--copy", metavar="PART|SYSTEM", help="Copy this part or system to change it.  Repeatable."),
     ] = None,
 ) -> None:
-    """A bench of one's own.  Example: gyrobench init mybench --copy floated_gyro"""
+    """Makes a bench of one's own.
+
+    What it lacks is taken from the standard bench.
+
+    \b
+    Example: gyrobench init mybench --copy floated_gyro
+    """
     from gyrobench.listing import init_bench
 
     for line in init_bench(name, list(copy or [])):
@@ -290,12 +384,14 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except KeyboardInterrupt:
+        print("gyrobench: interrupted", file=sys.stderr)
         sys.exit(130)
-    except Exception as e:
-        if not type(e).__module__.startswith(("gyrobench", "_gyrobench")) and not isinstance(e, OSError):
+    except Exception as error:
+        found = explain(error)
+        if found is None:
             raise
-        print(f"gyrobench: {e}", file=sys.stderr)
-        sys.exit(getattr(e, "exit_code", 2))
+        print(f"gyrobench: {found[0]}", file=sys.stderr)
+        sys.exit(found[1])
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shutil
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -36,16 +37,22 @@ def _entry(name: str, file: Path, base: str) -> dict[str, Any]:
     return {"name": name, "what": what, "spec": spec, "folder": str(file.parent)}
 
 
+def _title(file: Path) -> str:
+    try:
+        return str(tomllib.loads(file.read_text(encoding="utf-8")).get("title", ""))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return f"cannot be read: {error}"
+
+
 def listing(bench: Bench) -> dict[str, list[dict[str, Any]]]:
     """Parts, systems, sockets and acceptance specifications: a list of {name, what, spec, folder} each."""
     from gyrobench.system.sockets import SOCKETS
 
-    specs = sorted((bench.folder / "reports" / "specs").glob("*.toml"))
     return {
         "parts": [_entry(n, f / "model.py", "Component") for n, f in bench.parts().items()],
         "systems": [_entry(n, f / "system.py", "System") for n, f in bench.systems().items()],
-        "sockets": [{"name": s.name, "what": s.what} for s in SOCKETS.values()],
-        "specifications": [{"name": f.stem, "what": str(f)} for f in specs],
+        "sockets": [{"name": s.name, "what": s.meaning} for s in SOCKETS.values()],
+        "specifications": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.specifications().items()],
     }
 
 

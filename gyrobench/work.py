@@ -5,24 +5,32 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import Bench
+from gyrobench import telling
+from gyrobench.bench import Bench, UsageError, nearest
+from gyrobench.folders import claim, keep, labels, run_folder
+from gyrobench.progress import Meter
 from gyrobench.reduction.result import Result
-from gyrobench.system.record import Record
+from gyrobench.system.record import Record, RecordError
 from gyrobench.system.system import System, load_system
 
-Specification = Mapping[str, tuple[float | None, float | None]]
+Limits = Mapping[str, tuple[float | None, float | None]]
 
 
 class WorkError(Exception):
     """Something after the run failed; what was computed before is on disk, and the text says where."""
 
     exit_code = 3
+
+
+class Interrupted(WorkError):
+    """The user stopped a run; what was recorded is on disk."""
+
+    exit_code = 130
 
 
 @dataclass(frozen=True)
@@ -37,43 +45,56 @@ class Job:
     engine: str | None = None
     step: str | None = None
     out: Path | None = None
-    spec: Path | None = None
+    force: bool = False
+    spec: str | None = None
     check_step: bool = False
     isolate: tuple[str, ...] = ()
 
 
-def load(name: str, values: Mapping[str, Any] | None = None) -> System:
-    """A system of the bench at hand, with values set.  Raises BenchError and ValueProblem."""
-    system = load_system(name, Bench.find().system_folder(name).parent.parent)
+def note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def ours(error: BaseException) -> bool:
+    """True for errors that speak to the user, of the bench or of a system's own files."""
+    return type(error).__module__.startswith("gyrobench")
+
+
+def load(name: str, values: Mapping[str, Any] | None = None, step: float | None = None) -> System:
+    """A system of the bench at hand, or of an SSP archive, with values set.  Raises BenchError and ValueProblem."""
+    if name.endswith(".ssp"):
+        from gyrobench.system.ssp_read import read_ssp
+
+        system = read_ssp(Path(name), step or System.step)
+    else:
+        system = load_system(name, Bench.find().folder)
     for key, value in (values or {}).items():
         system.set(key, value)
     return system
 
 
-def _limits(spec: Path | None) -> Specification | None:
-    if spec is None:
-        return None
+def runnable(system: System) -> System:
+    if not system.slots:
+        raise UsageError(
+            f"{system.name} has nothing to run: it reduces measured data (gyrobench reduce {system.name} --template)"
+        )
+    return system
+
+
+def specification(spec: str | None) -> Path | None:
+    """The file of an acceptance specification, given by name or path."""
+    if spec is None or Path(spec).is_file():
+        return Path(spec) if spec else None
+    known = Bench.find().specifications()
+    if spec not in known:
+        raise UsageError(f"--spec {spec}: no such file or specification; {nearest(spec, known)}")
+    return known[spec]
+
+
+def limits_of(spec: Path | None) -> Limits | None:
     from gyrobench.report import load_specification
 
-    return load_specification(spec)
-
-
-def _progress() -> Callable[[Any], None]:
-    """Prints rate and time left on one line, from the second second on."""
-    last = [0.0]
-
-    def show(status: Any) -> None:
-        now = time.monotonic()
-        if status.elapsed < 1.0 or now - last[0] < 0.5:
-            return
-        last[0] = now
-        speed = f"{status.rate / 1e6:.2f} M steps/s"
-        text = f"{100 * status.fraction:5.1f} %  t = {status.time:,.0f} s  {speed}  {status.eta:.0f} s left"
-        end = "\r" if sys.stderr.isatty() else "\n"
-        if sys.stderr.isatty() or int(status.elapsed) % 10 == 0:
-            print(text.ljust(70), end=end, file=sys.stderr, flush=True)
-
-    return show
+    return load_specification(spec) if spec else None
 
 
 # ---------------------------------------------------------------------------------------------- run
@@ -82,34 +103,69 @@ def run(job: Job, as_json: bool = False) -> str:
 
     Raises what Session.run raises, and WorkError when reduction or report fail after the run.
     """
-    from gyrobench.system.run import Session
+    from gyrobench.system.run import RunError, RunInterrupted, Session
     from gyrobench.system.values import parse
 
-    system = load(job.system, job.values)
-    limits = _limits(job.spec)
     step = parse("--step", job.step, "s") if job.step else None
+    system = runnable(load(job.system, job.values, step))
+    spec = specification(job.spec)
+    limits = limits_of(spec)
     system.refuse()
-    bench = Bench.find()
-    with Session(system, job.parts, job.maps, engine=job.engine, isolate=job.isolate, bench=bench.folder) as session:
-        identity = repr((sorted(session.hashes.items()), sorted(job.values.items()), job.seed, step, session.engine))
-        folder = job.out or bench.out / job.system / hashlib.sha256(identity.encode()).hexdigest()[:8]
-        record = session.run({}, job.seed, step, folder, _progress())
+    bench = Bench.find().folder
+    with Session(system, job.parts, job.maps, engine=job.engine, isolate=job.isolate, bench=bench) as session:
+        folder = run_folder(session, system, job.seed, step or system.step, job.maps, job.out, job.force)
+        for text in session.notes:
+            note(f"note: {text}")
         try:
+            with Meter(system.name) as meter:
+                record = session.run({}, job.seed, step, None, meter)
+        except RunError as error:
+            if error.record is None:
+                raise
+            kept = keep(error.record, folder)
+            more = f"{error}\nthe record until then is kept in {kept}"
+            if isinstance(error, RunInterrupted):
+                raise Interrupted(f"{more} (gyrobench report says what it lacks)") from None
+            raise RunError(more, error.record) from None
+        record.save(folder)
+        stopped = ""
+        try:
+            if not reduces(system):
+                return no_reduction(record, as_json)
             result = reduced(system, record, limits)
             if job.check_step:
-                result.step_check = step_check(session, system, result, job.seed, step or system.step)
+                try:
+                    result.step_check = step_check(session, system, result, job.seed, step or system.step)
+                except RunInterrupted as error:
+                    stopped = f"step check {error}; the report is without it"
+            verdict = publish(result, folder, record, as_json, spec)
         except Exception as error:
-            if not type(error).__module__.startswith(("gyrobench", "gyrobench_system")):
+            if not ours(error):
                 raise
-            raise WorkError(f"{error}\nthe record is kept in {folder}") from error
-    return publish(result, folder, record, as_json, job.spec)
+            raise WorkError(
+                f"{error}\nthe record is kept in {folder}; when mended: gyrobench report {folder}"
+            ) from error
+    if stopped:
+        raise Interrupted(stopped)
+    return verdict
 
 
-def reduced(system: System, record: Record, limits: Specification | None) -> Result:
+def reduces(system: System) -> bool:
+    return type(system).reduce is not System.reduce
+
+
+def no_reduction(record: Record, as_json: bool) -> str:
+    print(
+        json.dumps(record.meta, indent=1, ensure_ascii=False) if as_json else f"no reduction; record: {record.folder}"
+    )
+    return telling.NO_VERDICT
+
+
+def reduced(system: System, record: Record, limits: Limits | None) -> Result:
     """The system's own reduction, with the run's circumstances attached."""
     from gyrobench.system.wiring import parse_wires
 
-    result: Result = system.reduce(record, limits)
+    result: Result = system.reduce(record, limits)  # type: ignore[call-arg]
     wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
     result.provenance = {**record.meta, "wires": wires}
     return result
@@ -117,10 +173,15 @@ def reduced(system: System, record: Record, limits: Specification | None) -> Res
 
 def step_check(session: Any, system: System, result: Result, seed: int, step: float) -> dict[str, Any]:
     """Change of each coefficient when the step is halved, noise off, against its standard uncertainty."""
-    quiet = {name: 0.0 for name in getattr(system, "noises", ())}
-    a, b = (system.reduce(session.run(quiet, seed, h, None, _progress()), None) for h in (step, step / 2.0))
+    bindings = session.assembly.bindings
+    known = {f"{slot}.{name}" for slot, binding in bindings.items() for name in binding.parameters}
+    quiet = {name: 0.0 for name in getattr(system, "noises", ()) if name in known}
+    found = []
+    for h in (step, step / 2.0):
+        with Meter(f"step check, {h:g} s") as meter:
+            found.append(system.reduce(session.run(quiet, seed, h, None, meter), None))  # type: ignore[call-arg]
     rows = []
-    for c, x, y in zip(result.coefficients, a.coefficients, b.coefficients, strict=True):
+    for c, x, y in zip(result.coefficients, found[0].coefficients, found[1].coefficients, strict=True):
         change = y.estimate - x.estimate
         rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": abs(change) / c.u})
     return {"step": step, "rows": rows, "worst": max(r["ratio"] for r in rows)}
@@ -132,146 +193,126 @@ def publish(result: Result, folder: Path, record: Record, as_json: bool, spec: P
 
     if spec is not None:
         check_units(spec, {c.name: c.unit for c in result.coefficients})
-    paths = write(result, folder, record=record.channels or None)
-    if as_json:
-        print(paths["json"].read_text(encoding="utf-8"))
-    else:
-        print(answer(result))
-        for path in paths.values():
-            print(path)
+    paths = write(result, folder, record=record.channels or None, bench=Bench.find().folder)
+    show_paths(paths, None if as_json else telling.answer(result))
     return result.verdict
 
 
-def answer(result: Result) -> str:
-    """The coefficient table and the warnings, as text."""
-    from gyrobench.report.numbers import write_number
-
-    head = ["coefficient", "estimate", "u", "95 % interval", "unit"]
-    truth = any(c.truth is not None for c in result.coefficients)
-    head += ["truth", "z"] if truth else []
-    head += ["verdict"] if result.verdict != "no specification given" else []
-    rows = [head]
-    for c in result.coefficients:
-        lo, hi = (write_number(x, c.u).text for x in c.interval)
-        row = [c.name, write_number(c.estimate, c.u).text, write_number(c.u, c.u).text, f"{lo} … {hi}", c.unit]
-        if truth:
-            row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
-        rows.append(row + ([c.verdict] if "verdict" in head else []))
-    widths = [max(len(r[k]) for r in rows) for k in range(len(head))]
-    left = {0, head.index("unit"), len(head) - 1 if "verdict" in head else 0}
-    lines = [
-        "  ".join(x.ljust(w) if k in left else x.rjust(w) for k, (x, w) in enumerate(zip(r, widths, strict=True)))
-        for r in rows
-    ]
-    notes = [f"warning: {w}" for w in result.warnings]
-    if result.step_check:
-        worst = result.step_check["worst"]
-        notes.append(f"step check: halving the step changes no coefficient by more than {worst:.2g} u")
-    return "\n".join([result.title, "", *(x.rstrip() for x in lines), "", *notes, f"verdict: {result.verdict}"])
+def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
+    """A text and the files; without text the JSON file on standard output and the files on standard error."""
+    if text is None:
+        print(paths["json"].read_text(encoding="utf-8").rstrip("\n"))
+    elif text:
+        print(text)
+    for path in paths.values():
+        print(path, file=sys.stderr if text is None else sys.stdout)
 
 
 # ------------------------------------------------------------------------------- measured data, again
-def template(name: str) -> str:
-    """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
-    return str(_measuring(load(name)).template())
-
-
-def _measuring(system: System) -> Any:
-    from gyrobench.cli import UsageError
-
+def measuring(name: str) -> Any:
+    system = load(name)
     if not hasattr(system, "measured"):
         raise UsageError(f"{system.name} has no reduction of measured data")
     return system
 
 
+def template(name: str) -> str:
+    """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
+    return str(measuring(name).template())
+
+
 def reduce(
-    name: str, data: Path, values: Mapping[str, str], spec: Path | None, out: Path | None, as_json: bool = False
+    name: str, data: Path, values: Mapping[str, str], spec: str | None, out: Path | None, as_json: bool = False
 ) -> str:
     """A laboratory's CSV to a report; returns the verdict."""
-    system = _measuring(load(name))
-    limits = _limits(spec)
-    record = system.measured(data, values)
-    result: Result = system.reduce(record, limits)
+    system = measuring(name)
+    file = specification(spec)
+    limits = limits_of(file)
     text = data.read_bytes()
+    record = system.measured(data, values)
     record.meta["data"] = {"file": data.name, "sha256": hashlib.sha256(text).hexdigest()}
+    result: Result = system.reduce(record, limits)
     result.provenance = dict(record.meta)
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
     folder = out or Bench.find().out / name / f"measured-{identity}"
+    claim(folder, {"system": name, "data": {"file": data.name}}, force=False)
     record.save(folder)
-    return publish(result, folder, record, as_json, spec)
+    return publish(result, folder, record, as_json, file)
 
 
-def report(folder: Path, spec: Path | None) -> str:
-    """Reduces a saved record again and writes its report."""
+def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
+    """Reduces a saved record again and writes its report; returns the verdict.
+
+    Raises RecordError when the folder is no run, and WorkError naming what an incomplete record lacks.
+    """
+    if not (folder / "run.json").is_file():
+        raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
     record = Record.load(folder)
     system = load(str(record.meta["system"]))
-    limits = _limits(spec)
-    result = reduced(system, record, limits)
+    file = specification(spec)
+    try:
+        result = reduced(system, record, limits_of(file))
+    except Exception as error:
+        if not ours(error) or record.complete:
+            raise
+        raise WorkError(
+            f"{folder}: the record is not complete, so there is no report\n{telling.lacking(record)}"
+        ) from None
     old = folder / "result.json"
     if old.exists():  # the step check is a run of its own and is kept
         result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
-    return publish(result, folder, record, False, spec)
+    return publish(result, folder, record, as_json, file)
 
 
-def compare(runs: list[Path], out: Path | None) -> None:
+def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
     """Reports of several runs side by side; the first is the baseline."""
     from gyrobench import report as reports
 
+    if len(runs) < 2:
+        raise UsageError("compare needs two runs or more: gyrobench compare RUN RUN")
+    missing = [f for f in runs if not (f / "result.json").is_file()]
+    if missing:
+        raise UsageError(f"{missing[0]}: has no result.json; gyrobench report {missing[0]} makes it")
     results = []
-    for folder in runs:
-        name = folder.name if [f.name for f in runs].count(folder.name) == 1 else str(folder)
+    for folder, name in zip(runs, labels(runs), strict=True):
         results.append((name, reports.load((folder / "result.json").read_text(encoding="utf-8"))))
     digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
     target = out or Bench.find().out / "comparison" / digest
-    for path in reports.compare(results, target).values():
-        print(path)
+    show_paths(reports.compare(results, target, bench=Bench.find().folder), None if as_json else "")
 
 
 # -------------------------------------------------------------------------------------- show, export
-def _assembly(system: System, parts: Mapping[str, str], maps: Mapping[str, Path]) -> Any:
+def show(
+    name: str,
+    values: Mapping[str, str],
+    parts: Mapping[str, str],
+    maps: Mapping[str, Path],
+    picture: Path | None,
+    as_json: bool,
+) -> None:
+    """Slots, wires, order, cuts, delays and plan of a system."""
+    from gyrobench.system.describe import describe
+    from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.parts import resolve_parts
     from gyrobench.system.wiring import assemble
 
+    if picture is not None and picture.suffix != ".svg":
+        raise UsageError(f"--picture {picture}: the drawing is an SVG; write {picture.with_suffix('.svg')}")
+    system = runnable(load(name, values))
     notes: list[str] = []
     paths, _ = resolve_parts(system, parts, "native", Bench.find().folder, notes)
-    return assemble(system, paths, maps)
-
-
-def show(name: str, values: Mapping[str, str], picture: Path | None, as_json: bool) -> None:
-    """Slots, wires, order, cuts, delays and plan of a system."""
-    from gyrobench.system.describe import describe
-
-    found = describe(_assembly(load(name, values), {}, {}))
+    assembly = assemble(system, paths, maps)
+    resolve(assembly, system, 1, defaults(assembly))  # refuses parameters that do not exist
+    found = describe(assembly)
     if picture is not None:
-        from gyrobench.report.drawing import system
+        from gyrobench.report import drawing
 
-        picture.write_text(system(found["order"], found, "system"), encoding="utf-8")
-        print(picture)
-        return
+        picture.write_text(drawing.system(found["order"], found, "system"), encoding="utf-8")
+        note(str(picture)) if as_json else print(picture)
     if as_json:
         print(json.dumps(found, indent=1, ensure_ascii=False))
-        return
-    print(f"{found['title']}  [{', '.join(found['spec'])}]\n")
-    print("slot (execution order)")
-    for slot in found["order"]:
-        s = found["slots"][slot]
-        print(f"  {slot:<12} {s['socket']:<12} {s['model']} {s['version']}  {s['fmu']}")
-    print("wires")
-    for w in found["wires"]:
-        marks = ["(one step delay)"] * w["cut"] + ["(not offered)"] * (not w["connected"])
-        print("  ".join(["", w["wire"], *marks]))
-    print("cuts")
-    for c in found["cuts"]:
-        print(f"  {c}")
-    print(f"plan  ({found['duration']:,.0f} s without the ways, step {found['step']:g} s)")
-    for p in found["plan"]:
-        turning = p["mode"] == "rate"
-        size = f"{p['travel']:.6g} rad at {p['target']:.6g} rad/s" if turning else f"{p['dwell']:g} s"
-        window = f"window {p['window']:.6g} {'rad' if turning else 's'}"
-        print(f"  {p['phase']:>2} {p['label']:<28} {p['mode']:<6} {size}, settle {p['settle']:g} s, {window}")
-    print("options")
-    for key, o in found["options"].items():
-        print(f"  {key:<16} {o['value']!s:<22} {o['unit']:<6} {o['doc']}")
+    elif picture is None:
+        print(telling.system(found))
 
 
 def export(
@@ -284,14 +325,14 @@ def export(
     out: Path | None,
 ) -> Path:
     """The system as an SSP archive or as one container FMU; returns the file."""
-    from gyrobench.system import ssp
+    from gyrobench.system import container, ssp
 
-    system = load(name, values)
-    system.refuse()
     suffix = ".ssp" if to == "ssp" else ".fmu"
-    path = out or Bench.find().fmus / f"{name}{suffix}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    assembly = _assembly(system, parts, maps)
-    if to == "ssp":
-        return Path(ssp.export_ssp(assembly, path, seed))
-    return Path(ssp.export_container(assembly, path, seed))
+    system = runnable(load(name, values))
+    path = out or Bench.find().products / f"{system.name}{suffix}"
+    if path.suffix != suffix:
+        raise UsageError(f"--out {path}: a{'n SSP archive' if to == 'ssp' else ' container FMU'} ends in {suffix}")
+    write = ssp.export_ssp if to == "ssp" else container.export_container
+    for text in write(system, path, parts, maps, None, seed, Bench.find().folder):
+        note(f"note: {text}")
+    return path

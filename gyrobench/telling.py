@@ -1,0 +1,118 @@
+"""What the commands say on a terminal: coefficient tables, systems, what a record lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from gyrobench import units
+from gyrobench.reduction.result import Result
+from gyrobench.system.record import Record
+
+NO_VERDICT = "no specification given"
+SHOWN = {"rad": ("deg", "°"), "rad/s": ("deg/h", "°/h")}
+
+
+def columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> list[str]:
+    """Rows as aligned lines; columns in ``left`` are flush left, the others flush right."""
+    widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))] if rows else []
+    return [
+        indent + "  ".join(x.ljust(w) if k in left else x.rjust(w) for k, (x, w) in enumerate(zip(r, widths))).rstrip()  # noqa: B905
+        for r in rows
+    ]
+
+
+def quantity(value: Any, unit: str) -> str:
+    """A value in SI as a person writes it: angles in degrees, rates in degrees an hour."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, int | float) or unit in ("int", "str"):
+        return str(value)
+    if unit in SHOWN:
+        name, sign = SHOWN[unit]
+        text = f"{units.convert(value, 'rad' if unit == 'rad' else 'rad/s', name):.9g}"
+        return text + sign if sign == "°" else f"{text} {sign}"
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"
+
+
+# ------------------------------------------------------------------------------------------- results
+def answer(result: Result) -> str:
+    """The coefficient table, the warnings and the verdict."""
+    from gyrobench.report.numbers import write_number
+
+    truth = any(c.truth is not None for c in result.coefficients)
+    judged = result.verdict != NO_VERDICT
+    head = ["coefficient", "estimate", "u", "95 % interval", "unit"]
+    rows = [head + (["truth", "z"] if truth else []) + (["verdict"] if judged else [])]
+    for c in result.coefficients:
+        lo, hi = (write_number(x, c.u).text for x in c.interval)
+        row = [c.name, write_number(c.estimate, c.u).text, write_number(c.u, c.u).text, f"{lo} … {hi}", c.unit]
+        if truth:
+            row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
+        rows.append(row + ([c.verdict] if judged else []))
+    notes = [f"warning: {w}" for w in result.warnings]
+    if result.step_check:
+        worst = result.step_check["worst"]
+        notes.append(f"step check: halving the step changes no coefficient by more than {worst:.2g} u")
+    if judged:
+        notes.append(f"verdict: {result.verdict}")
+    left = {0, 4} | ({len(rows[0]) - 1} if judged else set())
+    return "\n".join([result.title, "", *columns(rows, left), "", *notes])
+
+
+# ------------------------------------------------------------------------------------------- systems
+def system(found: Mapping[str, Any]) -> str:
+    """The description of a system (:func:`gyrobench.system.describe.describe`)."""
+    lines = [found["title"] or found["system"]]
+    if found["spec"]:
+        lines[0] += f"  [{', '.join(found['spec'])}]"
+    lines += ["", f"slots, in the order of execution; step {found['step']:g} s"]
+    slots = [(n, found["slots"][n]) for n in found["order"]]
+    lines += columns([[n, s["socket"], f"{s['model']} {s['version']}", s["fmu"]] for n, s in slots], {0, 1, 2, 3}, "  ")
+    lines += ["", "wires"]
+    for w in found["wires"]:
+        marks = ["   (value of the step before)"] * w["cut"] + ["   (not offered by the part)"] * (not w["connected"])
+        lines.append("  " + w["wire"] + "".join(marks))
+    lines += ["", "loops are cut at"] * bool(found["cuts"]) + [f"  {c}" for c in found["cuts"]]
+    if found["plan"]:
+        lines += ["", f"plan: {found['duration']:,.0f} s without the ways between the phases"]
+        rows = [_phase(p) for p in found["plan"]]
+        lines += columns([["", "phase", "mode", "", "settle", "window"], *rows], {1, 2, 3}, "  ")
+    if found["options"]:
+        lines += ["", "options (--set NAME=VALUE), and any slot.parameter of a part"]
+        options = [[k, quantity(o["value"], o["unit"]), o["doc"]] for k, o in found["options"].items()]
+        lines += columns(options, {0, 1, 2}, "  ")
+    return "\n".join([*lines, *(f"note: {n}" for n in found["notes"])])
+
+
+def _phase(p: Mapping[str, Any]) -> list[str]:
+    turning = p["mode"] == "rate"
+    if turning:
+        size = f"{quantity(p['travel'], 'rad')} at {quantity(p['target'], 'rad/s')}"
+    else:
+        where = f" at {quantity(p['target'], 'rad')}" if p["mode"] == "index" else ""
+        size = f"{p['dwell']:g} s{where}"
+    return [
+        str(p["phase"]),
+        p["label"],
+        p["mode"],
+        size,
+        f"{p['settle']:g} s",
+        quantity(p["window"], "rad" if turning else "s"),
+    ]
+
+
+# ------------------------------------------------------------------------------------------- records
+def lacking(record: Record) -> str:
+    """How far an incomplete record goes, phase by phase of its plan."""
+    done = [int(p) for p in record.windows.get("phase", [])]
+    stopped = record.meta.get("stopped_at")
+    lines = [str(record.meta.get("problem", "the run did not end"))]
+    lines += [f"recorded until t = {stopped:,.9g} s"] if isinstance(stopped, int | float) else []
+    for p in record.meta.get("plan", []):
+        length = p["travel"] if p["mode"] == "rate" else p["dwell"]
+        expected = round(length / p["window"]) if p.get("window") else 0
+        have = done.count(p["phase"])
+        if have < expected:
+            lines.append(f"phase {p['phase']} ({p['label']}): {have} of {expected} windows")
+    return "\n".join(f"  - {line}" for line in lines)
