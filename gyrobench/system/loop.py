@@ -63,7 +63,7 @@ class _CtrlC:
 
     def _on(self, number: int, frame: FrameType | None) -> None:
         self.hit = True
-        signal.signal(signal.SIGINT, self.before)
+        signal.signal(signal.SIGINT, self.before or signal.SIG_DFL)
 
     def __exit__(self, *_: object) -> None:
         if self.before is not None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -88,6 +89,17 @@ def read_table(stem: Path) -> dict[str, Array] | None:
     return None
 
 
+def _plain(value: Any) -> Any:
+    """The same without numbers that JSON lacks: an infinite bound or parameter of a foreign FMU becomes text."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
 @dataclass
 class Record:
     """What a run left: windows, channels and where they come from."""
@@ -104,7 +116,7 @@ class Record:
         write_table(folder / "record", self.windows)
         if self.channels:
             write_table(folder / "channels", self.channels)
-        text = json.dumps(self.meta, indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(_plain(self.meta), indent=1, ensure_ascii=False, allow_nan=False)
         _replace(folder / "run.json", lambda p: p.write_text(text + "\n", encoding="utf-8"))
         self.folder = folder
         return folder

@@ -244,3 +244,9 @@ def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, make: M
         run(small, parts={"gyro": make("faulty")}, values={"gyro.fault": 4, "gyro.at": 150, "rebalance.K_p": 0.0})
     assert caught.value.record is not None
     assert not caught.value.record.complete
+
+
+def test_infinite_parameter_does_not_cost_the_record(tmp_path: Path) -> None:
+    record = Record({"mean": np.zeros(1)}, {}, {"parameters": {"gyro.limit": math.inf}, "list": [math.nan]})
+    again = Record.load(record.save(tmp_path))
+    assert again.meta == {"parameters": {"gyro.limit": "inf"}, "list": ["nan"]}
