@@ -1,0 +1,59 @@
+"""The tumble system, prepared once, the foreign FMUs, and the commands called as a user calls them."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from tumbling import NAME
+
+from gyrobench.system.run import Session
+
+
+@pytest.fixture(scope="session")
+def session() -> Iterator[Session]:
+    """The standard parts under the native engine; every run starts afresh."""
+    with Session(NAME) as prepared:
+        yield prepared
+
+
+@pytest.fixture(scope="session")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Builds a foreign FMU of tests/foreign once."""
+    file = Path(__file__).parents[1] / "foreign" / "make.py"
+    spec = importlib.util.spec_from_file_location("foreign_make", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("foreign")
+    done: dict[str, Path] = {}
+
+    def make_once(name: str) -> Path:
+        if name not in done:
+            done[name] = module.make(name, folder)
+        return done[name]
+
+    return make_once
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Runs a gyrobench command: exit code, stdout, stderr.  Anything but a proper exit fails the test."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        from gyrobench.cli import main
+
+        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
