@@ -361,20 +361,3 @@ static void do_step(Part *p, double t, double step) {
     p->n.dirty = 0.0;
     if (!p->failed) finite(p);
 }
-
-/* ------------------------------------------------------------------------------------ saved states */
-typedef struct {
-    char guid[40]; /* a state of another FMU is refused */
-    Numbers n;
-} Saved;
-
-static inline void save(const Numbers *n, char *bytes) {
-    static const char guid[40] = MODEL_GUID;
-    memcpy(bytes, guid, sizeof guid);
-    memcpy(bytes + offsetof(Saved, n), n, sizeof *n);
-}
-
-static inline int saved_here(const void *bytes, size_t size) {
-    static const char guid[40] = MODEL_GUID;
-    return size == sizeof(Saved) && memcmp(bytes, guid, sizeof guid) == 0;
-}

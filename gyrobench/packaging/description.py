@@ -31,8 +31,9 @@ def number(x: float, kind: type) -> str:
     return str(int(x)) if kind is int else repr(x)
 
 
-def _unit(decl_unit: str, derivative: bool) -> str:
-    return (f"{decl_unit}/s" if decl_unit != "1" else "1/s") if derivative else decl_unit
+def unit_name(s: Scalar) -> str:
+    """The unit of a scalar; that of a state derivative is the state's per second."""
+    return f"{s.decl.unit}/s" if s.section == "derivative" else s.decl.unit
 
 
 def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
@@ -55,7 +56,7 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     of_type: dict[str, str] = {}
     derivative = s.section == "derivative"
     if kind == "Real":
-        of_type["unit"] = _unit(d.unit, derivative)
+        of_type["unit"] = unit_name(s)
     if s.section in ("parameter", "input", "state"):
         lo = d.min if d.min is not None else d.above
         hi = d.max if d.max is not None else d.below
@@ -70,8 +71,9 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     ET.SubElement(v, kind, of_type)
 
 
-def _units(root: ET.Element, cls: type[Component]) -> None:
-    used = sorted({_unit(s.decl.unit, s.section == "derivative") for s in cls.layout if s.decl.type is float})
+def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -> None:
+    """The definitions of all units in use, spelled out in base units."""
+    used = sorted({unit_name(s) for s in cls.layout if s.decl.type is float} | set(extra))
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name in used:
         u = ET.SubElement(definitions, "Unit", {"name": name})
@@ -118,7 +120,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     if native:
         files = ET.SubElement(co, "SourceFiles")
         ET.SubElement(files, "File", {"name": "fmi2.c"})
-    _units(root, cls)
+    units(root, cls)
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})

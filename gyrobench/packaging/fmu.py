@@ -18,6 +18,7 @@ from gyrobench.bench import Bench
 from gyrobench.component import Component
 from gyrobench.packaging import compiler, native, python_target
 from gyrobench.packaging.description import model_description
+from gyrobench.packaging.description3 import build_description, model_description3
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
@@ -168,8 +169,7 @@ def build(
         else:
             entries = _python_entries(cls, guid, identifier)
         if fmi == 3:
-            from gyrobench.packaging.description3 import model_description3
-
+            entries["sources/buildDescription.xml"] = build_description(identifier).encode()
             entries["modelDescription.xml"] = model_description3(cls, guid, identifier).encode()
         else:
             entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()

@@ -117,7 +117,6 @@ def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
     headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
     return {
         "model.c": c_source(cls, guid),
-        "core.h": (HERE / "core.h").read_text(encoding="utf-8"),
-        f"fmi{fmi}.c": (HERE / f"fmi{fmi}.c").read_text(encoding="utf-8"),
+        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "instance.h", f"fmi{fmi}.c")},
         **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
     }

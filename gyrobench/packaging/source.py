@@ -16,7 +16,7 @@ KEYWORDS = {
     "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
     "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
     # macros of the C library and of core.h
-    "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA", "HAS",
+    "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA",
     "MODEL_GUID", "N_REFERENCES", "U0", "Y0", "X0", "DX0", "Q0", "N_U", "N_Y", "N_X", "N_Q", "N_PORTS", "N_BOUNDS",
     "NONLINEAR", "RK4_SUBSTEPS", "LARGEST_STEP",
 }  # fmt: skip

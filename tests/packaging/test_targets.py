@@ -75,6 +75,12 @@ def test_fmpy_validates(part: str, target: str, fmu: Callable) -> None:
     assert validate_fmu(str(fmu(part, target))) == []
 
 
+def test_fmpy_validates_fmi3(part: str, fmu: Callable) -> None:
+    path = fmu(part, "native", 3)
+    assert validate_fmu(str(path)) == []
+    assert fmpy.model_description.read_build_description(str(path))
+
+
 def test_description(part: str, target: str, fmu: Callable) -> None:
     """Units known and spelled out, starts, bounds and causalities as declared, structure complete."""
     cls = load_part(part)
@@ -154,7 +160,7 @@ def test_a_state_of_another_part_is_refused(target: str, instance: Callable) -> 
     for one in (lag, noisy):
         one.initialize()
     data = lag.save(lag.get_state())
-    with pytest.raises(InstanceError, match="not a state of this FMU|a state of Lag 1.2.3 is not one of this part"):
+    with pytest.raises(InstanceError, match=r"not a state of this FMU|a state of Lag 1\.2\.3 is not one of this part"):
         noisy.set_state(noisy.load(data))
     noisy.step(0.0, 1e-3)
 

@@ -178,7 +178,7 @@ def test_accepted_and_equal(written: Written, tmp_path: Path) -> None:
 
 
 def strict(cls: type[Component], folder: Path) -> None:
-    for fmi in (2,):
+    for fmi in (2, 3):
         for name, text in native.source_files(cls, "guid", fmi).items():
             (folder / name).write_text(text, encoding="utf-8")
         platform = compiler.this_platform()

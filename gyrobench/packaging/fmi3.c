@@ -1,0 +1,214 @@
+/* FMI 3.0 co-simulation face of a native component.  Compiled as one unit: model.c is generated.
+ *
+ * The variables are scalars with the value references of the FMI 2.0 face; the one after them is the time.
+ */
+#include "model.c"
+
+#include "fmi3Functions.h"
+
+typedef fmi3LogMessageCallback Logger;
+#include "instance.h"
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* of the functions that only say they are not offered */
+#endif
+
+#define NOT_OFFERED(name) { return wrong((Instance *)m, #name ": not offered by this FMU"); }
+
+static void say(Instance *m, const char *message) { m->logger(m->environment, fmi3Error, "logStatusError", message); }
+
+const char *fmi3GetVersion(void) { return fmi3Version; }
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance m, fmi3Boolean on, size_t n, const fmi3String categories[]) {
+    return fmi3OK; /* the reasons of failures are always told */
+}
+
+/* ---------------------------------------------------------------------------------- instantiation */
+static fmi3Instance none(Logger logger, void *environment, const char *why) {
+    if (logger) logger(environment, fmi3Error, "logStatusError", why);
+    return NULL;
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging, fmi3Boolean eventMode, fmi3Boolean earlyReturn,
+                                         const fmi3ValueReference required[], size_t nRequired,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+                                         fmi3IntermediateUpdateCallback update) {
+    if (!token || strcmp(token, MODEL_GUID) != 0) return none(logger, environment, "the instantiation token is not this FMU's");
+    if (nRequired) return none(logger, environment, "no intermediate variables are offered");
+    return new_instance(name, logger, environment);
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback logger) {
+    return none(logger, environment, "only co-simulation is offered");
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                               fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                               fmi3LogMessageCallback logger, fmi3ClockUpdateCallback clock,
+                                               fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock) {
+    return none(logger, environment, "only co-simulation is offered");
+}
+
+void fmi3FreeInstance(fmi3Instance m) { free(m); }
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance m, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+                                       fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
+    ((Instance *)m)->part.n.v.t = startTime;
+    return fmi3OK;
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
+    Instance *m = (Instance *)c;
+    m->part.failed = 0;
+    initialize(&m->part, m->part.n.v.t);
+    return told(m);
+}
+
+fmi3Status fmi3Terminate(fmi3Instance m) { return fmi3OK; }
+fmi3Status fmi3Reset(fmi3Instance m) { reset((Instance *)m); return fmi3OK; }
+fmi3Status fmi3EnterStepMode(fmi3Instance m) { return fmi3OK; }
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance m) { return fmi3OK; }
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance m) { return fmi3OK; }
+
+/* -------------------------------------------------------------------------------------- variables */
+static const char *const counts = "as many values as value references are expected";
+
+#define GETTER(Name, Type, expression)                                                                               \
+    fmi3Status fmi3Get##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, Type out[], size_t n_out) {    \
+        Instance *m = (Instance *)c;                                                                                 \
+        size_t i;                                                                                                    \
+        if (n != n_out) return wrong(m, counts);                                                                     \
+        for (i = 0; i < n; i++) {                                                                                    \
+            double x = m->part.n.v.t;                                                                                \
+            if (vr[i] != (unsigned)N_REFERENCES && get_value(m, vr[i], &x)) return fmi3Error;                        \
+            out[i] = expression;                                                                                     \
+        }                                                                                                            \
+        return told(m);                                                                                              \
+    }
+#define SETTER(Name, Type)                                                                                           \
+    fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const Type in[], size_t n_in) { \
+        Instance *m = (Instance *)c;                                                                                 \
+        size_t i;                                                                                                    \
+        if (n != n_in) return wrong(m, counts);                                                                      \
+        for (i = 0; i < n; i++)                                                                                      \
+            if (set_value(m, vr[i], (double)in[i])) return fmi3Error;                                                \
+        m->part.n.dirty = 1.0;                                                                                       \
+        return fmi3OK;                                                                                               \
+    }
+#define NO_TYPE(Name)                                                                                                \
+    fmi3Status fmi3Get##Name(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3##Name out[], size_t k)    \
+        NOT_OFFERED(fmi3Get##Name)                                                                                   \
+    fmi3Status fmi3Set##Name(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3##Name in[], size_t k) \
+        NOT_OFFERED(fmi3Set##Name)
+
+GETTER(Float64, fmi3Float64, x)
+GETTER(Int32, fmi3Int32, (fmi3Int32)floor(x + 0.5))
+GETTER(Boolean, fmi3Boolean, x != 0.0)
+SETTER(Float64, fmi3Float64)
+SETTER(Int32, fmi3Int32)
+SETTER(Boolean, fmi3Boolean)
+NO_TYPE(Float32)
+NO_TYPE(Int8)
+NO_TYPE(UInt8)
+NO_TYPE(Int16)
+NO_TYPE(UInt16)
+NO_TYPE(UInt32)
+NO_TYPE(Int64)
+NO_TYPE(UInt64)
+NO_TYPE(String)
+
+fmi3Status fmi3GetBinary(fmi3Instance m, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary values[], size_t k)
+    NOT_OFFERED(fmi3GetBinary)
+fmi3Status fmi3SetBinary(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const size_t sizes[],
+                         const fmi3Binary values[], size_t k) NOT_OFFERED(fmi3SetBinary)
+fmi3Status fmi3GetClock(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3Clock values[]) NOT_OFFERED(fmi3GetClock)
+fmi3Status fmi3SetClock(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3Clock values[]) NOT_OFFERED(fmi3SetClock)
+
+/* --------------------------------------------------------------------------------------- stepping */
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean noSetPrior, fmi3Boolean *eventNeeded,
+                      fmi3Boolean *terminate, fmi3Boolean *earlyReturn, fmi3Float64 *lastTime) {
+    const int status = step((Instance *)c, t, h);
+    *eventNeeded = *terminate = *earlyReturn = fmi3False;
+    *lastTime = status ? t : t + h;
+    return status;
+}
+
+/* --------------------------------------------------------------------------- states, derivatives */
+fmi3Status fmi3GetFMUState(fmi3Instance m, fmi3FMUState *state) { return get_state((Instance *)m, state); }
+fmi3Status fmi3SetFMUState(fmi3Instance m, fmi3FMUState state) { return set_state((Instance *)m, state); }
+fmi3Status fmi3FreeFMUState(fmi3Instance m, fmi3FMUState *state) {
+    free(*state);
+    *state = NULL;
+    return fmi3OK;
+}
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance m, fmi3FMUState state, size_t *size) {
+    *size = sizeof(Saved);
+    return fmi3OK;
+}
+fmi3Status fmi3SerializeFMUState(fmi3Instance m, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
+    return save((Instance *)m, state, bytes, size);
+}
+fmi3Status fmi3DeserializeFMUState(fmi3Instance m, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
+    return load((Instance *)m, bytes, size, state);
+}
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance m, const fmi3ValueReference unknown[], size_t n_unknown,
+                                        const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
+                                        size_t n_seed, fmi3Float64 out[], size_t n_out) {
+    if (n_seed != n_known || n_out != n_unknown) return wrong((Instance *)m, counts);
+    return derivative((Instance *)m, unknown, n_unknown, known, n_known, seed, out);
+}
+
+/* ------------------------------------------------------------------------------------ not offered */
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance m, const fmi3ValueReference u[], size_t nu, const fmi3ValueReference k[],
+                                    size_t nk, const fmi3Float64 seed[], size_t ns, fmi3Float64 s[], size_t n)
+    NOT_OFFERED(fmi3GetAdjointDerivative)
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3Int32 orders[],
+                                    fmi3Float64 values[], size_t k) NOT_OFFERED(fmi3GetOutputDerivatives)
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance m, fmi3ValueReference vr, size_t *n)
+    NOT_OFFERED(fmi3GetNumberOfVariableDependencies)
+fmi3Status fmi3GetVariableDependencies(fmi3Instance m, fmi3ValueReference vr, size_t elements[], fmi3ValueReference independents[],
+                                       size_t others[], fmi3DependencyKind kinds[], size_t n)
+    NOT_OFFERED(fmi3GetVariableDependencies)
+
+/* event mode and clocks */
+fmi3Status fmi3EnterEventMode(fmi3Instance m) NOT_OFFERED(fmi3EnterEventMode)
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance m) NOT_OFFERED(fmi3EvaluateDiscreteStates)
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance m, fmi3Boolean *update, fmi3Boolean *terminate, fmi3Boolean *nominals,
+                                    fmi3Boolean *values, fmi3Boolean *timeDefined, fmi3Float64 *time)
+    NOT_OFFERED(fmi3UpdateDiscreteStates)
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3Float64 x[],
+                                  fmi3IntervalQualifier q[]) NOT_OFFERED(fmi3GetIntervalDecimal)
+fmi3Status fmi3GetIntervalFraction(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3UInt64 a[], fmi3UInt64 b[],
+                                   fmi3IntervalQualifier q[]) NOT_OFFERED(fmi3GetIntervalFraction)
+fmi3Status fmi3GetShiftDecimal(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3Float64 x[])
+    NOT_OFFERED(fmi3GetShiftDecimal)
+fmi3Status fmi3GetShiftFraction(fmi3Instance m, const fmi3ValueReference vr[], size_t n, fmi3UInt64 a[], fmi3UInt64 b[])
+    NOT_OFFERED(fmi3GetShiftFraction)
+fmi3Status fmi3SetIntervalDecimal(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3Float64 x[])
+    NOT_OFFERED(fmi3SetIntervalDecimal)
+fmi3Status fmi3SetIntervalFraction(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3UInt64 a[],
+                                   const fmi3UInt64 b[]) NOT_OFFERED(fmi3SetIntervalFraction)
+fmi3Status fmi3SetShiftDecimal(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3Float64 x[])
+    NOT_OFFERED(fmi3SetShiftDecimal)
+fmi3Status fmi3SetShiftFraction(fmi3Instance m, const fmi3ValueReference vr[], size_t n, const fmi3UInt64 a[],
+                                const fmi3UInt64 b[]) NOT_OFFERED(fmi3SetShiftFraction)
+fmi3Status fmi3ActivateModelPartition(fmi3Instance m, fmi3ValueReference clock, fmi3Float64 t)
+    NOT_OFFERED(fmi3ActivateModelPartition)
+
+/* model exchange */
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance m) NOT_OFFERED(fmi3EnterContinuousTimeMode)
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance m, fmi3Boolean noSet, fmi3Boolean *event, fmi3Boolean *terminate)
+    NOT_OFFERED(fmi3CompletedIntegratorStep)
+fmi3Status fmi3SetTime(fmi3Instance m, fmi3Float64 t) NOT_OFFERED(fmi3SetTime)
+fmi3Status fmi3SetContinuousStates(fmi3Instance m, const fmi3Float64 x[], size_t n) NOT_OFFERED(fmi3SetContinuousStates)
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance m, fmi3Float64 x[], size_t n)
+    NOT_OFFERED(fmi3GetContinuousStateDerivatives)
+fmi3Status fmi3GetEventIndicators(fmi3Instance m, fmi3Float64 x[], size_t n) NOT_OFFERED(fmi3GetEventIndicators)
+fmi3Status fmi3GetContinuousStates(fmi3Instance m, fmi3Float64 x[], size_t n) NOT_OFFERED(fmi3GetContinuousStates)
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance m, fmi3Float64 x[], size_t n)
+    NOT_OFFERED(fmi3GetNominalsOfContinuousStates)
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance m, size_t *n) NOT_OFFERED(fmi3GetNumberOfEventIndicators)
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance m, size_t *n) NOT_OFFERED(fmi3GetNumberOfContinuousStates)

@@ -1,0 +1,142 @@
+/* What the FMI 2 and FMI 3 faces share: an instance, its log, values by reference, states, derivatives.
+ *
+ * Included after model.c.  `Logger` is the type of the FMI version's log callback, `say` its call.
+ * The results are FMI status values: 0 OK, 3 error, the same in both versions.
+ */
+#include <stdlib.h>
+
+typedef struct {
+    Part part;
+    Numbers fresh; /* as instantiated, for reset */
+    Logger logger;
+    void *environment;
+} Instance;
+
+static void say(Instance *m, const char *message);
+
+static Instance *new_instance(const char *name, Logger logger, void *environment) {
+    Instance *m = (Instance *)calloc(1, sizeof *m);
+    if (!m) return NULL;
+    snprintf(m->part.name, sizeof m->part.name, "%s", name ? name : "");
+    m->logger = logger;
+    m->environment = environment;
+    memcpy(value(&m->part), starts, N_REFERENCES * sizeof(double));
+    m->part.n.dirty = 1.0;
+    m->fresh = m->part.n;
+    return m;
+}
+
+static void reset(Instance *m) {
+    m->part.n = m->fresh;
+    m->part.failed = 0;
+}
+
+/* --------------------------------------------------------------------------------------- failures */
+static int told(Instance *m) { /* the reason of a failure goes to the caller's log, once */
+    if (!m->part.failed) return 0;
+    if (m->part.failed == 1 && m->logger) say(m, m->part.message);
+    m->part.failed = 2;
+    return 3;
+}
+
+static int wrong(Instance *m, const char *format, ...) { /* a wrong call leaves the instance as it was */
+    const int before = m->part.failed;
+    va_list a;
+    va_start(a, format);
+    m->part.failed = 0;
+    vfail(&m->part, format, a);
+    va_end(a);
+    told(m);
+    m->part.failed = before;
+    return 3;
+}
+
+/* ---------------------------------------------------------------------------------------- values */
+static int missing(Instance *m, unsigned reference) {
+    return wrong(m, "no variable has the value reference %u", reference);
+}
+
+static inline int has(unsigned reference) { return reference < (unsigned)N_REFERENCES; }
+
+static int has_all(Instance *m, const unsigned references[], size_t n) {
+    size_t i;
+    for (i = 0; i < n; i++)
+        if (!has(references[i])) return missing(m, references[i]) == 0;
+    return 1;
+}
+
+static inline int get_value(Instance *m, unsigned reference, double *x) {
+    const int k = (int)reference;
+    if (!has(reference)) return missing(m, reference);
+    if (k >= Y0 && k < Y0 + N_Y) refresh(&m->part);
+    *x = value(&m->part)[k];
+    return 0;
+}
+
+static inline int set_value(Instance *m, unsigned reference, double x) {
+    const int k = (int)reference;
+    if (!has(reference)) return missing(m, reference);
+    if (k < U0 && m->part.n.running != 0.0)
+        return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[k]);
+    value(&m->part)[k] = x;
+    return 0;
+}
+
+static int step(Instance *m, double t, double h) {
+    if (m->part.n.running == 0.0) return wrong(m, "a step before initialization has succeeded");
+    if (m->part.failed) return 3;
+    do_step(&m->part, t, h);
+    return told(m);
+}
+
+/* Derivatives of outputs and state derivatives with respect to inputs, states and parameters. */
+static int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
+                      const double dv[], double out[]) {
+    Vars seed;
+    size_t i;
+    memset(&seed, 0, sizeof seed);
+    if (!has_all(m, unknown, n_unknown) || !has_all(m, known, n_known)) return 3;
+    for (i = 0; i < n_known; i++) ((double *)&seed)[known[i]] = dv[i];
+    flow_d(&m->part, &seed);
+    outputs_d(&m->part, &seed);
+    for (i = 0; i < n_unknown; i++) out[i] = ((double *)&seed)[unknown[i]];
+    return told(m);
+}
+
+/* ---------------------------------------------------------------------------------------- states */
+typedef struct {
+    char guid[40]; /* a state of another FMU is refused */
+    Numbers n;
+} Saved;
+
+static int get_state(Instance *m, void **state) {
+    if (!*state) *state = malloc(sizeof(Numbers));
+    if (!*state) return wrong(m, "out of memory");
+    memcpy(*state, &m->part.n, sizeof(Numbers));
+    return 0;
+}
+
+static int set_state(Instance *m, const void *state) {
+    if (!state) return wrong(m, "no state is given");
+    memcpy(&m->part.n, state, sizeof(Numbers));
+    m->part.failed = 0;
+    return 0;
+}
+
+static int save(Instance *m, const void *state, void *bytes, size_t size) {
+    static const char guid[40] = MODEL_GUID;
+    if (!state || size < sizeof(Saved)) return wrong(m, "a saved state has %u bytes", (unsigned)sizeof(Saved));
+    memcpy(bytes, guid, sizeof guid);
+    memcpy((char *)bytes + offsetof(Saved, n), state, sizeof(Numbers));
+    return 0;
+}
+
+static int load(Instance *m, const void *bytes, size_t size, void **state) {
+    static const char guid[40] = MODEL_GUID;
+    if (size != sizeof(Saved) || memcmp(bytes, guid, sizeof guid) != 0)
+        return wrong(m, "these bytes are not a state of this FMU");
+    if (!*state) *state = malloc(sizeof(Numbers));
+    if (!*state) return wrong(m, "out of memory");
+    memcpy(*state, (const char *)bytes + offsetof(Saved, n), sizeof(Numbers));
+    return 0;
+}
