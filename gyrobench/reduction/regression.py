@@ -53,7 +53,7 @@ def examine(X: Array, names: Sequence[str], tolerance: float = 1e-9) -> Design:
     p = X.shape[1]
     scale = np.linalg.norm(X, axis=0)
     top = float(scale.max(initial=0.0)) or 1.0
-    safe = np.where(scale > tolerance * top, scale, top)
+    safe = np.where(scale > 1e-13 * top, scale, top)  # a column of rounding is a column of zeros
     _, s, vt = np.linalg.svd(X / safe, full_matrices=True)
     s = np.concatenate([s, np.zeros(p - s.size)])
     rank = int(np.sum(s > tolerance * s[0])) if s[0] > 0 else 0

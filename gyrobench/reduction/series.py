@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 Array = NDArray[np.float64]
+NORMAL = 1.959963984540054
 
 
 def stretches(t0: Array, t1: Array, x: Array, tolerance: float = 0.01) -> list[tuple[float, Array]]:
@@ -42,15 +43,14 @@ def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
     return {"lag": [float(k) for k in range(lags + 1)], "rho": rho, "bound": bound}
 
 
-NORMAL = 1.959963984540054
-
-
 def ljung_box(acf: dict[str, list[float]], n: int, lags: int, fitted: int = 0) -> tuple[float, float]:
-    """Q = n (n + 2) sum rho_k^2/(n - k) over ``lags`` and its chi-squared probability, ``fitted`` noise
-    parameters.
+    """Q and its chi-squared probability over ``lags``, with ``fitted`` noise parameters.
+
+    Q = (n + 2)/n sum m_k rho_k^2 with m_k pairs at lag k (taken from the bound), rho_k from :func:`autocorrelation`;
+    without gaps it is n (n + 2) sum r_k^2/(n - k) of the biased r_k.
     """
-    rho = acf["rho"][1 : lags + 1]
-    q = n * (n + 2) * sum(r * r / (n - k) for k, r in enumerate(rho, 1))
+    terms = zip(acf["rho"][1 : lags + 1], acf["bound"][1 : lags + 1], strict=True)
+    q = (n + 2) / n * sum((r * NORMAL / b) ** 2 for r, b in terms if b > 0.0)
     return q, float(special.chdtrc(max(lags - fitted, 1), q))
 
 

@@ -1,0 +1,206 @@
+"""Covariance of window means against a fine sum, whitening against Cholesky, intervals against Monte Carlo."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench import drift
+from gyrobench.reduction import correlated, noise
+from gyrobench.reduction.regression import RegressionError, generalized, least_squares
+
+_spec = importlib.util.spec_from_file_location("coverage_of_tumble", Path(__file__).with_name("coverage.py"))
+assert _spec is not None and _spec.loader is not None
+mc: Any = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(mc)
+
+T0 = np.array([0.0, 10.0, 31.0, 45.0, 45.5])
+T1 = np.array([10.0, 30.0, 40.0, 45.5, 60.0])
+
+
+@pytest.mark.parametrize("tau", [0.3, 7.0, 4e4])
+def test_process_covariance_is_the_double_integral(tau: float) -> None:
+    """cov of two means = double mean of exp(-|t - s|/tau) (Gauss-Legendre off, Simpson-like sum on the diagonal)."""
+    found = noise.process_covariance(T0, T1, tau)
+    x, w = np.polynomial.legendre.leggauss(60)
+    for i in range(5):
+        for j in range(i, 5):
+            if i == j:
+                # |t - s| has density 2 (1 - d/T)/T: one smooth integral
+                T = T1[i] - T0[i]
+                d = T * (x + 1) / 2
+                edges = np.minimum(1.0, 40 * tau / T)  # nothing beyond 40 tau
+                d = d * edges
+                value = float(np.sum(w / 2 * edges * T * 2 * (1 - d / T) / T * np.exp(-d / tau)))
+            else:
+                a, b = (T0[i] + T1[i]) / 2 + (T1[i] - T0[i]) / 2 * x, (T0[j] + T1[j]) / 2 + (T1[j] - T0[j]) / 2 * x
+                value = float(w @ np.exp(-np.abs(b[None, :] - a[:, None]) / tau) @ w) / 4
+            assert found[i, j] == pytest.approx(value, rel=1e-6, abs=1e-9), (i, j)
+            assert found[i, j] == found[j, i]
+
+
+def test_series_of_the_variance_meets_the_formula() -> None:
+    r = np.array([0.9999e-3, 1.0001e-3])
+    assert np.diff(noise.mean_variance(r))[0] == pytest.approx(-2e-7 / 3, rel=1e-3)
+    assert noise.mean_variance(np.array([1e-9]))[0] == pytest.approx(1.0)
+    assert noise.mean_variance(np.array([1e6]))[0] == pytest.approx(2e-6, rel=1e-5)  # 2 tau/T: white seen from afar
+
+
+@pytest.mark.parametrize(("tau", "share"), [(5.0, 0.0), (0.2, 1.0), (20.0, 0.4), (1e5, 0.999), (30.0, 1.0)])
+def test_whitening_is_the_inverse_root_of_the_covariance(tau: float, share: float) -> None:
+    window = float(np.median(T1 - T0))
+    size = noise.mean_variance(np.array([window / tau]))[0]
+    covariance = share * noise.process_covariance(T0, T1, tau) / size + (1 - share) * np.diag(window / (T1 - T0))
+    W, logdet = noise.whiten(T0, T1, np.eye(5), np.array([tau]), np.array([share]))
+    np.testing.assert_allclose(W[:, 0] @ covariance @ W[:, 0].T, np.eye(5), atol=1e-9)
+    assert logdet[0] == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert np.allclose(W[:, 0], np.tril(W[:, 0]))
+
+
+def test_two_windows_by_hand() -> None:
+    """Equal adjacent windows T = tau: a = 1 - 1/e, v = 2/e; correlation a^2/v = 0.5431."""
+    c = noise.process_covariance(np.array([0.0, 1.0]), np.array([1.0, 2.0]), 1.0)
+    assert c[0, 0] == pytest.approx(2 / math.e)
+    assert c[0, 1] == pytest.approx((1 - 1 / math.e) ** 2)
+    assert c[0, 1] / c[0, 0] == pytest.approx(0.5431, abs=1e-4)
+
+
+def test_candidates_are_a_probability() -> None:
+    t0, t1, _ = mc.plan(36, 5)
+    c = noise.cells(t0, t1)
+    assert c.prior.sum() == pytest.approx(1.0) and np.all(c.prior > 0)
+    assert np.all((c.share >= 0) & (c.share <= 1)) and c.share[0] == 0.0
+    assert c.tau.size == 83
+
+
+# ------------------------------------------------------------------------------------------ estimates
+def test_ideal_data_come_back_exactly() -> None:
+    t0, t1, X = mc.plan(72, 10)
+    truth = np.linspace(-1, 1, 9) + 0.05
+    e = correlated.fit(X, X @ truth, drift.terms(9), t0, t1)
+    np.testing.assert_allclose(e.beta, truth, rtol=1e-12)
+    assert np.max(e.u) < 1e-13 and e.warnings == () and e.white == 1.0
+
+
+def test_gain_reproduces_the_design_and_fits_like_generalized_least_squares() -> None:
+    t0, t1, X = mc.plan(36, 5)
+    y = next(mc.samples(t0, t1, 5.0, 1.0, 1, 2))
+    names = drift.terms(9)
+    e = correlated.fit(X, y, names, t0, t1)
+    np.testing.assert_allclose(e.gain @ X, np.eye(9), atol=1e-10)
+    tau, share = e.best
+    window = float(np.median(t1 - t0))
+    R = share * noise.process_covariance(t0, t1, tau) / noise.mean_variance(np.array([window / tau]))[0]
+    R = R + (1 - share) * np.diag(window / (t1 - t0))
+    np.testing.assert_allclose(e.gain @ y, generalized(X, y, names, R).beta, rtol=1e-7)
+
+
+def test_white_noise_gives_nearly_the_ordinary_answer() -> None:
+    t0, t1, X = mc.plan(72, 10)
+    y = X @ np.ones(9) + next(mc.samples(t0, t1, 0.0, 0.0, 1, 4))
+    e, o = correlated.fit(X, y, drift.terms(9), t0, t1), least_squares(X, y, drift.terms(9))
+    assert e.white > 0.8
+    np.testing.assert_allclose(e.beta, o.beta, atol=0.1 * o.u.max())
+    assert np.all((e.u / o.u > 0.9) & (e.u / o.u < 1.5))
+    assert e.density[0] == pytest.approx(o.s * math.sqrt(mc.WINDOW), rel=0.05)
+
+
+def test_parameters_of_the_noise_are_found() -> None:
+    """Mean over records of the likeliest values; correlation time and rms are biased low, as every short record's."""
+    t0, t1, X = mc.plan(72, 10)
+    found = [correlated.fit(X, y, drift.terms(9), t0, t1) for y in mc.samples(t0, t1, 3.0, 1.0, 40, 8)]
+    tau = np.median([e.tau[0] for e in found]) / mc.WINDOW
+    sigma = np.median([e.sigma[0] for e in found])
+    assert 2.0 < tau < 4.5
+    truth = 1 / math.sqrt(noise.mean_variance(np.array([1 / 3.0]))[0])
+    assert sigma == pytest.approx(truth, rel=0.2)
+    held = np.mean([e.tau[1] <= 3.0 * mc.WINDOW <= e.tau[2] for e in found])
+    assert held > 0.75
+
+
+def test_unbounded_correlation_time_is_said() -> None:
+    t0, t1, X = mc.plan(36, 5)
+    y = next(mc.samples(t0, t1, 500.0, 1.0, 1, 3))
+    e = correlated.fit(X, y, drift.terms(9), t0, t1)
+    assert len(e.warnings) == 1 and "not bounded by this record" in e.warnings[0]
+
+
+def test_scale_and_shift_of_data_do_not_matter() -> None:
+    t0, t1, X = mc.plan(36, 5)
+    y = next(mc.samples(t0, t1, 3.0, 0.6, 1, 6))
+    a = correlated.fit(X, y, drift.terms(9), t0, t1)
+    b = correlated.fit(X, 1e-6 * y + X @ np.arange(9.0), drift.terms(9), t0 + 1e5, t1 + 1e5)
+    np.testing.assert_allclose(b.u, 1e-6 * a.u, rtol=1e-5)
+    np.testing.assert_allclose(b.half_width, 1e-6 * a.half_width, rtol=1e-5)
+
+
+def test_degrees_of_freedom_say_the_same_as_the_coverage_factor() -> None:
+    from scipy import stats
+
+    t0, t1, X = mc.plan(36, 5)
+    e = correlated.fit(X, next(mc.samples(t0, t1, 3.0, 1.0, 1, 7)), drift.terms(9), t0, t1)
+    for k, dof in zip(e.half_width / e.u, e.dof, strict=True):
+        assert k == pytest.approx(1.959964 if math.isinf(dof) else stats.t.ppf(0.975, dof), rel=2e-3)
+    assert np.all((e.p >= 0) & (e.p <= 1))
+
+
+def test_refusals() -> None:
+    t0, t1, X = mc.plan(36, 5)
+    y, names = np.zeros(t0.size), drift.terms(9)
+    with pytest.raises(RegressionError, match="finite positive length"):
+        correlated.fit(X, y, names, t0, t0)
+    with pytest.raises(RegressionError, match="overlap or are out of order"):
+        correlated.fit(X, y, names, t0[::-1], t1[::-1])
+    with pytest.raises(RegressionError, match="non-finite"):
+        correlated.fit(X, y + math.nan, names, t0, t1)
+
+
+def test_time_of_a_fit() -> None:
+    """Budget: 30 ms for a record of 164 windows (a tenth of a second where the machine is busy)."""
+    import time
+
+    t0, t1, X = mc.plan(72, 10)
+    y = next(mc.samples(t0, t1, 3.0, 0.5, 1, 1))
+    times = []
+    for _ in range(7):
+        start = time.perf_counter()
+        correlated.fit(X, y, drift.terms(9), t0, t1)
+        times.append(time.perf_counter() - start)
+    assert min(times) < 0.1
+
+
+# ------------------------------------------------------------------------------------------ coverage
+def bounds(runs: int, low: float = 0.93, high: float = 0.97) -> tuple[float, float]:
+    """Observed fractions that a true coverage inside low..high allows (4 standard deviations)."""
+    return low - 4 * math.sqrt(low * (1 - low) / runs), high + 4 * math.sqrt(high * (1 - high) / runs)
+
+
+SLOW = os.environ.get("GYROBENCH_SLOW") == "1"
+
+
+@pytest.mark.parametrize(("turn", "dwell"), [(36, 5), (72, 10)])
+@pytest.mark.parametrize(("tau", "share"), [(0.0, 0.0), (1.0, 1.0), (3.0, 1.0), (8.0, 1.0)])
+def test_intervals_cover(turn: int, dwell: int, tau: float, share: float) -> None:
+    """Nine coefficients, white and Gauss-Markov noise whose parameters the fit estimates itself."""
+    runs = 1000 if SLOW else 250
+    found = mc.coverage(turn, dwell, tau, share, runs, seed=20)
+    low, high = bounds(runs)
+    assert np.all(found >= low), dict(zip(drift.terms(9), found, strict=True))
+    assert np.all(found <= max(high, 1.0 if not SLOW else 0.0)), dict(zip(drift.terms(9), found, strict=True))
+    assert 0.925 < found.mean() < 0.985
+
+
+def test_ordinary_least_squares_does_not_cover() -> None:
+    """Why all this: under Gauss-Markov noise of three windows the ordinary intervals hold the truth half the time."""
+    t0, t1, X = mc.plan(36, 5)
+    hits = np.zeros(9)
+    for e in mc.samples(t0, t1, 3.0, 1.0, 200, 1):
+        fit = least_squares(X, e, drift.terms(9))
+        hits += np.abs(fit.beta) <= fit.half_width()
+    assert hits[0] / 200 < 0.75 and hits.mean() / 200 < 0.85
