@@ -212,6 +212,15 @@ class Session:
             raise RunError(str(problem), record)
         return record
 
+    def _units(self) -> dict[str, str]:
+        """SI units of the recorded channels, as far as their sockets or their FMUs name them."""
+        found = {}
+        for name in self.program.channel.names:
+            slot, bound = self.assembly.output(name)
+            connector = self.assembly.bindings[slot].socket.connector(bound.element.split("[")[0])
+            found[name] = connector.unit if connector is not None and connector.unit else bound.unit
+        return found
+
     def _meta(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
         parts = {}
         for slot, d in self.assembly.descriptions.items():
@@ -236,6 +245,7 @@ class Session:
             "parameters": parameters,
             "changed": [*(f"{s}: part" for s in self.swapped), *system.given],
             "options": dict(system.values),
+            "units": self._units(),
             "plan": system.plan().rows(),
             "versions": dict(_versions()),
             "notes": [*self.notes, *notes, *system.warnings()],
