@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from toybench import HEAD, PARTS, TARGETS, TOYS
+from toybench import FORMS, HEAD, PARTS, TARGETS, TOYS
 
 from gyrobench.component import Component
 from gyrobench.packaging import build, load_part
@@ -18,6 +18,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("part", PARTS)
     if "target" in metafunc.fixturenames:
         metafunc.parametrize("target", TARGETS)
+    if "form" in metafunc.fixturenames:
+        metafunc.parametrize("form", FORMS)
 
 
 @pytest.fixture(scope="session")

@@ -119,7 +119,7 @@ def play(one: Any, r: Reference, rows: range, outputs: list[str]) -> list[list[f
     return got
 
 
-def test_state_and_reset_restore_a_run(part: str, target: str, instance: Callable) -> None:
+def test_state_and_reset_restore_a_run(part: str, form: str, instance: Callable) -> None:
     """From a state in memory, from its bytes in another instance, and after reset: the same bits."""
     r = read_reference(reference_of(part))
     cls = load_part(part)
@@ -132,7 +132,7 @@ def test_state_and_reset_restore_a_run(part: str, target: str, instance: Callabl
         one.set({k: x[0] for k, x in r.inputs.items()})
         one.initialize()
 
-    one = instance(part, target)
+    one = instance(part, form)
     begin(one)
     begun = play(one, r, first, names)
     state = one.get_state()
@@ -143,7 +143,7 @@ def test_state_and_reset_restore_a_run(part: str, target: str, instance: Callabl
     one.set_state(state)
     assert one.save(one.get_state()) == data
 
-    other = instance(part, target, "other")
+    other = instance(part, form, "other")
     begin(other)
     other.set_state(other.load(data))
     assert play(other, r, second, names) == told
@@ -155,8 +155,8 @@ def test_state_and_reset_restore_a_run(part: str, target: str, instance: Callabl
     assert play(one, r, first, names) == begun
 
 
-def test_a_state_of_another_part_is_refused(target: str, instance: Callable) -> None:
-    lag, noisy = (instance(n, target, toy=True) for n in ("lag", "noisy"))
+def test_a_state_of_another_part_is_refused(form: str, instance: Callable) -> None:
+    lag, noisy = (instance(n, form, toy=True) for n in ("lag", "noisy"))
     for one in (lag, noisy):
         one.initialize()
     data = lag.save(lag.get_state())

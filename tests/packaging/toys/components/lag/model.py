@@ -15,7 +15,7 @@ class Lag(Component):
     mix = Parameter([[1.0, 0.5], [0.0, 1.0]], "1", "mixing matrix")
     limit = Parameter(50.0, "1", "limit", min=0.0, max=100.0)
     part_of = Parameter(0.5, "1", "less than one", below=1.0)
-    k = Parameter(2, int, "which column", min=1, max=3)
+    k = Parameter(2, int, "which column", min=1, max=2)
     on = Parameter(True, bool, "noise on")
     wrong = Parameter(0.0, "1", "more than 1 is refused")
     late = Parameter(1e9, "s", "refused after this time")
