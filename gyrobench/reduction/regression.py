@@ -54,7 +54,7 @@ def examine(X: Array, names: Sequence[str], tolerance: float = 1e-9) -> Design:
     scale = np.linalg.norm(X, axis=0)
     top = float(scale.max(initial=0.0)) or 1.0
     safe = np.where(scale > 1e-13 * top, scale, top)  # a column of rounding is a column of zeros
-    _, s, vt = np.linalg.svd(X / safe, full_matrices=True)
+    _, s, vt = np.linalg.svd(np.linalg.qr(X / safe, mode="r"), full_matrices=True)
     s = np.concatenate([s, np.zeros(p - s.size)])
     rank = int(np.sum(s > tolerance * s[0])) if s[0] > 0 else 0
     lost = []
@@ -165,7 +165,7 @@ def _solve(Z: Array, z: Array, X: Array, y: Array, names: Sequence[str], whitene
     n, p = Z.shape
     scale = np.linalg.norm(Z, axis=0)
     q, r = np.linalg.qr(Z / scale)
-    inverse = linalg.solve_triangular(r, np.eye(p)) / scale[:, None]
+    inverse = np.linalg.inv(r) / scale[:, None]
     gain = inverse @ q.T
     beta = gain @ z
     v = z - Z @ beta

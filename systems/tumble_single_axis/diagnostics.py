@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
+RAW = "Ljung-Box, residuals"
 
 
 def plus_minus(c: Coefficient) -> str:
@@ -65,7 +66,7 @@ class Findings:
         self.ideal = self.residual_std * DPH <= 1e-12 * float(np.max(np.abs(self.y)))
         self._tests = self._run_tests()
         for test in self._tests:
-            if test.p is not None and test.p < 0.001:
+            if test.p is not None and test.p < 0.001 and test.name != RAW:  # correlation is allowed for
                 self.warnings.append(f"{test.name}: p = {test.p:.2g}, {test.finding}.")
 
     # ------------------------------------------------------------------------------------------ plots
@@ -158,7 +159,7 @@ class Findings:
             if p < 0.05
             else "no correlation seen"
         )
-        found.append(Test("Ljung-Box, residuals", q, p, f"correlation up to lag {lags}", text))
+        found.append(Test(RAW, q, p, f"correlation up to lag {lags}", text))
         q, p = series.ljung_box(whitened, n, lags, 2 if e.best[1] > 0.0 else 0)
         text = "the noise model leaves some correlation" if p < 0.05 else "the noise model explains the correlation"
         found.append(Test("Ljung-Box, whitened residuals", q, p, "correlation the noise model does not hold", text))

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -124,6 +124,8 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         warnings = []
     found = diagnostics.Findings(setup, phase, turning, y, X, est, book, fits)
     coefficients = [_coefficient(setup, n, j, est, book, effects) for j, n in enumerate(names)]
+    if found.ideal:  # u is rounding: nothing to compare with
+        coefficients = [replace(c, z=None) for c in coefficients]
     warnings += [*est.warnings, *found.warnings]
     if why:
         warnings.append(f"No closed formulas: {why}.")
