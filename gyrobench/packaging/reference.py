@@ -153,6 +153,29 @@ def write_reference(
     return path
 
 
+def compare(reference: Reference, instance: Instance, label: str) -> list[str]:
+    """Repeats a reference run with an instance; returns what differs, in words (empty: bit for bit)."""
+    outputs = list(reference.outputs)
+    table = run(instance, reference, outputs)
+    problems: list[str] = []
+    for j, name in enumerate(outputs):
+        wrong = [k for k, row in enumerate(table) if row[j] != reference.outputs[name][k]]
+        if wrong:
+            k = wrong[0]
+            problems.append(
+                f"{label}: {name} at t = {reference.time[k]:.9g} s is {table[k][j]!r}, not "
+                f"{reference.outputs[name][k]!r} ({len(wrong)} of {len(table)} rows differ)"
+            )
+    return problems
+
+
+def outdated(reference: Reference, names: Mapping[str, Sequence[str]]) -> list[str]:
+    """Says so if a file has other inputs or outputs than the part has now (``names``: section -> FMI names)."""
+    if list(names["input"]) == list(reference.inputs) and list(names["output"]) == list(reference.outputs):
+        return []
+    return [f"reference.csv has other inputs or outputs than {reference.part}: write it again"]
+
+
 def run_reference(
     path: Path, target: str = "plain", *, part: str | type[Component] | None = None, bench: Path | None = None
 ) -> list[str]:
@@ -164,22 +187,11 @@ def run_reference(
     if part is None:
         part, bench = path.parent.name, bench or path.parent.parent.parent
     cls = load_part(part, bench) if isinstance(part, str) else part
-    outputs = [s.name for s in cls.layout if s.section == "output"]
-    inputs = [s.name for s in cls.layout if s.section == "input"]
-    if outputs != list(reference.outputs) or inputs != list(reference.inputs):
-        return [f"{path.name} has other inputs or outputs than {reference.part}: write it again"]
+    old = outdated(reference, {k: [s.name for s in cls.layout if s.section == k] for k in ("input", "output")})
+    if old:
+        return old
     instance = make(part, target, bench=bench)
     try:
-        table = run(instance, reference, outputs)
+        return compare(reference, instance, target)
     finally:
         instance.free()
-    problems: list[str] = []
-    for j, name in enumerate(outputs):
-        wrong = [k for k, row in enumerate(table) if row[j] != reference.outputs[name][k]]
-        if wrong:
-            k = wrong[0]
-            problems.append(
-                f"{target}: {name} at t = {reference.time[k]:.9g} s is {table[k][j]!r}, not "
-                f"{reference.outputs[name][k]!r} ({len(wrong)} of {len(table)} rows differ)"
-            )
-    return problems

@@ -1,0 +1,112 @@
+"""Checks of an FMU, or of a part with everything that is built from it."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, BenchError
+from gyrobench.packaging.compiler import command, this_platform
+from gyrobench.packaging.fmu import build
+from gyrobench.packaging.instance import Fmu, InstanceError, Plain
+from gyrobench.packaging.reference import Reference, compare, outdated, read_reference
+from gyrobench.units import UnitError, unit
+
+
+def validate(what: str | Path, bench: Path | None = None) -> list[str]:
+    """What is wrong with an FMU file, or with a part (by name) in all its targets; empty if nothing is.
+
+    An FMU is checked against the FMI standard (schema, structure, starts, units of the description), for units
+    that gyrobench does not know, and for a binary that runs here.  One that was built from a part of the bench
+    repeats the part's reference run bit for bit.  A foreign FMU is not run.
+
+    Raises BenchError where ``what`` is neither a file nor a part.
+    """
+    path = Path(what)
+    home = Bench.find(bench)
+    if path.is_file():
+        return _file(path, home)
+    if path.suffix == ".fmu" or path.name != str(what):
+        raise BenchError(f"{what}: no such file")
+    return _part(str(what), home)
+
+
+def _part(name: str, home: Bench) -> list[str]:
+    from gyrobench.packaging import load_part
+
+    reference = _reference(name, home)
+    if reference is None:
+        return [f"{name} has no reference.csv beside its model.py"]
+    cls = load_part(name, home.folder)
+    names = {k: [s.name for s in cls.layout if s.section == k] for k in ("input", "output")}
+    problems = outdated(reference, names) or compare(reference, Plain(cls, name), "plain class")
+    targets = [("python", 2)]
+    if command(this_platform()):
+        targets += [("native", 2), ("native", 3)]
+    else:
+        problems.append("no C compiler: the native FMUs of this part were not checked")
+    with tempfile.TemporaryDirectory(prefix="gyrobench-") as out:
+        for target, fmi in targets:
+            file = build(name, target, fmi=fmi, out=Path(out), bench=home.folder)
+            problems += [f"{target} FMU (FMI {fmi}): {p}" for p in _file(file, home)]
+    return problems
+
+
+def _reference(name: str, home: Bench) -> Reference | None:
+    folder = home.parts().get(name)
+    file = folder / "reference.csv" if folder else None
+    return read_reference(file) if file and file.is_file() else None
+
+
+def _file(path: Path, home: Bench) -> list[str]:
+    from fmpy import read_model_description, supported_platforms
+    from fmpy.validation import validate_fmu
+
+    try:
+        problems = [str(p) for p in validate_fmu(str(path))]
+        description = read_model_description(str(path), validate=False)
+    except Exception as error:  # of the archive, of the XML, or FMPy's own
+        return [f"not an FMU that can be read: {error}"]
+    problems += _units(description)
+    if description.coSimulation is None:
+        return [*problems, "no co-simulation: the bench runs co-simulation FMUs only"]
+    here = this_platform()
+    available = supported_platforms(str(path))
+    if here not in available and {"linux64": "x86_64-linux"}.get(here, here) not in available:
+        problems.append(f"no binary for {here}; it has {', '.join(available) or 'none'}")
+    elif description.generationTool == "gyrobench" and not problems:
+        problems += _reference_run(path, description, home)
+    return problems
+
+
+def _units(description: Any) -> list[str]:
+    problems: dict[str, str] = {}
+    for v in description.modelVariables:
+        name = v.unit or (v.declaredType.unit if v.declaredType is not None else None)
+        if name and name not in problems:
+            try:
+                unit(name)
+            except UnitError as error:
+                problems[name] = f"{v.name}: {error}"
+    return list(problems.values())
+
+
+def _reference_run(path: Path, description: Any, home: Bench) -> list[str]:
+    name = description.coSimulation.modelIdentifier
+    reference = _reference(name, home)
+    if reference is None:
+        return []
+    if reference.version != description.version:
+        return [f"{name} {description.version}, but the reference run is that of {reference.version}"]
+    of = {k: [v.name for v in description.modelVariables if v.causality == k] for k in ("input", "output")}
+    problems = outdated(reference, of)
+    if problems:
+        return problems
+    instance = Fmu(path, name)
+    try:
+        return compare(reference, instance, "reference run")
+    except InstanceError as error:
+        return [f"reference run: {error}"]
+    finally:
+        instance.free()

@@ -1,0 +1,86 @@
+"""`gyrobench validate`: what it finds wrong, and that it finds nothing wrong with what we build."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from toybench import TOYS
+
+from gyrobench.bench import BenchError
+from gyrobench.packaging import compiler
+from gyrobench.packaging.reference import write_reference
+from gyrobench.packaging.validate import validate
+
+
+def test_parts_have_no_problems(part: str) -> None:
+    assert validate(part) == []
+
+
+def changed(path: Path, to: Path, edit: Callable[[str], str], drop: str = "nothing") -> Path:
+    """A copy of an FMU with another model description, or without some of its files."""
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(to, "w") as new:
+        for name in old.namelist():
+            if not name.startswith(drop):
+                data = old.read(name)
+                new.writestr(name, edit(data.decode()) if name == "modelDescription.xml" else data)
+    return to
+
+
+def test_an_unknown_unit(fmu: Callable, tmp_path: Path) -> None:
+    """Foreign units are told once each, with the variable and what would do."""
+
+    def edit(text: str) -> str:
+        text = text.replace('Unit name="rad/s2"', 'Unit name="furlong/s2"').replace(
+            'unit="rad/s2"', 'unit="furlong/s2"'
+        )
+        return text.replace('generationTool="gyrobench"', 'generationTool="other"')
+
+    (problem,) = validate(changed(fmu("floated_gyro", "native"), tmp_path / "a.fmu", edit))
+    assert problem.startswith("alpha[1]: unit 'furlong/s2': unknown symbol 'furlong'")
+
+
+def test_a_wrong_structure(fmu: Callable, tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        return re.sub(r"<InitialUnknowns>.*</InitialUnknowns>", "", text, flags=re.S)
+
+    (problem,) = validate(changed(fmu("floated_gyro", "native"), tmp_path / "a.fmu", edit))
+    assert "InitialUnknowns does not contain the expected set" in problem
+
+
+def test_no_binary_for_this_platform(fmu: Callable, tmp_path: Path) -> None:
+    path = changed(fmu("site", "native"), tmp_path / "a.fmu", str, drop="binaries")
+    (problem,) = validate(path)
+    assert problem.startswith(f"no binary for {compiler.this_platform()}; it has")
+
+
+def test_not_an_fmu(tmp_path: Path) -> None:
+    path = tmp_path / "a.fmu"
+    path.write_text("nothing")
+    assert validate(path)[0].startswith("not an FMU that can be read")
+    with pytest.raises(BenchError, match="no such file"):
+        validate(tmp_path / "b.fmu")
+    with pytest.raises(BenchError, match="no part 'nothing'"):
+        validate("nothing")
+
+
+def test_another_run_than_the_reference(tmp_path: Path, fmu: Callable) -> None:
+    """A bench whose reference run was made by another model."""
+    for room in ("components/site", "systems", "reports"):
+        (tmp_path / room).mkdir(parents=True)
+    folder = tmp_path / "components" / "site"
+    (folder / "model.py").write_text(Path(TOYS.parent.parent.parent / "components/site/model.py").read_text())
+    write_reference("site", folder / "reference.csv", bench=tmp_path, rows=5)
+    assert validate("site", tmp_path) == []
+    text = (folder / "model.py").read_text()
+    (folder / "model.py").write_text(text.replace("self.g = self.local_g", "self.g = 2.0 * self.local_g"))
+    problems = validate("site", tmp_path)
+    assert len(problems) == 4  # plain class and three FMUs
+    assert problems[0].startswith("plain class: g at t = 0 s is 19.6")
+    (folder / "model.py").write_text(text.replace('version = "1.0.0"', 'version = "1.1.0"'))
+    assert any("site 1.1.0, but the reference run is that of 1.0.0" in p for p in validate("site", tmp_path))
+    (folder / "reference.csv").unlink()
+    assert validate("site", tmp_path) == ["site has no reference.csv beside its model.py"]
