@@ -5,10 +5,11 @@ import re
 import pytest
 from wired import BENCH
 
+from gyrobench.bench import Bench
 from gyrobench.component import Input, Output, Parameter
 from gyrobench.packaging import load_part
 
-PARTS = ("site", "sequencer", "table_rate", "floated_gyro", "rebalance_analog", "sampler")
+PARTS = sorted(Bench(BENCH).parts())
 
 
 @pytest.mark.parametrize("name", PARTS)

@@ -1,0 +1,220 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.math import clip, exp, fabs, pi, sqrt
+
+DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
+IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+
+class Gyro2dof(Component):
+    """Free two-degree-of-freedom gyro with two pickoffs and two torquers.  [GYRO-DYN-2DOF, GYRO-STATIC-2DOF]
+
+    Axes x, y, z are outer gimbal axis, inner gimbal axis, spin (H along +z), those of the mount: v_gyro = mount v_case.
+    psi = angles of the rotor axis against the case, small; each torquer precesses the rotor about the OTHER axis:
+
+        psi_x' = -omega_x + omega_z psi_y + omega_dx + k_y i_y (1 + k2_y i_y + k3_y i_y2)
+        psi_y' = -omega_y - omega_z psi_x + omega_dy + k_x i_x (1 + k2_x i_x + k3_x i_x2)
+        u_x = -K_sg_x psi_x + noise,  u_y = -K_sg_y psi_y + noise,  limited to +-u_max
+
+    Wiring rule: the torquer that nulls u_x acts about y and is fed by i_y, that of u_y is fed by i_x.  u is the angle
+    of the case against the rotor (the spec's K psi with its sign turned), so that a rebalance or a servo of positive
+    gain closes the loop, as with floated_gyro.  In its steady state psi = 0 and, exactly,
+
+        k_y i_y (1 + ...) = omega_x - omega_dx,     k_x i_x (1 + ...) = omega_y - omega_dy             [spec d1, 4.1]
+
+    Drift of channel c = x, y in precession sign, (X, Y, Z) = -f/g0 along x, y, z, g0 = 9.80665 m/s2   [2-29..2-46]
+
+        omega_dc = Dc_0 + Dc_x X + Dc_y Y + Dc_z Z + Dc_xx X2 + Dc_yy Y2 + Dc_zz Z2 + Dc_xy X Y + Dc_yz Y Z + Dc_xz X Z
+                   + turn-on constant + Gauss-Markov + white
+
+    Dx_x = -m l_z/H is of the torque about the inner axis, Dy_y of that about the outer axis: it contains the outer
+    gimbal, so the two differ (u_zy and u_zx of the book).  `terms_x`, `terms_y` say which model is meant; a coefficient
+    outside it must be 0.  x channel: 8 = 0, x, z, xx, zz, xy, yz, xz; 9 = 8 + y; 10 = 9 + yy.  y channel: the same with
+    x and y exchanged.  Gauss-Markov and noise as in floated_gyro, each channel its own.
+
+    Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses at once).  p, q = inertial rates of the rotor axis:
+
+        J_x p' = -H q - C_x (p - omega_x) + M_x,     M_x = +H (omega_dy + k_x i_x (1 + ...))
+        J_y q' = +H p - C_y (q - omega_y) + M_y,     M_y = -H (omega_dx + k_y i_y (1 + ...))
+        psi_x' = p - omega_x + omega_z psi_y,        psi_y' = q - omega_y - omega_z psi_x
+
+    undamped frequency H / sqrt(J_x J_y).  p and q are inertial: an angular acceleration of the case is no input.
+
+    Not modelled: reaction of the torques on the mount, gimbal angles beyond the small, gimbal stops, torquer axis
+    error, the share of omega_z in the angular momentum, ageing and temperature, vibration, hysteresis, warm-up.
+    Source: 000_791234d3afc34a0c.txt ch. 2 and 3 (wiring rule of 3.6); the dynamics are the spec's own minimal model.
+    """
+
+    version = "1.0.0"
+
+    K_sg_x = Parameter(10.0, "V/rad", "gain of the x pickoff", above=0.0)
+    K_sg_y = Parameter(10.0, "V/rad", "gain of the y pickoff", above=0.0)
+    u_max = Parameter(0.1, "V", "saturation of the pickoffs", above=0.0)
+    k_x = Parameter(17.227e3 * DEG_H, "rad/s/A", "scale factor of the torquer about x (17.227 deg/h/mA)", above=0.0)
+    k_y = Parameter(17.180e3 * DEG_H, "rad/s/A", "scale factor of the torquer about y (17.180 deg/h/mA)", above=0.0)
+    k2_x = Parameter(0.0, "1/A", "nonlinearity of the torquer about x, relative, even in the rate")
+    k3_x = Parameter(0.0, "1/A2", "nonlinearity of the torquer about x, relative, odd in the rate")
+    k2_y = Parameter(0.0, "1/A", "nonlinearity of the torquer about y, relative, even in the rate")
+    k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
+    mount = Parameter(IDENTITY, "1", "rows: gyro axes x, y, z in case axes")
+
+    H = Parameter(0.2, "N.m.s", "spin angular momentum (used with nutation only)", above=0.0)
+    J_x = Parameter(0.0, "kg.m2", "inertia of rotor and both gimbals about x; 0: no nutation", min=0.0)
+    J_y = Parameter(0.0, "kg.m2", "inertia of rotor and inner gimbal about y; 0: no nutation", min=0.0)
+    C_x = Parameter(0.0, "N.m.s/rad", "damping about x, rotor against case (with nutation)", min=0.0)
+    C_y = Parameter(0.0, "N.m.s/rad", "damping about y, rotor against case (with nutation)", min=0.0)
+
+    terms_x = Parameter(9, int, "terms of the x channel: 8, 9 or 10")
+    Dx_0 = Parameter(-0.3 * DEG_H, "rad/s", "x channel, constant drift (-0.3 deg/h)")
+    Dx_x = Parameter(-0.9 * DEG_H, "rad/s", "x channel, per g0 along x, mass unbalance along z (-0.9 deg/h/g)")
+    Dx_y = Parameter(0.1 * DEG_H, "rad/s", "x channel, per g0 along y, empirical (0.1 deg/h/g)")
+    Dx_z = Parameter(-0.7 * DEG_H, "rad/s", "x channel, per g0 along z, mass unbalance along x (-0.7 deg/h/g)")
+    Dx_xx = Parameter(-0.05 * DEG_H, "rad/s", "x channel, per g0 squared along x (-0.05 deg/h/g2)")
+    Dx_yy = Parameter(0.0, "rad/s", "x channel, per g0 squared along y, empirical")
+    Dx_zz = Parameter(0.04 * DEG_H, "rad/s", "x channel, per g0 squared along z (0.04 deg/h/g2)")
+    Dx_xy = Parameter(-0.03 * DEG_H, "rad/s", "x channel, per g0 squared, x and y (-0.03 deg/h/g2)")
+    Dx_yz = Parameter(-0.02 * DEG_H, "rad/s", "x channel, per g0 squared, y and z (-0.02 deg/h/g2)")
+    Dx_xz = Parameter(-0.15 * DEG_H, "rad/s", "x channel, per g0 squared, anisoelasticity (-0.15 deg/h/g2)")
+
+    terms_y = Parameter(9, int, "terms of the y channel: 8, 9 or 10")
+    Dy_0 = Parameter(0.4 * DEG_H, "rad/s", "y channel, constant drift (0.4 deg/h)")
+    Dy_x = Parameter(-0.08 * DEG_H, "rad/s", "y channel, per g0 along x, empirical (-0.08 deg/h/g)")
+    Dy_y = Parameter(-1.0 * DEG_H, "rad/s", "y channel, per g0 along y, unbalance with outer gimbal (-1 deg/h/g)")
+    Dy_z = Parameter(0.8 * DEG_H, "rad/s", "y channel, per g0 along z, mass unbalance along y (0.8 deg/h/g)")
+    Dy_xx = Parameter(0.0, "rad/s", "y channel, per g0 squared along x, empirical")
+    Dy_yy = Parameter(-0.03 * DEG_H, "rad/s", "y channel, per g0 squared along y (-0.03 deg/h/g2)")
+    Dy_zz = Parameter(0.03 * DEG_H, "rad/s", "y channel, per g0 squared along z (0.03 deg/h/g2)")
+    Dy_xy = Parameter(-0.05 * DEG_H, "rad/s", "y channel, per g0 squared, x and y (-0.05 deg/h/g2)")
+    Dy_yz = Parameter(-0.12 * DEG_H, "rad/s", "y channel, per g0 squared, anisoelasticity (-0.12 deg/h/g2)")
+    Dy_xz = Parameter(-0.02 * DEG_H, "rad/s", "y channel, per g0 squared, x and z (-0.02 deg/h/g2)")
+
+    turn_on_x = Noise(0.0, "rad/s", "rms of the turn-on drift of the x channel, one value a run", per="start")
+    turn_on_y = Noise(0.0, "rad/s", "rms of the turn-on drift of the y channel, one value a run", per="start")
+    markov_x = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift, x channel (0.002 deg/h)", per="step")
+    markov_y = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift, y channel (0.002 deg/h)", per="step")
+    markov_tau = Parameter(300.0, "s", "correlation time of the Gauss-Markov drifts", above=0.0)
+    white_x = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density, x channel (0.0178 deg/h/sqrt(Hz))")
+    white_y = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density, y channel (0.0178 deg/h/sqrt(Hz))")
+    pickoff_x = Noise(5e-8, "V/sqrt(Hz)", "noise density of the x pickoff")
+    pickoff_y = Noise(5e-8, "V/sqrt(Hz)", "noise density of the y pickoff")
+
+    omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
+    f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
+    i_x = Input(0.0, "A", "current of the torquer about x (nulls u_y)")
+    i_y = Input(0.0, "A", "current of the torquer about y (nulls u_x)")
+
+    u_x = Output("V", "x pickoff: case against rotor about x")
+    u_y = Output("V", "y pickoff: case against rotor about y")
+    drift_x = Output("rad/s", "drift rate omega_dx, precession sign")
+    drift_y = Output("rad/s", "drift rate omega_dy, precession sign")
+    saturated = Output("1", "1 while a pickoff is saturated")
+
+    psi_x = State(0.0, "rad", "angle of the rotor axis against the case about x")
+    psi_y = State(0.0, "rad", "angle of the rotor axis against the case about y")
+    p = State(0.0, "rad/s", "inertial rate of the rotor axis about x (with nutation)")
+    q = State(0.0, "rad/s", "inertial rate of the rotor axis about y (with nutation)")
+
+    wander_x = Discrete(0.0, "rad/s", "Gauss-Markov drift, x channel")
+    wander_y = Discrete(0.0, "rad/s", "Gauss-Markov drift, y channel")
+    decay = Discrete(0.0, "1", "decay in one internal step")
+    fresh = Discrete(0.0, "1", "size of the innovation")
+    h_last = Discrete(0.0, "s", "internal step they were made for")
+    per_g = Discrete(0.0, "s2/m", "-1 / g0")
+
+    def start(self) -> None:
+        n = self.terms_x
+        self.refuse(
+            not (n == 8.0 or n == 9.0 or n == 10.0),
+            "terms_x = {terms_x} is no static model of a channel: it must be 8, 9 or 10",
+        )
+        self.refuse(n < 9.0 and self.Dx_y != 0.0, "Dx_y must be 0 with terms_x = {terms_x} (from 9 on)")
+        self.refuse(n < 10.0 and self.Dx_yy != 0.0, "Dx_yy must be 0 with terms_x = {terms_x} (from 10 on)")
+        n = self.terms_y
+        self.refuse(
+            not (n == 8.0 or n == 9.0 or n == 10.0),
+            "terms_y = {terms_y} is no static model of a channel: it must be 8, 9 or 10",
+        )
+        self.refuse(n < 9.0 and self.Dy_x != 0.0, "Dy_x must be 0 with terms_y = {terms_y} (from 9 on)")
+        self.refuse(n < 10.0 and self.Dy_xx != 0.0, "Dy_xx must be 0 with terms_y = {terms_y} (from 10 on)")
+        self.refuse(
+            (self.J_x > 0.0) != (self.J_y > 0.0),
+            "J_x = {J_x} and J_y = {J_y} kg.m2: give both (nutation) or neither",
+        )
+        self.refuse(
+            self.J_x == 0.0 and (self.C_x > 0.0 or self.C_y > 0.0),
+            "C_x and C_y must be 0 without nutation (J_x = J_y = 0)",
+        )
+        for i in range(3):
+            for j in range(3):
+                dot = 0.0 if i != j else -1.0
+                for m in range(3):
+                    dot = dot + self.mount[i][m] * self.mount[j][m]
+                self.refuse(
+                    fabs(dot) > 1e-9,
+                    "mount is no rotation: its rows must be unit vectors at right angles, to 1e-9",
+                )
+        det = self.mount[0][0] * (self.mount[1][1] * self.mount[2][2] - self.mount[1][2] * self.mount[2][1])
+        det = det - self.mount[0][1] * (self.mount[1][0] * self.mount[2][2] - self.mount[1][2] * self.mount[2][0])
+        det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
+        self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
+        self.per_g = -1.0 / 9.80665
+        self.wander_x = self.noise.markov_x
+        self.wander_y = self.noise.markov_y
+        self.h_last = 0.0
+
+    def static_x(self, x, y, z):
+        along_x = self.Dx_x + self.Dx_xx * x + self.Dx_xy * y + self.Dx_xz * z
+        along_y = self.Dx_y + self.Dx_yy * y + self.Dx_yz * z
+        along_z = self.Dx_z + self.Dx_zz * z
+        return self.Dx_0 + along_x * x + along_y * y + along_z * z
+
+    def static_y(self, x, y, z):
+        along_x = self.Dy_x + self.Dy_xx * x + self.Dy_xy * y + self.Dy_xz * z
+        along_y = self.Dy_y + self.Dy_yy * y + self.Dy_yz * z
+        along_z = self.Dy_z + self.Dy_zz * z
+        return self.Dy_0 + along_x * x + along_y * y + along_z * z
+
+    def flow(self) -> None:
+        w = [0.0, 0.0, 0.0]
+        g = [0.0, 0.0, 0.0]
+        for j in range(3):
+            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
+            w[j] = row + self.mount[j][2] * self.omega[2]
+            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
+            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
+        drift_x = self.static_x(g[0], g[1], g[2]) + self.noise.turn_on_x + self.wander_x + self.noise.white_x
+        drift_y = self.static_y(g[0], g[1], g[2]) + self.noise.turn_on_y + self.wander_y + self.noise.white_y
+        rate_x = drift_x + self.k_y * self.i_y * (1.0 + self.k2_y * self.i_y + self.k3_y * self.i_y * self.i_y)
+        rate_y = drift_y + self.k_x * self.i_x * (1.0 + self.k2_x * self.i_x + self.k3_x * self.i_x * self.i_x)
+        self.der.p = 0.0
+        self.der.q = 0.0
+        if self.J_x > 0.0:
+            self.der.p = (self.H * (rate_y - self.q) - self.C_x * (self.p - w[0])) / self.J_x
+            self.der.q = (self.H * (self.p - rate_x) - self.C_y * (self.q - w[1])) / self.J_y
+            rate_x = self.p
+            rate_y = self.q
+        self.der.psi_x = rate_x - w[0] + w[2] * self.psi_y
+        self.der.psi_y = rate_y - w[1] - w[2] * self.psi_x
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if self.h != self.h_last:
+            self.decay = exp(-self.h / self.markov_tau)
+            self.fresh = sqrt(1.0 - self.decay * self.decay)
+            self.h_last = self.h
+        self.wander_x = self.decay * self.wander_x + self.fresh * self.noise.markov_x
+        self.wander_y = self.decay * self.wander_y + self.fresh * self.noise.markov_y
+
+    def outputs(self) -> None:
+        g = [0.0, 0.0, 0.0]
+        for j in range(3):
+            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
+            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
+        self.drift_x = self.static_x(g[0], g[1], g[2]) + self.noise.turn_on_x + self.wander_x + self.noise.white_x
+        self.drift_y = self.static_y(g[0], g[1], g[2]) + self.noise.turn_on_y + self.wander_y + self.noise.white_y
+        wish_x = -self.K_sg_x * self.psi_x + self.noise.pickoff_x
+        wish_y = -self.K_sg_y * self.psi_y + self.noise.pickoff_y
+        self.u_x = clip(wish_x, -self.u_max, self.u_max)
+        self.u_y = clip(wish_y, -self.u_max, self.u_max)
+        self.saturated = 1.0 if self.u_x != wish_x or self.u_y != wish_y else 0.0

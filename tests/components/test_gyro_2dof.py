@@ -1,0 +1,354 @@
+"""Wiring rule, steady state of both loops, nutation against closed forms, the static model, and the random drift."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+from wired import BENCH, DEG_H, RebalanceAnalog, Wired
+
+from gyrobench.component import PartError
+from gyrobench.packaging import load_part
+
+Gyro2dof = load_part("gyro_2dof", BENCH)
+H = 1e-3
+G0 = 9.80665
+W = 7.2921159e-5
+TERMS = ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")
+QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
+NO_DRIFT = {f"D{c}_{n}": 0.0 for c in "xy" for n in TERMS}
+STILL = {**QUIET, **NO_DRIFT}
+INPUTS = ("omega", "f", "i_x", "i_y")
+
+
+def started(**parameters):
+    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
+    part = Gyro2dof(**parameters)
+    for key, x in inputs.items():
+        setattr(part, key, x)
+    part.initialize()
+    return part
+
+
+def looped(late=False, **parameters):
+    """The gyro and two rebalances: u_x feeds i_y, u_y feeds i_x."""
+    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
+    parts = {
+        "gyro": Gyro2dof(**{**QUIET, **parameters}),
+        "about_y": RebalanceAnalog(meter=0.0),
+        "about_x": RebalanceAnalog(meter=0.0),
+    }
+    for key, x in inputs.items():
+        setattr(parts["gyro"], key, x)
+    wires = [
+        ("gyro.u_x", "about_y.u"),
+        ("about_y.i", "gyro.i_y"),
+        ("gyro.u_y", "about_x.u"),
+        ("about_x.i", "gyro.i_x"),
+    ]
+    return Wired(parts, list(parts), wires, late)
+
+
+def settled(seconds=5.0, **parameters):
+    pair = looped(**parameters)
+    for _ in range(round(seconds / H)):
+        pair.step(H)
+    return pair.parts["gyro"]
+
+
+def drift(part, channel, f):
+    """omega_d by a sum over the names of the coefficients."""
+    v = dict(zip("xyz", -np.asarray(f) / G0, strict=True))
+    return sum(getattr(part, f"D{channel}_{n}") * math.prod(v[a] for a in n if a != "0") for n in TERMS)
+
+
+# ------------------------------------------------------------------------------------- signs and wiring
+def test_signs_of_the_free_rotor():
+    """The rotor stays in space: +omega_x leaves the case ahead of it, u_x > 0; +i_y precesses it along +x."""
+    part = started(**STILL, omega=[2e-4, 0.0, 0.0])
+    for k in range(100):
+        part.do_step(k * H, H)
+    assert (part.psi_x, part.psi_y) == (pytest.approx(-2e-5, rel=1e-12), 0.0)
+    assert (part.u_x, part.u_y) == (pytest.approx(2e-4, rel=1e-12), 0.0)
+    part = started(**STILL, i_y=1e-3, i_x=-2e-3)
+    for k in range(100):
+        part.do_step(k * H, H)
+    assert part.psi_x == pytest.approx(1e-4 * 17.180e3 * DEG_H, rel=1e-12)
+    assert part.psi_y == pytest.approx(-2e-4 * 17.227e3 * DEG_H, rel=1e-12)
+
+
+# the first step sees omega_z = 0 (`late`): the exponential step then treats the coupling by Euler's rule
+@pytest.mark.parametrize("w_z, late, bound", [(0.5, False, 1e-5), (0.01, True, 1e-5), (0.5, True, 5e-4)])
+def test_a_rotor_fixed_in_space_seen_from_a_turning_case(w_z, late, bound):
+    """The README's numbers: the rotor axis n' = -omega x n in case axes, psi = (-n_y, n_x), over 1 s."""
+    w = np.array([2e-3, -1e-3, w_z])
+    part = started(**STILL)
+    if late:
+        part.do_step(-H, H)
+    part.omega = w.tolist()
+    for k in range(1000):
+        part.do_step(k * H, H)
+    n = Rotation.from_rotvec(-w).apply([0.0, 0.0, 1.0])
+    tight = solve_ivp(lambda _, n: -np.cross(w, n), (0.0, 1.0), [0.0, 0.0, 1.0], "DOP853", rtol=1e-12, atol=1e-14)
+    assert n == pytest.approx(tight.y[:, -1], abs=1e-11)
+    error = max(abs(part.psi_x + n[1]), abs(part.psi_y - n[0])) / math.hypot(n[0], n[1])
+    print(f"omega_z = {w_z}, late {late}: relative error {error:.2g}")
+    assert error < bound
+
+
+def test_steady_state_is_the_measurement_equation():
+    """k_y i_y = omega_x - omega_dx and k_x i_x = omega_y - omega_dy, to the last digits, all terms and a mount."""
+    rng = np.random.default_rng(5)
+    mount = Rotation.random(random_state=4).as_matrix()
+    w, f = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 5.0
+    g = settled(
+        mount=mount.tolist(), omega=w.tolist(), f=f.tolist(), terms_x=10, terms_y=10, Dx_yy=DEG_H, Dy_xx=-2.0 * DEG_H
+    )
+    seen_w, seen_f = mount @ w, mount @ f
+    assert g.k_y * g.i_y == pytest.approx(seen_w[0] - drift(g, "x", seen_f), rel=1e-12)
+    assert g.k_x * g.i_x == pytest.approx(seen_w[1] - drift(g, "y", seen_f), rel=1e-12)
+    assert max(abs(g.psi_x), abs(g.psi_y)) < 1e-17
+
+
+E, N, U = np.eye(3)
+POSITIONS = [(E, N), (N, -E), (-E, -N), (-N, E), (U, E), (-E, U), (-U, -E), (E, -U)]  # x, y in (E, N, U)
+
+
+@pytest.mark.parametrize("position", range(1, 9))
+def test_eight_positions_of_the_book(position):
+    """The table of spec d1, 4.2 written out; y channel: R_x, u_zx, u_y; x channel: R_y, u_zy, u_x; at 1 g0."""
+    R_x, R_y, u_x, u_y, u_zx, u_zy = (v * DEG_H for v in (0.3, -0.5, 1.1, 0.9, -0.6, 0.8))
+    latitude = math.radians(45.75)
+    wc, ws = W * math.cos(latitude), W * math.sin(latitude)
+    x_current = {
+        1: -R_x + wc + u_y,
+        2: -R_x + u_y,
+        3: -R_x - wc + u_y,
+        4: -R_x + u_y,
+        5: -R_x,
+        6: -R_x + ws - u_zx,
+        7: -R_x,
+        8: -R_x - ws + u_zx,
+    }
+    y_current = {
+        1: R_y + u_x,
+        2: R_y + wc + u_x,
+        3: R_y + u_x,
+        4: R_y - wc + u_x,
+        5: R_y + ws - u_zy,
+        6: R_y,
+        7: R_y - ws + u_zy,
+        8: R_y,
+    }
+    x, y = POSITIONS[position - 1]
+    attitude = np.array([x, y, np.cross(x, y)])
+    coefficients = {"Dy_0": R_x, "Dy_y": -u_zx, "Dy_z": u_y, "Dx_0": -R_y, "Dx_x": -u_zy, "Dx_z": u_x}
+    omega, f = attitude @ [0.0, wc, ws], attitude @ [0.0, 0.0, G0]
+    g = settled(2.5, **{**NO_DRIFT, **coefficients}, omega=omega.tolist(), f=f.tolist())
+    assert g.k_x * g.i_x == pytest.approx(x_current[position], abs=1e-10 * W)
+    assert g.k_y * g.i_y == pytest.approx(y_current[position], abs=1e-10 * W)
+
+
+def test_torquer_nonlinearity_and_unequal_scale_factors():
+    g = settled(**NO_DRIFT, omega=[1e-3, -2e-3, 0.0], k_x=0.08, k_y=0.1, k2_x=0.4, k3_x=30.0, k2_y=-0.3, k3_y=7.0)
+    assert 0.1 * g.i_y * (1 - 0.3 * g.i_y + 7.0 * g.i_y * g.i_y) == pytest.approx(1e-3, rel=1e-12)
+    assert 0.08 * g.i_x * (1 + 0.4 * g.i_x + 30.0 * g.i_x * g.i_x) == pytest.approx(-2e-3, rel=1e-12)
+    assert abs(0.08 * g.i_x / -2e-3 - 1.0) > 2e-3
+
+
+@pytest.mark.parametrize("h, stable", [(1e-3, True), (5e-3, True), (3e-2, False)])
+def test_loop_with_one_more_step_of_delay(h, stable):
+    """K_sg k K_p = 100 1/s: with a step of delay psi+ = psi - 0.1 psi(before) ... is stable, at 30 ms it is not."""
+    pair = looped(late=True, **NO_DRIFT, omega=[1e-6, -1e-6, 0.0])
+    for part in pair.parts.values():
+        part.step = 1.0
+    for _ in range(round(2.0 / h)):
+        pair.step(h)
+    g = pair.parts["gyro"]
+    assert (max(abs(g.psi_x), abs(g.psi_y)) < 1e-9) is stable
+
+
+# --------------------------------------------------------------------------------------------- nutation
+NUTATION = {"J_x": 2e-4, "J_y": 1e-4, "C_x": 0.02, "C_y": 0.03}
+
+
+def test_nutation_after_a_step_of_current():
+    """Equal inertias, no damping: p + j q = Omega (1 - exp(j n t)), n = H / J, Omega = k_y i_y."""
+    part = started(**STILL, J_x=1e-4, J_y=1e-4, i_y=1e-3)
+    n, rate = 0.2 / 1e-4, 1e-3 * 17.180e3 * DEG_H
+    for k in range(200):
+        part.do_step(k * H, H)
+        t = (k + 1) * H
+        wanted = rate * (1.0 - np.exp(1j * n * t))
+        angle = rate * (t + (1.0 - np.exp(1j * n * t)) / (1j * n))
+        assert abs(complex(part.p, part.q) - wanted) < 1e-12 * rate
+        assert abs(complex(part.psi_x, part.psi_y) - angle) < 1e-12 * rate * 0.2
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3, 5e-3])
+def test_linear_gyro_is_exact_for_held_inputs(h):
+    """Unequal inertias, damping, a turning case: states from expm of the extended matrix."""
+    w_z, (jx, jy, cx, cy), spin = 0.3, NUTATION.values(), 0.2
+    part = started(**STILL, **NUTATION, omega=[0.0, 0.0, w_z], step=1.0)
+    a = np.zeros((8, 8))  # psi_x, psi_y, p, q; held: rate_x, rate_y, omega_x, omega_y
+    a[0, [1, 2, 6]] = w_z, 1.0, -1.0
+    a[1, [0, 3, 7]] = -w_z, 1.0, -1.0
+    a[2, [2, 3, 5, 6]] = -cx / jx, -spin / jx, spin / jx, cx / jx
+    a[3, [2, 3, 4, 7]] = spin / jy, -cy / jy, -spin / jy, cy / jy
+    m = expm(h * a)[:4]
+    rng = np.random.default_rng(2)
+    x, worst = np.zeros(4), 0.0
+    for k in range(300):
+        w, i = rng.normal(size=2) * 1e-3, rng.normal(size=2) * 1e-2
+        part.omega = [*w.tolist(), w_z]
+        part.i_x, part.i_y = i.tolist()
+        part.do_step(k * h, h)
+        x = m @ [*x, part.k_y * i[1], part.k_x * i[0], *w]
+        found = np.array([part.psi_x, part.psi_y, part.p, part.q])
+        worst = max(worst, *(abs(found - x)[:2] / abs(x[:2]).max()), *(abs(found - x)[2:] / abs(x[2:]).max()))
+    print(f"h = {h}: {worst:.1g}")
+    assert worst < 1e-11
+
+
+def test_loops_with_nutation():
+    """Damped nutation: stable, and the steady state is the same.  Undamped: the loops drive it, as theory has it."""
+    f = [3.0, -4.0, 5.0]
+    g = settled(J_x=1e-4, J_y=1e-4, C_x=0.05, C_y=0.05, omega=[1e-4, -2e-4, 3e-4], f=f)
+    assert g.k_y * g.i_y == pytest.approx(1e-4 - drift(g, "x", f), rel=1e-12)
+    assert g.k_x * g.i_x == pytest.approx(-2e-4 - drift(g, "y", f), rel=1e-12)
+    assert abs(g.p - 1e-4) < 1e-15 and abs(g.q + 2e-4) < 1e-15
+    # one complex equation: s3 = j n (s2 + 100 s + 1000), n = H / J; its root near j n grows with about 100 1/s
+    n = 0.2 / 1e-4
+    growth = max(np.roots([1.0, -1j * n, -100j * n, -1000j * n]).real)
+    pair = looped(**NO_DRIFT, J_x=1e-4, J_y=1e-4, k_x=0.08338795, k_y=0.08338795, omega=[1e-10, 0.0, 0.0])
+    rates = []
+    for _ in range(4000):
+        pair.step(5e-5)
+        rates.append(math.hypot(pair.parts["gyro"].p, pair.parts["gyro"].q))
+    assert math.log(rates[-1] / rates[1999]) / 0.1 == pytest.approx(growth, rel=0.05)
+
+
+def test_no_nutation_is_the_limit_of_small_inertia():
+    given = {"f": [3.0, -4.0, 5.0], "omega": [1e-4, -2e-4, 1e-2], "i_x": 1e-3, "i_y": -2e-3}
+    slow, fast = started(**QUIET, **given), started(**QUIET, **given, J_x=1e-8, J_y=1e-8)
+    for part in (slow, fast):
+        for k in range(100):
+            part.do_step(k * H, H)
+    assert [fast.psi_x, fast.psi_y] == pytest.approx([slow.psi_x, slow.psi_y], rel=1e-5)
+
+
+# ---------------------------------------------------------------------------------------- static model
+def test_every_coefficient_multiplies_its_product():
+    rng = np.random.default_rng(8)
+    some = {name: rng.normal() * DEG_H for name in NO_DRIFT}
+    part = started(**QUIET, **some, terms_x=10, terms_y=10)
+    for _ in range(10):
+        part.f = (rng.normal(size=3) * 10.0).tolist()
+        part._dirty = True
+        for c in "xy":
+            assert part.get(f"drift_{c}") == pytest.approx(drift(part, c, part.f), rel=1e-12)
+
+
+def test_pickoffs_saturate():
+    for omega, wanted in (([0.5, 0.0, 0.0], (0.1, 0.0)), ([0.0, -0.5, 0.0], (0.0, -0.1))):
+        part = started(**STILL, omega=omega)
+        assert part.saturated == 0.0
+        part.do_step(0.0, 0.1)
+        assert (part.u_x, part.u_y, part.saturated) == (*wanted, 1.0)
+
+
+# --------------------------------------------------------------------------------------- random drift
+def record(part, n, h, names):
+    out = np.empty((n, len(names)))
+    for k in range(n):
+        part.do_step(k * h, h)
+        out[k] = [getattr(part, name) for name in names]
+    return out.T
+
+
+@pytest.mark.parametrize("h", [1e-3, 4e-3])
+@pytest.mark.parametrize("port, names", [("white", ("drift_x", "drift_y")), ("pickoff", ("u_x", "u_y"))])
+def test_noise_density_per_channel(port, names, h):
+    n = 12_000
+    sizes = 3e-7, 5e-7
+    part = started(**{**STILL, f"{port}_x": sizes[0], f"{port}_y": sizes[1]}, step=1.0)
+    x = record(part, n, h, names)
+    if port == "pickoff":  # the psi of this case stay 0: u is the noise alone
+        assert part.psi_x == part.psi_y == 0.0
+    for row, size in zip(x, sizes, strict=True):
+        assert row.var() == pytest.approx(size**2 / h, rel=5 * math.sqrt(2 / n))
+        means = row.reshape(-1, 40).mean(axis=1)
+        assert means.var() == pytest.approx(size**2 / (40 * h), rel=5 * math.sqrt(2 / len(means)))
+    assert abs(np.corrcoef(x)[0, 1]) < 5 / math.sqrt(n)
+
+
+def test_gauss_markov_per_channel():
+    tau, n, h = 1.0, 16_000, 0.1
+    part = started(**{**STILL, "markov_x": 2e-8, "markov_y": 3e-8, "markov_tau": tau})
+    part.step = 1.0
+    x = record(part, n, h, ("drift_x", "drift_y"))
+    independent = n * h / (2 * tau)
+    for row, rms in zip(x, (2e-8, 3e-8), strict=True):
+        assert row.var() == pytest.approx(rms**2, rel=5 * math.sqrt(2 / independent))
+        for lag in (0.5, 1.0, 2.0):
+            k = round(lag / h)
+            assert np.mean(row[k:] * row[:-k]) / rms**2 == pytest.approx(
+                math.exp(-lag / tau), abs=5 * math.sqrt(2 / independent)
+            )
+    assert abs(np.corrcoef(x)[0, 1]) < 5 / math.sqrt(independent)
+
+
+def test_random_drift_at_the_start():
+    first, constant = [], []
+    for seed in range(1500):
+        part = started(**{**STILL, "markov_x": 1e-8, "markov_y": 2e-8, "seed": seed})
+        first.append([part.drift_x, part.drift_y])
+        part = started(**{**STILL, "turn_on_x": 3e-8, "turn_on_y": 5e-8, "seed": seed})
+        constant.append([part.drift_x, part.drift_y])
+    spread = 5 / math.sqrt(2 * 1500)
+    assert np.std(first, axis=0) == pytest.approx([1e-8, 2e-8], rel=spread)
+    assert np.std(constant, axis=0) == pytest.approx([3e-8, 5e-8], rel=spread)
+    assert abs(np.corrcoef(np.transpose(constant))[0, 1]) < 5 / math.sqrt(1500)
+    before = part.drift_x, part.drift_y
+    record(part, 50, H, ("drift_x",))
+    assert (part.drift_x, part.drift_y) == before
+
+
+# ------------------------------------------------------------------------------------------- refusals
+@pytest.mark.parametrize("channel, second", [("x", "y"), ("y", "x")])
+def test_term_sets(channel, second):
+    linear, square = f"D{channel}_{second}", f"D{channel}_{second}{second}"
+    terms = f"terms_{channel}"
+    inside = {name: DEG_H for name in NO_DRIFT if name[1] == channel and name not in (linear, square)}
+    started(**{**NO_DRIFT, **inside, terms: 8})
+    started(**{**NO_DRIFT, **inside, linear: DEG_H, terms: 9})
+    started(**{**NO_DRIFT, **inside, linear: DEG_H, square: DEG_H, terms: 10})
+    with pytest.raises(PartError, match=f"{linear} must be 0 with {terms} = 8"):
+        started(**{**NO_DRIFT, **inside, linear: DEG_H, terms: 8})
+    with pytest.raises(PartError, match=f"{square} must be 0 with {terms} = 9"):
+        started(**{**NO_DRIFT, **inside, square: DEG_H, terms: 9})
+
+
+@pytest.mark.parametrize(
+    "parameters, message",
+    [
+        ({"terms_x": 5}, "terms_x = 5 is no static model of a channel: it must be 8, 9 or 10"),
+        ({"terms_y": 11}, "terms_y = 11 is no static model of a channel"),
+        ({"J_x": 1e-4}, "J_x = 0.0001 and J_y = 0 kg.m2: give both"),
+        ({"C_y": 1e-4}, "C_x and C_y must be 0 without nutation"),
+        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is no rotation"),
+        ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
+        ({"H": 0.0}, "H = 0 N.m.s must be > 0"),
+        ({"J_x": -1.0}, "J_x = -1 kg.m2 must be >= 0"),
+        ({"k_x": 0.0}, "k_x = 0 rad/s/A must be > 0"),
+        ({"K_sg_y": -1.0}, "K_sg_y = -1 V/rad must be > 0"),
+        ({"u_max": 0.0}, "u_max = 0 V must be > 0"),
+        ({"markov_tau": 0.0}, "markov_tau = 0 s must be > 0"),
+        ({"white_y": -1.0}, r"white_y = -1 rad/s/sqrt\(Hz\) must be >= 0"),
+    ],
+)
+def test_refuses(parameters, message):
+    with pytest.raises(PartError, match=message):
+        started(**parameters)
