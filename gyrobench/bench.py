@@ -23,8 +23,14 @@ class UsageError(Exception):
 def nearest(name: str, known: Iterable[str]) -> str:
     """Names like ``name`` (a misprint), else all there are, as the end of a message."""
     known = list(known)
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or [k for k in known if name and name in k]
     return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known) or 'none'}"
+
+
+def short(path: Path) -> str:
+    """A path from the working folder, where it lies in it."""
+    path = path.resolve()
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 
 def standard_folder() -> Path:

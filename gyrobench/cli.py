@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import Bench, UsageError
+from gyrobench.bench import Bench, UsageError, short
 from gyrobench.explain import explain
 
 app = typer.Typer(
@@ -168,7 +168,7 @@ def show(
 
 @app.command()
 def build(
-    parts: Annotated[list[str] | None, typer.Argument(metavar="[PART]...", help="Names of parts.")] = None,
+    parts: Annotated[list[str] | None, typer.Argument(metavar="PART", help="Names of parts.")] = None,
     every: Annotated[bool, typer.Option("--all", help="Every part of the bench.")] = False,
     target: Annotated[
         Target, typer.Option(help="native: C, needs nothing where it runs; python: needs Python and numpy there.")
@@ -199,7 +199,7 @@ def build(
         raise UsageError(f"--platform {wrong[0]}: one of {', '.join(PLATFORMS)}")
     for name in names:
         path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
-        say(str(path))
+        say(short(path))
 
 
 @app.command()
@@ -336,7 +336,7 @@ def export(
     """
     from gyrobench import work
 
-    say(str(work.export(system, to.value, settings(values), *swaps(part, mapping), seed, out)))
+    say(short(work.export(system, to.value, settings(values), *swaps(part, mapping), seed, out)))
 
 
 @app.command()
@@ -350,7 +350,7 @@ def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An F
     """
     from gyrobench.packaging.validate import validate as check
 
-    problems = check(file)
+    problems = check(file, Bench.find().folder)
     for p in problems:
         say(p)
     if problems:

@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import ROOMS, Bench, BenchError
+from gyrobench.bench import ROOMS, Bench, BenchError, nearest
 
 
 def _class_text(file: Path, base: str) -> tuple[str, dict[str, Any]]:
@@ -59,29 +59,43 @@ def listing(bench: Bench) -> dict[str, list[dict[str, Any]]]:
 README = """# {name}
 
 A bench for gyrobench: parts in `components/`, systems in `systems/`, acceptance specifications in
-`reports/specs/`. What is not here is taken from the standard bench; a part or system of the same name
-stands in for the standard one.
+`reports/specs/`, templates of reports in `reports/templates/`. What is not here is taken from the standard
+bench; a part, system, specification or template of the same name stands in for the standard one.
 
     gyrobench list
+    gyrobench build --all
     gyrobench run tumble_single_axis
+
+Records and reports go to `reports/out/<system>/<id>/`, built FMUs to `fmus/`.
 """
 
 
 def init_bench(folder: Path, copies: list[str]) -> list[str]:
-    """Makes the rooms of a new bench and copies parts into it; returns what was made, a line each.
+    """Makes the rooms of a new bench and copies parts and systems into it; returns what was made, a line each.
 
-    Raises BenchError if the folder exists and is not empty, or a part does not exist.
+    Raises BenchError if the folder exists and is not empty, or there is no such part or system.
     """
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BenchError(f"{folder} exists and is not empty: choose another name")
-    standard = Bench.find()
-    sources = {name: standard.part_folder(name) for name in copies}
+    bench = Bench.find()
+    parts, systems = bench.parts(), bench.systems()
+    for name in copies:
+        if name not in parts and name not in systems:
+            raise BenchError(f"--copy {name}: no such part or system; {nearest(name, [*parts, *systems])}")
     for room in (*ROOMS, "fmus"):
         (folder / room).mkdir(parents=True, exist_ok=True)
-    (folder / "README.md").write_text(README.format(name=folder.name), encoding="utf-8")
-    (folder / ".gitignore").write_text("fmus/*.fmu\nreports/out/\n", encoding="utf-8")
-    lines = [f"{folder}: a new bench"]
-    for name, source in sources.items():
-        shutil.copytree(source, folder / "components" / name, ignore=shutil.ignore_patterns("__pycache__"))
-        lines.append(f"{folder / 'components' / name}: a copy of {name}; change model.py, then: gyrobench build {name}")
+    for room in ("systems", "components", "reports/specs"):
+        (folder / room).mkdir(exist_ok=True)
+        (folder / room / ".gitkeep").touch()  # git keeps no empty folder, and these make the bench
+    (folder / "README.md").write_text(README.format(name=folder.resolve().name), encoding="utf-8")
+    (folder / ".gitignore").write_text("fmus/\nreports/out/\n", encoding="utf-8")
+    lines = [f"{folder}: a new bench; cd {folder} and gyrobench list"]
+    for name in dict.fromkeys(copies):
+        room, source = ("components", parts[name]) if name in parts else ("systems", systems[name])
+        target = folder / room / name
+        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+        if room == "components":
+            lines.append(f"{target}: a copy; change its model.py, then: gyrobench build {name}")
+        else:
+            lines.append(f"{target}: a copy; change its system.py, then: gyrobench run {name}")
     return lines

@@ -10,7 +10,7 @@ from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record
 
 NO_VERDICT = "no specification given"
-SHOWN = {"rad": ("deg", "°"), "rad/s": ("deg/h", "°/h")}
+FAST = 0.01  # rad/s; above it rates are shown in degrees a second
 
 
 def columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> list[str]:
@@ -23,15 +23,16 @@ def columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> 
 
 
 def quantity(value: Any, unit: str) -> str:
-    """A value in SI as a person writes it: angles in degrees, rates in degrees an hour."""
+    """A value in SI as a person writes it: angles in degrees, rates in degrees an hour or a second."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if not isinstance(value, int | float) or unit in ("int", "str"):
         return str(value)
-    if unit in SHOWN:
-        name, sign = SHOWN[unit]
-        text = f"{units.convert(value, 'rad' if unit == 'rad' else 'rad/s', name):.9g}"
-        return text + sign if sign == "°" else f"{text} {sign}"
+    if unit == "rad":
+        return f"{units.convert(value, 'rad', 'deg'):.9g}°"
+    if unit == "rad/s":
+        name = "deg/s" if abs(value) > FAST else "deg/h"
+        return f"{units.convert(value, 'rad/s', name):.9g} {name.replace('deg', '°')}"
     return f"{value:g}" if unit == "1" else f"{value:g} {unit}"
 
 

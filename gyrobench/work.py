@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import telling
-from gyrobench.bench import Bench, UsageError, nearest
+from gyrobench.bench import Bench, UsageError, nearest, short
 from gyrobench.folders import claim, keep, labels, run_folder
 from gyrobench.progress import Meter
 from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record, RecordError
 from gyrobench.system.system import System, load_system
+from gyrobench.system.values import ValueProblem, parse
 
+HINTS = {"rad": "deg", "rad/s": "deg/h"}
 Limits = Mapping[str, tuple[float | None, float | None]]
 
 
@@ -69,8 +71,37 @@ def load(name: str, values: Mapping[str, Any] | None = None, step: float | None 
     else:
         system = load_system(name, Bench.find().folder)
     for key, value in (values or {}).items():
-        system.set(key, value)
+        slot, dot, _ = key.partition(".")
+        if dot and slot not in system.slots:
+            raise UsageError(f"--set {key}: no slot '{slot}'; {nearest(slot, system.slots)}")
+        try:
+            system.set(key, value)
+        except ValueProblem as error:
+            raise UsageError(f"--set {error}{_bare(system, key, value)}") from None
     return system
+
+
+def _bare(system: System, key: str, value: Any) -> str:
+    """A hint for a number that was given without its unit."""
+    option = system.options.get(key)
+    if option is None or not isinstance(option.unit, str) or option.unit == "1" or str(value)[-1:].isalpha():
+        return ""
+    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS.get(option.unit, '')}"
+
+
+def check_fmus(parts: Mapping[str, str]) -> None:
+    """Raises UsageError for a file that is given as an FMU and is none."""
+    for slot, part in parts.items():
+        if not part.endswith(".fmu"):
+            continue
+        from fmpy import read_model_description
+
+        try:
+            if not Path(part).is_file():
+                raise ValueError("no such file")
+            read_model_description(part, validate=False)
+        except Exception as error:  # of the zip archive, of the XML, or FMPy's own
+            raise UsageError(f"--part {slot}={part}: not an FMU that can be read: {error}") from None
 
 
 def runnable(system: System) -> System:
@@ -104,13 +135,13 @@ def run(job: Job, as_json: bool = False) -> str:
     Raises what Session.run raises, and WorkError when reduction or report fail after the run.
     """
     from gyrobench.system.run import RunError, RunInterrupted, Session
-    from gyrobench.system.values import parse
 
     step = parse("--step", job.step, "s") if job.step else None
     system = runnable(load(job.system, job.values, step))
     spec = specification(job.spec)
     limits = limits_of(spec)
     system.refuse()
+    check_fmus(job.parts)
     bench = Bench.find().folder
     with Session(system, job.parts, job.maps, engine=job.engine, isolate=job.isolate, bench=bench) as session:
         folder = run_folder(session, system, job.seed, step or system.step, job.maps, job.out, job.force)
@@ -123,7 +154,7 @@ def run(job: Job, as_json: bool = False) -> str:
             if error.record is None:
                 raise
             kept = keep(error.record, folder)
-            more = f"{error}\nthe record until then is kept in {kept}"
+            more = f"{error}\nthe record until then is kept in {short(kept)}"
             if isinstance(error, RunInterrupted):
                 raise Interrupted(f"{more} (gyrobench report says what it lacks)") from None
             raise RunError(more, error.record) from None
@@ -131,7 +162,7 @@ def run(job: Job, as_json: bool = False) -> str:
         stopped = ""
         try:
             if not reduces(system):
-                return no_reduction(record, as_json)
+                return no_reduction(record, folder, as_json)
             result = reduced(system, record, limits)
             if job.check_step:
                 try:
@@ -143,7 +174,7 @@ def run(job: Job, as_json: bool = False) -> str:
             if not ours(error):
                 raise
             raise WorkError(
-                f"{error}\nthe record is kept in {folder}; when mended: gyrobench report {folder}"
+                f"{error}\nthe record is kept in {short(folder)}; when mended: gyrobench report {short(folder)}"
             ) from error
     if stopped:
         raise Interrupted(stopped)
@@ -154,9 +185,9 @@ def reduces(system: System) -> bool:
     return type(system).reduce is not System.reduce
 
 
-def no_reduction(record: Record, as_json: bool) -> str:
+def no_reduction(record: Record, folder: Path, as_json: bool) -> str:
     print(
-        json.dumps(record.meta, indent=1, ensure_ascii=False) if as_json else f"no reduction; record: {record.folder}"
+        json.dumps(record.meta, indent=1, ensure_ascii=False) if as_json else f"no reduction; record: {short(folder)}"
     )
     return telling.NO_VERDICT
 
@@ -205,7 +236,7 @@ def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
     elif text:
         print(text)
     for path in paths.values():
-        print(path, file=sys.stderr if text is None else sys.stdout)
+        print(short(path), file=sys.stderr if text is None else sys.stdout)
 
 
 # ------------------------------------------------------------------------------- measured data, again
@@ -270,6 +301,9 @@ def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
 
     if len(runs) < 2:
         raise UsageError("compare needs two runs or more: gyrobench compare RUN RUN")
+    for folder in runs:
+        if not folder.is_dir():
+            raise UsageError(f"{folder}: no such folder; runs are in {Bench.find().out}/SYSTEM/")
     missing = [f for f in runs if not (f / "result.json").is_file()]
     if missing:
         raise UsageError(f"{missing[0]}: has no result.json; gyrobench report {missing[0]} makes it")
@@ -299,6 +333,7 @@ def show(
     if picture is not None and picture.suffix != ".svg":
         raise UsageError(f"--picture {picture}: the drawing is an SVG; write {picture.with_suffix('.svg')}")
     system = runnable(load(name, values))
+    check_fmus(parts)
     notes: list[str] = []
     paths, _ = resolve_parts(system, parts, "native", Bench.find().folder, notes)
     assembly = assemble(system, paths, maps)
@@ -332,6 +367,7 @@ def export(
     path = out or Bench.find().products / f"{system.name}{suffix}"
     if path.suffix != suffix:
         raise UsageError(f"--out {path}: a{'n SSP archive' if to == 'ssp' else ' container FMU'} ends in {suffix}")
+    check_fmus(parts)
     write = ssp.export_ssp if to == "ssp" else container.export_container
     for text in write(system, path, parts, maps, None, seed, Bench.find().folder):
         note(f"note: {text}")
