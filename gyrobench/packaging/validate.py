@@ -35,6 +35,7 @@ def validate(what: str | Path, bench: Path | None = None) -> list[str]:
 def _part(name: str, home: Bench) -> list[str]:
     from gyrobench.packaging import load_part
 
+    home.part_folder(name)  # says which parts there are
     reference = _reference(name, home)
     if reference is None:
         return [f"{name} has no reference.csv beside its model.py"]
