@@ -1,0 +1,79 @@
+"""The torquer table of the book through the command: 17.171 deg/h/mA and the linearity column."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench.bench import Bench
+
+Command = Callable[..., tuple[int, str, str]]
+NAME = "torquer_scale_factor"
+
+
+def test_book_table(command: Command, tmp_path: Path) -> None:
+    """[LIN-TABLE, E49]: K = 17.1706, printed 17.171; linearity against 17.171, the 5 mA value with its true sign."""
+    data = Bench.find().system_folder(NAME) / "book_table.csv"
+    code, out, err = command("reduce", NAME, "--data", data, "--out", tmp_path)
+    assert code == 0, err
+    assert "17.17" in out
+    result = json.loads((tmp_path / "result.json").read_text("utf-8"))
+    (K,) = [c for c in result["coefficients"] if c["name"] == "K"]
+    assert K["unit"] == "°/h/mA"
+    # mean of 17.184 17.169 17.166 17.160 17.172 17.173 17.170 17.171: 17 + (184+169+166+160+172+173+170+171)/8000
+    assert K["estimate"] == pytest.approx(17.0 + 1.365 / 8.0, rel=1e-12)
+    assert abs(K["estimate"] - 17.171) < 5e-4
+    assert not result["simulated"]
+    column = [
+        [row[k] for row in t["rows"]]
+        for t in result["tables"] for k, name in enumerate(t["columns"]) if "17.171" in name or "linearity" in name
+    ]  # fmt: skip
+    printed = [0.076, -0.012, -0.029, -0.064, 0.006, 0.012, -0.006, 0.0]
+    assert any(_numbers(c) == pytest.approx(printed, abs=6e-4) for c in column), column
+
+
+def _numbers(cells: list[object]) -> list[float]:
+    return [float(str(c).replace("−", "-").replace("+", "").replace("%", "")) for c in cells]
+
+
+@pytest.mark.parametrize("words", [("run",), ("show",), ("export", "--to", "ssp")])
+def test_there_is_nothing_to_run(command: Command, tmp_path: Path, words: tuple[str, ...]) -> None:
+    more = () if words == ("show",) else ("--out", tmp_path / "run")
+    code, out, err = command(*words, NAME, *more)
+    assert code == 2 and out == "" and "Traceback" not in err
+    assert "measured data" in err and f"gyrobench reduce {NAME}" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_template_and_refusals(command: Command, tmp_path: Path) -> None:
+    code, template, _ = command("reduce", NAME, "--template")
+    assert code == 0
+    file = tmp_path / "lab.csv"
+    for rows, words in (
+        ("", ["no rows"]),
+        ("1,17.2,17.1,10,10\n2,34.4,34.2,10,20\n3,51.6,51.3,10,10\n", ["range"]),
+        ("0,17.2,17.1,10,10\n2,34.4,34.2,10,10\n3,51.6,51.3,10,10\n", ["current"]),
+        ("1,17.2,17.1,10,10\n", ["current"]),
+        ("1,17.2,nan,10,10\n2,34.4,34.2,10,10\n3,51.6,51.3,10,10\n", ["rate_minus", "no finite number"]),
+    ):
+        file.write_text(template + rows, encoding="utf-8")
+        code, out, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")
+        assert code == 2 and out == "" and "Traceback" not in err, err
+        for word in words:
+            assert word in err, err
+    file.write_text(template.replace("rate_minus [deg/h],", "") + "1,17.2,10,10\n", encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", file)
+    assert code == 2 and "column 'rate_minus [rad/s]' is missing" in err
+
+
+def test_it_is_listed(command: Command) -> None:
+    code, out, _ = command("list")
+    assert code == 0 and NAME in out
+
+
+def test_book_table_says_where_it_comes_from() -> None:
+    head = (Bench.find().system_folder(NAME) / "book_table.csv").read_text("utf-8")
+    assert "000_791234d3afc34a0c.txt" in head and "K_n" in head
