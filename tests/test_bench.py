@@ -1,0 +1,176 @@
+"""Where things are: benches, what they lack, names that are near; and which room of the tool may import which."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import gyrobench
+from gyrobench.bench import Bench, BenchError, nearest, short, standard_folder
+from gyrobench.listing import init_bench, listing
+
+TOOL = Path(gyrobench.__file__).parent if gyrobench.__file__ else Path(gyrobench.__path__[0])
+
+
+# -------------------------------------------------------------------------------------------- benches
+def test_the_nearest_folder_above_with_the_rooms_is_the_bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    init_bench(tmp_path / "mine", ["site"])
+    inside = tmp_path / "mine" / "components" / "site"
+    monkeypatch.chdir(inside)
+    bench = Bench.find()
+    assert bench.folder == (tmp_path / "mine").resolve()
+    assert bench.out == bench.folder / "reports" / "out"
+    assert bench.fmus == bench.products == bench.folder / "fmus"
+
+
+def test_outside_of_a_bench_the_standard_one_is_used_and_results_stay_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    bench = Bench.find()
+    assert bench.folder == standard_folder()
+    assert bench.out == tmp_path / "reports" / "out"
+    assert bench.products == tmp_path / "fmus"
+
+
+def test_own_parts_come_before_standard_ones(tmp_path: Path) -> None:
+    init_bench(tmp_path / "mine", ["site"])
+    bench = Bench.find(tmp_path / "mine")
+    assert bench.part_folder("site") == bench.folder / "components" / "site"
+    assert bench.part_folder("floated_gyro") == standard_folder() / "components" / "floated_gyro"
+    assert bench.system_folder("tumble_single_axis") == standard_folder() / "systems" / "tumble_single_axis"
+    (bench.folder / "reports" / "specs" / "floated_gyro.toml").write_text("")
+    assert bench.specifications()["floated_gyro"] == bench.folder / "reports" / "specs" / "floated_gyro.toml"
+
+
+def test_unknown_names_are_answered_with_names_that_are_near(tmp_path: Path) -> None:
+    bench = Bench(standard_folder())
+    with pytest.raises(BenchError, match=r"no part 'floated_gyr'; did you mean floated_gyro\?"):
+        bench.part_folder("floated_gyr")
+    with pytest.raises(BenchError, match=r"no system 'tumble'; did you mean tumble_single_axis\?"):
+        bench.system_folder("tumble")
+    with pytest.raises(BenchError, match=r"is no bench: it has no folder components/ \(make one: gyrobench init NAME"):
+        Bench.find(tmp_path)
+    assert nearest("xyz", ["site", "table"]) == "there are: site, table"
+    assert nearest("xyz", []) == "there are: none"
+
+
+def test_short_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert short(tmp_path / "a" / "b") == "a/b"
+    assert short(Path("/somewhere/else")) == "/somewhere/else"
+
+
+# --------------------------------------------------------------------------------- list and init
+def test_listing_reads_what_each_part_says_of_itself() -> None:
+    found = listing(Bench(standard_folder()))
+    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+    assert all(r["what"] for rows in found.values() for r in rows)
+    rows = {r["name"]: r for title in ("parts", "systems") for r in found[title]}
+    assert rows["floated_gyro"]["what"] == "Single-degree-of-freedom floated rate-integrating gyro"
+    assert "GYRO-DYN-1" in rows["floated_gyro"]["spec"]
+    assert rows["tumble_single_axis"]["what"] == "Single-axis tumble test"
+    assert "TEST-TUMBLE1-SDF" in rows["tumble_single_axis"]["spec"]
+
+
+def test_listing_survives_a_specification_that_cannot_be_read(tmp_path: Path) -> None:
+    init_bench(tmp_path / "mine", [])
+    (tmp_path / "mine" / "reports" / "specs" / "odd.toml").write_text("title =")
+    rows = {r["name"]: r for r in listing(Bench.find(tmp_path / "mine"))["specifications"]}
+    assert rows["odd"]["what"].startswith("cannot be read")
+
+
+def test_init_copies_parts_and_systems(tmp_path: Path) -> None:
+    lines = init_bench(tmp_path / "mine", ["site", "tumble_single_axis", "site"])
+    assert len(lines) == 3
+    bench = Bench.find(tmp_path / "mine")
+    assert bench.part_folder("site").is_relative_to(bench.folder)
+    assert bench.system_folder("tumble_single_axis").is_relative_to(bench.folder)
+    # git keeps no empty folder: each room that makes a bench holds a file
+    for room in ("components", "systems", "reports"):
+        assert [f for f in (bench.folder / room).rglob("*") if f.is_file()]
+
+
+def test_init_refuses(tmp_path: Path) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    with pytest.raises(BenchError, match="exists and is not empty"):
+        init_bench(tmp_path / "full", [])
+    with pytest.raises(BenchError, match="exists and is not empty"):
+        init_bench(tmp_path / "full" / "file", [])
+    with pytest.raises(BenchError, match=r"--copy gyro: no such part or system; did you mean .*floated_gyro"):
+        init_bench(tmp_path / "new", ["gyro"])
+    assert not (tmp_path / "new").exists()
+
+
+# ------------------------------------------------------------------------------------------- imports
+#: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> record -> reduction -> report.  A
+#: room may know what comes before it, never what comes after; bench, units and the like belong to no room.
+COMMON = {"bench", "units", "frames", "drift", "math", "numerics"}
+COMPONENT = {"component", "declare", "linearize"}
+ROOMS = {
+    **{name: COMMON for name in COMMON},
+    **{name: COMMON | COMPONENT for name in COMPONENT},
+    "packaging": COMMON | COMPONENT,
+    "system": COMMON | COMPONENT | {"packaging"},
+    "reduction": COMMON | {"system"},
+    "report": COMMON | {"system", "reduction"},
+}
+#: reductions get a record as data and need none of the machine that made it
+RECORD = {"gyrobench.system.record", "gyrobench.system.plan", "gyrobench.system.measured"}
+
+
+def imports(file: Path) -> set[str]:
+    """Modules of gyrobench that a file imports, anywhere in it, as absolute names."""
+    package = ["gyrobench", *file.relative_to(TOOL).parent.parts]
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            found |= {f"{module}.{a.name}" for a in node.names} if module == "gyrobench" else {module}
+    return {m for m in found if m == "gyrobench" or m.startswith("gyrobench.")}
+
+
+def room(file: Path) -> str:
+    return file.relative_to(TOOL).parts[0].removesuffix(".py")
+
+
+FILES = sorted(f for f in TOOL.rglob("*.py") if "_bench" not in f.parts)
+
+
+@pytest.mark.parametrize("file", FILES, ids=[str(f.relative_to(TOOL)) for f in FILES])
+def test_imports_go_one_way(file: Path) -> None:
+    allowed = ROOMS.get(room(file))
+    if allowed is None:  # the commands see everything
+        return
+    for module in imports(file):
+        there = module.split(".")[1] if "." in module else ""
+        assert there in allowed | {room(file), ""}, f"{file}: imports {module}"
+        if room(file) in ("reduction", "report") and there == "system":
+            assert module in RECORD, f"{file}: imports {module}"
+
+
+def test_every_room_is_known() -> None:
+    commands = {"cli", "work", "listing", "telling", "progress", "folders", "explain", "__init__"}
+    assert {room(f) for f in FILES} <= set(ROOMS) | commands
+
+
+def test_the_tool_names_no_content() -> None:
+    """gyrobench works on any bench: no part, system or specification is named in its code."""
+    bench = Bench(standard_folder())
+    names = {n for n in (*bench.parts(), *bench.systems(), *bench.specifications()) if "_" in n}  # no plain words
+    rooms = ("components", "systems", "fmus")
+    for file in FILES:
+        assert not {m.split(".")[0] for m in imports(file)} & set(rooms)
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        texts = {
+            n.value
+            for n in ast.walk(tree)
+            if isinstance(n, ast.Constant) and isinstance(n.value, str) and n.value in names
+        }
+        assert not texts, f"{file} names {texts}"

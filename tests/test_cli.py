@@ -1,0 +1,412 @@
+"""The commands as a user meets them: what they print, their exit codes, what they leave on disk."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gyrobench import cli, progress
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.system.loop import Status
+from gyrobench.system.record import Record
+
+Call = Callable[..., tuple[int, str, str]]
+NAME = "tumble_single_axis"
+QUICK = ["--set", "rate=2deg/s", "--set", "dwell=60", "--set", "windows=36"]
+TINY = ["--set", "rate=30deg/s", "--set", "dwell=2", "--set", "settle=0.5", "--set", "windows=12"]
+
+
+def call(words: tuple[object, ...], capture: Any, patch: pytest.MonkeyPatch) -> tuple[int, str, str]:
+    patch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
+    capture.readouterr()
+    try:
+        cli.main()
+        code = 0
+    except SystemExit as end:
+        code = int(end.code or 0)
+    out, err = capture.readouterr()
+    return code, out, err
+
+
+@pytest.fixture
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """Runs a command in an empty folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: call(words, capsys, monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a run ``a`` (checked step, judged) and a run ``b`` of a worse gyro."""
+    folder = tmp_path_factory.mktemp("runs")
+    base = [sys.executable, "-m", "gyrobench.cli", "run", NAME, *QUICK, "--spec", "floated_gyro", "--strict"]
+    env_path = str(Path(cli.__file__).parents[1])
+    for name, more, code in (("a", ["--check-step"], 0), ("b", ["--set", "gyro.D_I=3deg/h/g"], 1)):
+        done = subprocess.run(
+            [*base, *more, "--out", name],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            env={**__import__("os").environ, "PYTHONPATH": env_path},
+            check=False,
+        )
+        assert done.returncode == code, done.stderr
+        (folder / f"{name}.txt").write_text(done.stdout, encoding="utf-8")
+    yield folder
+
+
+# ------------------------------------------------------------------------------------------ help, list
+def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
+    code, out, _ = gyrobench("--help")
+    assert code == 0 and "gyrobench run tumble_single_axis" in out
+    names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
+    assert len(names) == 10
+    for name in names:
+        code, text, _ = gyrobench(name, "--help")
+        assert code == 0
+        assert f"  gyrobench {name} " in text or f"Example: gyrobench {name}" in text, name
+        assert f"  {name} " in out and "..." not in next(
+            line for line in out.splitlines() if line.startswith(f"  {name} ")
+        )
+
+
+def test_version(gyrobench: Call) -> None:
+    assert gyrobench("--version")[1].startswith("gyrobench")
+
+
+def test_list_and_help_load_nothing_heavy() -> None:
+    """0.5 s of the budget go to Python and typer; numpy, scipy and matplotlib alone would take it."""
+    heavy = ("numpy", "scipy", "matplotlib", "fmpy", "pyarrow", "jinja2", "typst", "control", "statsmodels")
+    for words in (["list"], ["--help"], ["run", "--help"]):
+        code = (
+            f"import sys; sys.argv = ['gyrobench', *{words!r}]\n"
+            "from gyrobench.cli import main\n"
+            "try: main()\nexcept SystemExit: pass\n"
+            f"print(sorted(set({heavy!r}) & set(sys.modules)), file=sys.stderr)"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(cli.__file__).parents[1]
+        )
+        assert done.stderr.strip() == "[]", words
+
+
+def test_list(gyrobench: Call) -> None:
+    code, out, err = gyrobench("list")
+    assert (code, err) == (0, "")
+    for name in (*Bench(standard_folder()).parts(), NAME, "SdfGyro"):
+        assert f"  {name} " in out
+    found = json.loads(gyrobench("list", "--json")[1])
+    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+
+
+# ------------------------------------------------------------------------------------------------ show
+def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path) -> None:
+    code, out, err = gyrobench("show", NAME, "--set", "rate=2deg/s", "--set", "latitude=50deg")
+    assert (code, err) == (0, "")
+    slots = out.split("slots, in the order of execution; step 0.001 s\n")[1].split("\n\n")[0]
+    assert [line.split()[0] for line in slots.splitlines()][:3] == ["site", "sequencer", "table"]
+    assert "rebalance.i -> gyro.i: one step delay" in out
+    assert "360° at -2 °/s" in out
+    assert "latitude        50°" in out
+    found = json.loads(gyrobench("show", NAME, "--json")[1])
+    assert found["order"][:3] == ["site", "sequencer", "table"] and len(found["plan"]) == 4
+    assert gyrobench("show", NAME, "--picture", "w.svg")[:2] == (0, "w.svg\n")
+    assert (tmp_path / "w.svg").read_text(encoding="utf-8").startswith("<svg")
+
+
+# --------------------------------------------------------------------------------------------- refused
+REFUSED = [
+    (["run", "tumbl_single_axis"], "no system 'tumbl_single_axis'; did you mean tumble_single_axis?"),
+    (["show", "tumble"], "did you mean tumble_single_axis?"),
+    (["run", NAME, "--set", "latitud=45deg"], "latitud: no such option of tumble_single_axis; options: latitude"),
+    (["run", NAME, "--set", "gyr.D_I=3"], "--set gyr.D_I: no slot 'gyr'; did you mean gyro?"),
+    (["run", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),
+    (["show", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),
+    (["run", NAME, "--set", "latitude=45"], "a number without unit is in rad, write for example latitude=45deg"),
+    (["run", NAME, "--set", "latitude=45m"], "'m' (m) does not convert to 'rad'"),
+    (["run", NAME, "--set", "latitude"], "--set latitude: write NAME=VALUE, for example --set latitude=45.75deg"),
+    (["run", NAME, "--set", "turns=1", "--set", "turns=2"], "--set turns: given twice, 1 and 2"),
+    (["run", NAME, "--step", "1m"], "units that fit: s, ms"),
+    (["run", NAME, "--part", "gyr=site"], "no slot 'gyr'; slots: site"),
+    (["run", NAME, "--part", "gyro=floated_gyr"], "no part 'floated_gyr'; did you mean floated_gyro?"),
+    (["run", NAME, "--part", "gyro=no.fmu"], "--part gyro=no.fmu: not an FMU that can be read: no such file"),
+    (["run", NAME, "--part", "gyro=bad.fmu"], "--part gyro=bad.fmu: not an FMU that can be read"),
+    (["run", NAME, "--part", "gyro=site"], "slot gyro: FMU 'Site' does not fit socket SdfGyro"),
+    (["run", NAME, "--map", "gyro=no.toml"], "--map gyro=no.toml: no such file"),
+    (["run", NAME, "--spec", "floated_gyr"], "--spec floated_gyr: no such file or specification; did you mean"),
+    (["run", NAME, "--isolate", "gyr"], "no slot 'gyr'"),
+    (["run", NAME, "--seed", "-1"], "--seed"),
+    (["run", NAME, "--engine", "fast"], "'native', 'reference'"),
+    (["run", NAME, "--out", "full"], "--out full: holds other files; name a new folder, for example full/run1"),
+    (["run", NAME, "--out", "bad.fmu"], "--out bad.fmu: is a file"),
+    (["run", "torquer_scale_factor"], "it reduces measured data"),
+    (["run", NAME, "--sed", "3"], "No such option: --sed"),
+    (["rum", NAME], "Did you mean 'run'?"),
+    (["show", NAME, "--picture", "w.png"], "write w.svg"),
+    (["build"], "name a part, or say --all; parts: "),
+    (["build", "site", "sit"], "no part 'sit'; did you mean site?"),
+    (["build", "site", "--platform", "win"], "--platform win: one of linux64"),
+    (["report", "full"], "full: no run there (no run.json)"),
+    (["compare", "full"], "compare needs two runs or more"),
+    (["compare", "full", "nothing"], "nothing: no such folder"),
+    (["compare", "full", "full"], "full: has no result.json; gyrobench report full makes it"),
+    (["reduce", NAME], "name the record: gyrobench reduce tumble_single_axis --data FILE.csv"),
+    (["reduce", NAME, "--data", "no.csv"], "no.csv: No such file"),
+    (["export", NAME], "Missing option '--to'"),
+    (["export", NAME, "--to", "ssp", "--out", "x.zip"], "an SSP archive ends in .ssp"),
+    (["validate", "no.fmu"], "no.fmu"),
+    (["init", "full"], "full exists and is not empty"),
+    (["init", "new", "--copy", "gyro"], "--copy gyro: no such part or system"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED, ids=[" ".join(w) for w, _ in REFUSED])
+def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    (tmp_path / "bad.fmu").write_text("nothing", encoding="utf-8")
+    code, out, err = gyrobench(*words)
+    assert code == 2
+    assert message in err
+    assert out == "" and "Traceback" not in err
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.fmu", "full"]
+
+
+# ------------------------------------------------------------------------------------------ run, report
+def test_run_prints_table_verdict_step_check_and_paths(runs: Path) -> None:
+    text = (runs / "a.txt").read_text(encoding="utf-8")
+    assert text.startswith("Single-axis tumble test")
+    names = ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS"]
+    rows = [line.split() for line in text.splitlines() if line.startswith("D_")]
+    assert [r[0] for r in rows] == names and all(r[-1] == "pass" for r in rows)
+    assert "step check: halving the step changes no coefficient by more than" in text
+    assert text.endswith("verdict: pass\na/result.json\na/report.html\na/report.pdf\n")
+    assert {p.name for p in (runs / "a").iterdir()} == {
+        "run.json", "record.parquet", "channels.parquet", "result.json", "report.html", "report.pdf",
+    }  # fmt: skip
+    assert "verdict: fail" in (runs / "b.txt").read_text(encoding="utf-8")
+
+
+def test_step_check_changes_less_than_a_tenth_of_u(runs: Path) -> None:
+    check = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))["step_check"]
+    assert len(check["rows"]) == 9
+    assert check["worst"] == max(r["ratio"] for r in check["rows"]) < 0.1
+
+
+def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
+    code, out, _ = gyrobench("report", runs / "a", "--spec", "floated_gyro", "--strict")
+    assert code == 0 and "step check:" in out and "verdict: pass" in out
+    code, out, _ = gyrobench("report", runs / "b", "--spec", "floated_gyro", "--strict", "--json")
+    assert code == 1 and json.loads(out)["verdict"] == "fail"
+
+
+def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Path) -> None:
+    code, out, err = gyrobench("run", NAME, *TINY, "--json")
+    assert code == 0
+    (folder,) = (tmp_path / "reports" / "out" / NAME).iterdir()
+    assert json.loads(out) == json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    assert f"reports/out/{NAME}/{folder.name}/report.html" in err
+    assert not (tmp_path / "fmus").exists()
+
+
+def test_the_same_run_has_the_same_folder_and_another_one_another(gyrobench: Call, tmp_path: Path) -> None:
+    for more in ([], ["--set", "latitude=2745arcmin"], ["--seed", "2"]):  # 2745' = 45.75°, the default
+        assert gyrobench("run", NAME, *TINY, *more, "--json")[0] == 0
+    assert len(list((tmp_path / "reports" / "out" / NAME).iterdir())) == 2
+
+
+def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) -> None:
+    run = ["run", NAME, *TINY, "--out", "here"]
+    assert gyrobench(*run)[0] == 0
+    assert gyrobench(*run)[0] == 0  # the same run again
+    code, _, err = gyrobench(*run, "--seed", "2", "--set", "gyro.D_I=0")
+    assert code == 2
+    assert "--out here: holds another run (its parameters, seed differ); name another folder, or --force" in err
+    assert Record.load(tmp_path / "here").meta["seed"] == 1
+    assert gyrobench(*run, "--seed", "2", "--force")[0] == 0
+    assert Record.load(tmp_path / "here").meta["seed"] == 2
+
+
+def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('[coefficients.D_I]\nunit = "mA"\nmin = -1\n', encoding="utf-8")
+    code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
+    assert code == 3
+    assert "D_I is given in 'mA'; the report uses '°/h/g'" in err
+    assert "the record is kept in r; when mended: gyrobench report r" in err
+    assert gyrobench("report", "r")[0] == 0
+
+
+def test_engines_and_isolation_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
+    short = [*TINY[:1], "rate=60deg/s", *TINY[2:]]
+    for name, more in (("n", []), ("r", ["--engine", "reference"])):
+        assert gyrobench("run", NAME, *short, *more, "--out", name)[0] == 0
+    assert Record.load(tmp_path / "n").same_data(Record.load(tmp_path / "r"))
+
+
+def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+    code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--out", "c")
+    assert (code, out) == (0, "c/comparison.json\nc/comparison.html\nc/comparison.pdf\n")
+    code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--json")
+    assert code == 0 and json.loads(out)
+    code, _, err = gyrobench("compare", runs / "a", runs / "a")
+    assert code == 2 and "given twice" in err
+
+
+# ---------------------------------------------------------------------------- interrupted and failed runs
+def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(self: progress.Meter, status: Status) -> None:
+        if status.windows >= 2:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(progress.Meter, "__call__", interrupt)
+    run = ["run", NAME, "--set", "rate=2deg/s", "--set", "windows=36", "--out", "r"]
+    code, out, err = gyrobench(*run)
+    assert code == 130 and out == ""
+    assert "interrupted at t = " in err and "the record until then is kept in r" in err
+    record = Record.load(tmp_path / "r")
+    assert not record.complete and len(record.windows["phase"]) >= 2
+    code, out, err = gyrobench("report", "r")
+    assert code == 3 and out == ""
+    assert "r: the record is not complete, so there is no report\n  - interrupted at t = " in err
+    assert "  - phase 4 (mount 2, against the Earth): " in err and "of 36 windows" in err
+
+
+def test_interrupt_does_not_replace_a_whole_record(
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = ["run", NAME, *TINY, "--out", "r"]
+    assert gyrobench(*run)[0] == 0
+    monkeypatch.setattr(progress.Meter, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT))
+    code, _, err = gyrobench(*run)
+    assert code == 130 and "is kept in r-incomplete" in err
+    assert Record.load(tmp_path / "r").complete and not Record.load(tmp_path / "r-incomplete").complete
+
+
+def test_interrupted_step_check_still_gives_the_report(
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(self: progress.Meter, status: Status) -> None:
+        if "step check" in self.label:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(progress.Meter, "__call__", interrupt)
+    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r")
+    assert code == 130
+    assert "r/report.html" in out and "the report is without it" in err
+    assert json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["step_check"] == {}
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A gyro FMU that crashes, see tests/foreign/faulty.c."""
+    file = Path(__file__).parent / "foreign" / "make.py"
+    spec = importlib.util.spec_from_file_location("foreign_make", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    made: Path = module.make("faulty", tmp_path_factory.mktemp("foreign"))
+    return made
+
+
+def test_crash_of_an_isolated_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:
+    code, out, err = gyrobench(
+        "run", NAME, *TINY, "--part", f"gyro={faulty}", "--isolate", "gyro", "--out", "r",
+        "--set", "gyro.fault=1", "--set", "gyro.at=150", "--set", "rebalance.K_p=0", "--set", "rebalance.K_i=0",
+    )  # fmt: skip
+    assert code == 3 and out == ""
+    assert "gyro: doStep failed at t = 0.15 s: its process crashed (SIGSEGV)" in err
+    assert "the record until then is kept in r" in err and "Traceback" not in err
+    assert Record.load(tmp_path / "r").meta["stopped_at"] == pytest.approx(0.15)
+
+
+def test_faults_of_a_part_are_shown_with_file_and_line(gyrobench: Call, tmp_path: Path) -> None:
+    assert gyrobench("init", "mine", "--copy", "site")[0] == 0
+    model = tmp_path / "mine" / "components" / "site" / "model.py"
+    good = model.read_text(encoding="utf-8")
+    last = len(good.splitlines()) + 1
+    for wrong, message in (("def x(:", "SyntaxError"), ("undefined_name", "NameError: name 'undefined_name'")):
+        model.write_text(good + wrong + "\n", encoding="utf-8")
+        bench = Bench.find(tmp_path / "mine")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(bench.folder)
+            code, _, err = gyrobench("build", "site")
+        assert code == 2
+        assert f"{model}:{last}: {message}" in err and "Traceback" not in err
+
+
+# ------------------------------------------------------------------------------------------- progress
+def test_progress_in_lines_where_there_is_no_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "PAUSE", 0.0)
+    with progress.Meter("tumble") as meter:
+        meter(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
+    # 250 of 1000 s are done after 2.5 s: 7.5 s are left; 250,000 steps in 2.5 s
+    assert capsys.readouterr().err == "tumble: 25 %, t = 250 of 1,000 s, 0.10 M steps/s, 8 s left\n"
+
+
+def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress.Meter("tumble") as meter:
+        meter(Status(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
+        assert meter.bar is None  # short runs stay silent
+        meter(Status(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
+        assert meter.bar is not None and meter.bar.tasks[0].completed == 0.5
+        assert "1 min 00 s left" in meter.bar.tasks[0].fields["words"]
+    captured = capsys.readouterr()
+    assert captured.out == ""
+
+
+def test_spans_of_time() -> None:
+    assert [progress.span(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
+        "0 s", "1 min 15 s", "2 h 01 min", "unknown",
+    ]  # fmt: skip
+
+
+# ------------------------------------------------------------------------------ build, export, validate
+def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_path: Path) -> None:
+    code, out, _ = gyrobench("build", "site", "sampler", "site")
+    assert (code, out) == (0, "fmus/site.fmu\nfmus/sampler.fmu\n")
+    assert gyrobench("build", "site", "--target", "python", "--out", "o")[1] == "o/site-python.fmu\n"
+    assert gyrobench("validate", "fmus/site.fmu")[:2] == (0, "fmus/site.fmu: no problems found\n")
+    broken = tmp_path / "broken.fmu"
+    broken.write_bytes(b"nothing")
+    code, out, _ = gyrobench("validate", broken)
+    assert code == 1 and out
+
+
+def test_export_and_run_of_an_archive(gyrobench: Call, tmp_path: Path) -> None:
+    assert gyrobench("export", NAME, "--to", "ssp", *TINY)[:2] == (0, f"fmus/{NAME}.ssp\n")
+    code, out, _ = gyrobench("run", f"fmus/{NAME}.ssp", "--out", "s")
+    assert (code, out) == (0, "no reduction; record: s\n")
+    assert Record.load(tmp_path / "s").complete
+
+
+# ------------------------------------------------------------------------------------------- measured
+def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> None:
+    code, template, _ = gyrobench("reduce", "torquer_scale_factor", "--template")
+    assert code == 0 and "current [mA],rate_plus [deg/h]" in template
+    # 17 °/h/mA both ways, at eight currents, by arithmetic
+    rows = "".join(f"{i},{17 * i},{17 * i},360,360\n" for i in (0.5, 1, 2, 4, 6, 8, 10, 12))
+    (tmp_path / "t.csv").write_text(template + rows, encoding="utf-8")
+    code, out, err = gyrobench("reduce", "torquer_scale_factor", "--data", "t.csv", "--out", "r")
+    assert code == 0, err
+    assert "K_LS " in out and "r/report.html" in out
+    (k,) = [
+        c
+        for c in json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["coefficients"]
+        if c["name"] == "K"
+    ]
+    assert (k["estimate"], k["unit"]) == (pytest.approx(17.0, rel=1e-12), "°/h/mA")
