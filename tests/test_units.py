@@ -127,9 +127,16 @@ def test_base_unit_for_fmi() -> None:
 
 
 def test_display() -> None:
-    assert [
-        display(n) for n in ("deg/h", "deg/h/g", "deg/h/g2", "arcsec", "rad/s/sqrt(Hz)", "kg.m2", "ug", "1")
-    ] == ["°/h", "°/h/g", "°/h/g²", "″", "rad/s/√Hz", "kg·m²", "µg", "1"]
+    assert [display(n) for n in ("deg/h", "deg/h/g", "deg/h/g2", "arcsec", "rad/s/sqrt(Hz)", "kg.m2", "ug", "1")] == [
+        "°/h",
+        "°/h/g",
+        "°/h/g²",
+        "″",
+        "rad/s/√Hz",
+        "kg·m²",
+        "µg",
+        "1",
+    ]
 
 
 def test_every_symbol_reads_its_own_printed_form() -> None:
