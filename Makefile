@@ -1,15 +1,17 @@
-# One command does the main job, one passes the tests; both set up .venv first.
-PYTHON ?= python3
+# `make demo` does the main job, `make test` passes the tests; both set up .venv first, once.
+PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV ?= .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: demo test check bench clean
 
+# The whole single-axis tumble test of the standard gyro: FMUs, run, step check, coefficients, report.
 demo: $(VENV)/demo.stamp
 	$(BIN)/gyrobench build --all
 	$(BIN)/gyrobench run tumble_single_axis --set latitude=45.75deg --check-step
 
-test: $(VENV)/test.stamp check
+test: check
 	$(BIN)/python -m pytest
 
 check: $(VENV)/test.stamp
@@ -17,18 +19,24 @@ check: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# Speed against the budgets and against other tools.
 bench: $(VENV)/test.stamp
 	$(BIN)/python tests/benchmarks/run.py
 
-$(VENV)/demo.stamp: pyproject.toml
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "gyrobench needs Python 3.11 or newer; name one: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
-	touch $@
 
-$(VENV)/test.stamp: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[test]"
-	touch $@
+$(VENV)/demo.stamp: pyproject.toml | $(BIN)/python
+	@echo "installing gyrobench and what it needs into $(VENV); the first time takes some minutes"
+	$(PIP) -e .
+	@touch $@
+
+$(VENV)/test.stamp: pyproject.toml | $(BIN)/python
+	@echo "installing gyrobench and what its tests need into $(VENV); the first time takes some minutes"
+	$(PIP) -e ".[test]"
+	@touch $@ $(VENV)/demo.stamp
 
 clean:
-	rm -rf $(VENV) fmus/*.fmu reports/out build dist
+	rm -rf $(VENV) fmus/*.fmu fmus/*.ssp reports/out build dist
