@@ -72,6 +72,7 @@ class TumbleSingleAxis(System):
         "dwell": Option(1200.0, "s", "length of each of the two dwells"),
         "settle": Option(10.0, "s", "wait before averaging, after each move", 0.0),
         "fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS"),
+        "tilt": Option(False, bool, "estimate the tilt of the input axis towards the output axis too"),
         "u_axis": Option(0.0, "rad", "standard uncertainty of the table axis against the pole", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the fixture", 0.0),
         "u_scale_factor": Option(0.0, "1", "relative standard uncertainty of the torquer scale factor", 0.0),

@@ -1,0 +1,86 @@
+"""Errors of the set-up, put into the parts: what the co-simulation shows is what the formulas of the README say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from tumbling import DPH, NAMES, RATE, SHORT, load, quiet
+
+from gyrobench import frames
+from gyrobench.system.run import Session
+
+W = frames.EARTH_RATE / DPH  # 15.041 deg/h
+PHI = math.radians(45.75)
+GAMMA = frames.normal_gravity(PHI) / frames.G0
+C, S = math.cos(PHI), math.sin(PHI)
+TEN = math.radians(10.0 / 3600.0)  # 10 arcsec
+
+
+def tumble(session: Session, **values: Any) -> tuple[dict[str, float], dict[str, float], Any]:
+    """Estimates and closed formulas (deg/h per g^n) of a gyro without drift, noise off: errors of the set-up alone."""
+    ideal = {**SHORT, **quiet(load()), **{f"gyro.{n}": 0.0 for n in NAMES}}
+    given = {**ideal, **{k.replace("__", "."): v for k, v in values.items()}}
+    result = load().with_values(given).reduce(session.run(given))
+    closed = {c.name: c.closed for c in result.coefficients if c.closed is not None}
+    return {c.name: c.estimate for c in result.coefficients}, closed, result
+
+
+def expect(found: dict[str, float], **expected: float) -> None:
+    for name in NAMES:
+        assert found[name] == pytest.approx(expected.get(name, 0.0), rel=1e-3, abs=1e-7), name
+
+
+def test_axis_off_the_pole_about_east(session: Session) -> None:
+    """The pole has the part W delta along the second table axis; the input axis sees it once a turn, in phase with X:
+    W delta/(gamma cos phi) in D_I, nothing else: 1.05e-3 deg/h/g for 10 arcsec.  [TUM1-SENS-AXIS]
+    """
+    found, closed, _ = tumble(session, **{"table.tilt": [TEN, 0.0]})
+    size = W * TEN / (GAMMA * C)
+    assert size == pytest.approx(1.05e-3, rel=0.01)
+    expect(found, D_I=-size)
+    expect(closed, D_I=-size)
+
+
+def test_axis_off_the_pole_about_its_second_axis(session: Session) -> None:
+    """Now W delta stands east at angle 0: cosines with one sign in both mounts are D_OS, 2 W delta/(gamma2 sin 2 phi) =
+    1.46e-3.  The dwells see W delta on their input axis too, as the mounts stand on the same base: D_F by W delta, and
+    D_II, D_SS by -W delta/(gamma2 cos2 phi).
+    """
+    found, closed, _ = tumble(session, **{"table.tilt": [0.0, TEN]})
+    east = W * TEN
+    expected = {"D_OS": 2 * east / (GAMMA**2 * math.sin(2 * PHI)), "D_F": east}
+    expected |= dict.fromkeys(("D_II", "D_SS"), -east / (GAMMA * C) ** 2)
+    expect(found, **expected)
+    expect(closed, **expected)
+
+
+def towards_output(eps: float) -> list[list[float]]:
+    """A mount with its input axis tilted by eps towards the output axis, turned about the spin axis."""
+    c, s = math.cos(eps), math.sin(eps)
+    return [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+
+
+def test_input_axis_tilted_towards_the_output_axis(session: Session) -> None:
+    """The input axis sees eps (W + table rate) with opposite sign in the two mounts, and eps W sin phi in the dwells.
+    The closed formulas feel the dwells only: eps W sin(phi)/gamma in D_O.  [TUM1-SENS-IA]  Least squares that knows of
+    the tilt (option tilt) finds it and has no error; the tilt in arcsec is what was put in.
+    """
+    eps = 3e-4
+    _, closed, _ = tumble(session, gyro__mount=towards_output(eps))
+    expect(closed, D_O=eps * W * S / GAMMA)
+    found, _, result = tumble(session, gyro__mount=towards_output(eps), tilt=True)
+    expect(found)
+    (tilt,) = [c for c in result.coefficients if c.name not in NAMES]
+    assert tilt.unit == "″"
+    assert tilt.estimate == pytest.approx(math.degrees(eps) * 3600.0, rel=1e-6)
+    assert eps * RATE > 0.1 * DPH  # it is a large disturbance: eps times the table rate
+
+
+def test_scale_factor_error_scales_everything(session: Session) -> None:
+    """The input rate is 0 everywhere, so y = -k i: k wrong by 1e-3 makes every coefficient wrong by 1e-3."""
+    truth = {"gyro.D_F": 0.3 * DPH, "gyro.D_I": 0.9 * DPH, "gyro.D_IS": -0.2 * DPH}
+    k = 17.2e3 * DPH
+    found, _, _ = tumble(session, **truth, k=1.001 * k)
+    expect(found, **{n[5:]: 1.001 * v / DPH for n, v in truth.items()})
