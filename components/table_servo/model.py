@@ -1,0 +1,450 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.math import clip, cos, fabs, floor, maximum, minimum, pi, sign, sin, sqrt, tanh
+
+IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
+
+
+class TableServo(Component):
+    """Turntable with one axis that a gyro holds still in inertial space.  [TABLE-SERVO, LOOP-TABLE-SERVO, CTRL-CAPTURE]
+
+    Modes 0 hold, 1 index, 2 rate are kinematic and those of table_rate.  In mode 3 the table obeys (w: inertial
+    rate about the axis, e: that of the base, x: angle against the base)
+
+        J w' = M + M_load + torque - D (w - e) - (H_g / K_g) u'          x' = w - e
+
+    with the motor torque M = -G C(s) u / (1 + lag s), limited to torque_max, and the compensator of three networks
+    C(s) = prod (1 + s / zero_i) / (1 + s / pole_i), so that the pickoff voltage u of a gyro with its input axis
+    along the table axis is nulled: w = omega_d, rate = -omega_E - omega_M (spec d1, 5.0).  H_g, J_g, C_g, K_g are the
+    gyro the loop is made for; G follows from the crossover or from the static stiffness K_T = G K_g H_g / C_g:
+
+        L(s) = G K_g H_g C(s) / ( s [ (J s + D) (J_g s + C_g) + H_g2 ] (1 + lag s) ),   |L(j crossover)| = 1
+
+    Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w are near zero for capture_hold; then
+    the networks are preset and the fine loop closes.  All linear terms are integrated exactly; load torque, limit
+    and square law of the motor are taken once in each internal step and stay out of the linearization.
+
+        M_load = -friction tanh((w - e) / v) + ripple sin(n x + phase) - (unbalance x f)_z + noise
+
+    Encoder: angle_read = x + sum_k amplitude_k sin(n_k x + phase_k), n = 1, 2, encoder_fine, rounded to the quantum.
+    f, omega, alpha in face axes as in table_rate.
+
+    Not modelled: stiction before breakaway, wobble, torsion between motor and plate, air bearing and slip-ring
+    follower (their torque comes in by `torque`), carrier and demodulator ripple, stops, drop-out from the fine loop.
+    Source: 000_791234d3afc34a0c.txt eq. 3-54, 3-55, 5-1..5-21, ch. 5.5 one-1, 6.1 item 6.
+    """
+
+    version = "1.0.0"
+
+    base = Parameter(IDENTITY, "1", "rows: table axes in ENU at angle 0; the third is the axis")
+    tilt = Parameter([0.0, 0.0], "rad", "axis tilt about the first and second table axis", min=-0.1, max=0.1)
+    angle0 = Parameter(0.0, "rad", "angle at the start")
+    acceleration = Parameter(0.1, "rad/s2", "acceleration of every kinematic move", above=0.0)
+    index_rate = Parameter(0.1, "rad/s", "rate of an index move", above=0.0)
+    rate_max = Parameter(10.0, "rad/s", "largest rate that may be asked for", above=0.0)
+
+    J = Parameter(2.56, "kg.m2", "inertia of table and load about the axis", above=0.0)
+    viscous = Parameter(0.0, "N.m.s/rad", "viscous friction and back EMF, of the rate against the base", min=0.0)
+    friction = Parameter(0.0, "N.m", "Coulomb friction", min=0.0)
+    friction_rate = Parameter(2e-6, "rad/s", "rate at which it is 76 % there", above=0.0)
+    ripple = Parameter(0.0, "N.m", "torque ripple, amplitude", min=0.0)
+    ripple_cycles = Parameter(36, int, "its cycles per turn", min=1, max=100000)
+    ripple_phase = Parameter(0.0, "rad", "its phase at angle 0")
+    unbalance = Parameter([0.0, 0.0], "kg.m", "mass times offset along the first and second table axis")
+    rumble = Noise(0.0, "N.m/sqrt(Hz)", "random torque density (brushes, air)")
+
+    torque_max = Parameter(9.80665, "N.m", "largest motor torque (1 kg.m)", above=0.0)
+    shaper = Parameter(1, int, "root shaper before the square-law motor: 1 torque = demand, 0 square law", min=0, max=1)
+    lag = Parameter(5e-4, "s", "lag of demodulator and drive", above=0.0)
+    polarity = Parameter(1, int, "1: input axis along the table axis; -1: against it", min=-1, max=1)
+    network = Parameter(2, int, "1: 0.4 ms, 2: 1 ms, 3 and 4: undamped gyro, 0: own zeros and poles", min=0, max=4)
+    zeros = Parameter([100.0, 100.0, 100.0], "rad/s", "zeros of the three networks (network 0)", above=0.0)
+    poles = Parameter([100.0, 100.0, 100.0], "rad/s", "poles of the three networks (network 0)", above=0.0)
+    crossover = Parameter(0.0, "rad/s", "crossover of the loop; 0: 50 Hz (networks 1, 2) or 10 Hz (3, 4)", min=0.0)
+    stiffness = Parameter(0.0, "N.m/rad", "static stiffness K_T; 0: that which makes the crossover", min=0.0)
+    H_g = Parameter(0.2, "N.m.s", "gyro: spin angular momentum", above=0.0)
+    J_g = Parameter(2e-4, "kg.m2", "gyro: float inertia", above=0.0)
+    C_g = Parameter(0.2, "N.m.s/rad", "gyro: float damping; 0: undamped", min=0.0)
+    K_g = Parameter(10.0, "V/rad", "gyro: pickoff gain", above=0.0)
+
+    capture = Parameter(1, int, "1: capture first, 0: close the fine loop at once", min=0, max=1)
+    capture_rate = Parameter(8.0 * pi, "rad/s", "natural frequency while capturing (4 Hz)", above=0.0)
+    capture_damping = Parameter(1.2, "1", "damping ratio while capturing, by the tachometer", above=0.0)
+    capture_speed = Parameter(pi / 90.0, "rad/s", "speed limit while capturing (2 deg/s)", above=0.0)
+    capture_angle = Parameter(8.0 * pi / 648000.0, "rad", "fine below this table angle from null (8 arcsec)", above=0.0)
+    capture_slow = Parameter(3e-5, "rad/s", "fine below this rate", above=0.0)
+    capture_hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
+
+    encoder_amplitude = Parameter([0.0, 0.0, 0.0], "rad", "encoder error of orders 1, 2 and encoder_fine")
+    encoder_phase = Parameter([0.0, 0.0, 0.0], "rad", "their phases at angle 0")
+    encoder_fine = Parameter(360, int, "order of the fine encoder error, cycles per turn", min=1, max=100000)
+    quantum = Parameter(0.0, "rad", "quantum of angle_read; 0: none", min=0.0)
+
+    f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
+    omega_local = Input([0.0, 0.0, 0.0], "rad/s", "Earth rate at the site, ENU")
+    mode = Input(0.0, "1", "0 hold, 1 index, 2 rate, 3 servo")
+    target = Input(0.0, "1", "angle in rad (index) or rate in rad/s (rate)")
+    face = Input(IDENTITY, "1", "mount: rows are the gyro axes in table axes")
+    u = Input(0.0, "V", "pickoff voltage of the gyro")
+    torque = Input(0.0, "N.m", "disturbance torque on the table")
+
+    angle = Output("rad", "table angle, cumulative")
+    rate = Output("rad/s", "table rate relative to its base")
+    angle_read = Output("rad", "table angle as the encoder reads it")
+    omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
+    alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
+    f = Output("m/s2", "specific force, face axes", shape=(3,))
+    in_position = Output("1", "1 when the target is reached, or the fine loop closed")
+    saturated = Output("1", "1 while the motor is at its limit")
+    motor = Output("N.m", "motor torque")
+
+    theta = State(0.0, "rad", "table angle x")
+    spin = State(0.0, "rad/s", "inertial rate w about the axis")
+    filt = State(0.0, "V", "pickoff voltage behind the lag")
+    net = State([0.0, 0.0, 0.0], "V", "state of each network")
+
+    tilted = Discrete(IDENTITY, "1", "base with tilt")
+    gain = Discrete(0.0, "N.m/V", "static gain G of the loop")
+    pole = Discrete([0.0, 0.0, 0.0], "rad/s", "pole of each network")
+    ratio = Discrete([1.0, 1.0, 1.0], "1", "its gain at high frequency, pole / zero")
+    pull = Discrete(0.0, "N.m/V", "k_p while capturing")
+    brake = Discrete(0.0, "N.m.s/rad", "k_d while capturing")
+    near = Discrete(0.0, "V", "capture_angle as a pickoff voltage")
+
+    stage = Discrete(DRIVEN, "1", "0 kinematic, 1 capture, 2 fine")
+    near_for = Discrete(0.0, "s", "time near null while capturing")
+    wish = Discrete(0.0, "N.m", "demand of the compensator at the end of the step")
+    slope = Discrete(0.0, "N.m/s", "its derivative for u = 0")
+    load = Discrete(0.0, "N.m", "M_load without noise")
+    drag = Discrete(0.0, "N.m", "tachometer torque while capturing")
+    push = Discrete(0.0, "N.m", "motor torque at the end of the step")
+    acc = Discrete(0.0, "rad/s2", "acceleration about the axis")
+
+    x = Discrete(0.0, "rad", "angle at the end of the last step")
+    v = Discrete(0.0, "rad/s", "rate there")
+    arrived = Discrete(0.0, "1", "in position")
+    t_last = Discrete(0.0, "s", "time of x, v")
+    mode_last = Discrete(0.0, "1", "mode of the motion planned")
+    target_last = Discrete(0.0, "1", "target of the motion planned")
+    t_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "s", "start of each segment of a kinematic move")
+    x_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad", "angle there")
+    v_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad/s", "rate there")
+    a_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad/s2", "acceleration in each segment")
+
+    def start(self) -> None:
+        for i in range(3):
+            for j in range(3):
+                dot = 0.0 if i != j else -1.0
+                for k in range(3):
+                    dot = dot + self.base[i][k] * self.base[j][k]
+                self.refuse(
+                    fabs(dot) > 1e-9,
+                    "base is no rotation: its rows must be unit vectors at right angles, to 1e-9",
+                )
+        det = self.base[0][0] * (self.base[1][1] * self.base[2][2] - self.base[1][2] * self.base[2][1])
+        det = det - self.base[0][1] * (self.base[1][0] * self.base[2][2] - self.base[1][2] * self.base[2][0])
+        det = det + self.base[0][2] * (self.base[1][0] * self.base[2][1] - self.base[1][1] * self.base[2][0])
+        self.refuse(det < 0.0, "base is left-handed (determinant -1): reverse one row")
+        c1 = cos(self.tilt[0])
+        s1 = sin(self.tilt[0])
+        c2 = cos(self.tilt[1])
+        s2 = sin(self.tilt[1])
+        for k in range(3):
+            first = self.base[0][k]
+            second = c1 * self.base[1][k] + s1 * self.base[2][k]
+            third = c1 * self.base[2][k] - s1 * self.base[1][k]
+            self.tilted[0][k] = c2 * first - s2 * third
+            self.tilted[1][k] = second
+            self.tilted[2][k] = s2 * first + c2 * third
+
+        self.refuse(self.polarity == 0.0, "polarity must be 1 or -1")
+        self.refuse(
+            self.C_g == 0.0 and self.stiffness > 0.0,
+            "stiffness = {stiffness} N.m/rad is asked for with an undamped gyro (C_g = 0), whose static "
+            "stiffness is infinite: give the crossover",
+        )
+        self.refuse(
+            self.network == 0.0 and self.crossover == 0.0 and self.stiffness == 0.0,
+            "network 0 needs a crossover or a stiffness",
+        )
+        w = self.crossover
+        if w == 0.0:
+            w = 100.0 * pi if self.network < 3.0 else 20.0 * pi
+        # leads: zero w / sqrt(r), pole w sqrt(r); lag-lead (1 + s/w_l) / (1 + 5 s/w_l) with w_l = w / 12
+        spread = 2.0 if self.network == 1.0 else sqrt(5.0)
+        spread = sqrt(28.0) if self.network == 3.0 else spread
+        spread = sqrt(6.5) if self.network == 4.0 else spread
+        top = self.K_g * self.H_g
+        zero = [0.0, 0.0, 0.0]
+        for k in range(3):
+            zero[k] = w / spread
+            self.pole[k] = w * spread
+        if self.network == 1.0 or self.network == 2.0:
+            zero[2] = w / 12.0
+            self.pole[2] = w / 60.0
+        if self.network == 3.0:
+            zero[2] = self.pole[2]  # two leads only
+        if self.network == 0.0:
+            for k in range(3):
+                zero[k] = self.zeros[k]
+                self.pole[k] = self.poles[k]
+        square = 1.0
+        for k in range(3):
+            self.ratio[k] = self.pole[k] / zero[k]
+            q = w / self.pole[k]
+            z = w / zero[k]
+            square = square * (1.0 + q * q) / (1.0 + z * z)
+        # denominator of L: d[0] s + d[1] s2 + ... with the lag and the poles multiplied in
+        d = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        d[1] = self.viscous * self.C_g + self.H_g * self.H_g
+        d[2] = self.J * self.C_g + self.viscous * self.J_g
+        d[3] = self.J * self.J_g
+        real = d[1] - d[3] * w * w
+        square = square * (real * real + d[2] * d[2] * w * w) * (1.0 + self.lag * self.lag * w * w)
+        self.gain = w * sqrt(square) / top
+        if self.stiffness > 0.0:
+            self.gain = self.stiffness * self.C_g / top
+        n = [self.gain * top, 0.0, 0.0, 0.0]
+        for k in range(3):
+            for j in range(3):
+                n[3 - j] = n[3 - j] + n[2 - j] / zero[k]
+        for j in range(6):
+            d[6 - j] = d[6 - j] + d[5 - j] * self.lag
+        for k in range(3):
+            for j in range(7):
+                d[7 - j] = d[7 - j] + d[6 - j] / self.pole[k]
+        for k in range(4):
+            d[k] = d[k] + n[k]
+        # Routh's table of d: all poles to the left while its first column stays positive
+        upper = [d[7], d[5], d[3], d[1], 0.0]
+        lower = [d[6], d[4], d[2], d[0], 0.0]
+        for _k in range(6):
+            self.refuse(
+                lower[0] <= 0.0,
+                "the loop is unstable with network {network} and a gyro of J_g = {J_g}, C_g = {C_g}: networks are per "
+                "gyro time constant (1: 0.4 ms, 2: 1 ms, 3 and 4: undamped), and stiffness has a lower limit too",
+            )
+            q = upper[0] / lower[0]
+            for j in range(4):
+                below = upper[j + 1] - q * lower[j + 1]
+                upper[j] = lower[j]
+                lower[j] = below
+        self.refuse(
+            self.C_g == 0.0 and self.capture == 1.0,
+            "capture = 1 needs a damped gyro (C_g > 0): an undamped one integrates the table angle; set capture = 0",
+        )
+        sensitivity = top / self.C_g if self.C_g > 0.0 else self.K_g  # V per rad of table angle
+        self.pull = self.J * self.capture_rate * self.capture_rate / sensitivity
+        self.brake = 2.0 * self.J * self.capture_rate * self.capture_damping
+        self.near = self.capture_angle * sensitivity
+        self.refuse(
+            self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max,
+            "capture_angle = {capture_angle} rad is beyond the linear range of the fine loop, torque_max / stiffness",
+        )
+
+        self.x = self.angle0
+        self.theta = self.angle0
+        self.spin = self.base_rate()
+        self.v = 0.0
+        self.acc = 0.0
+        self.arrived = 0.0
+        self.stage = DRIVEN
+        self.t_last = self.t
+        self.mode_last = -1.0
+        self.target_last = 0.0
+        for k in range(5):
+            self.t_s[k] = self.t
+            self.x_s[k] = self.angle0
+            self.v_s[k] = 0.0
+            self.a_s[k] = 0.0
+
+    def base_rate(self):
+        row = self.tilted[2][0] * self.omega_local[0] + self.tilted[2][1] * self.omega_local[1]
+        return row + self.tilted[2][2] * self.omega_local[2]
+
+    def shaped(self, demand):
+        m = clip(demand, -self.torque_max, self.torque_max)
+        return m if self.shaper == 1.0 else m * fabs(m) / self.torque_max
+
+    def flow(self) -> None:
+        slip = self.spin - self.base_rate()
+        volt = self.polarity * self.u if self.stage == FINE else 0.0
+        fast = (volt - self.filt) / self.lag
+        self.der.filt = fast
+        y = self.filt
+        high = 1.0
+        for k in range(3):
+            self.der.net[k] = self.pole[k] * (y - self.net[k])
+            y = self.net[k] + self.ratio[k] * (y - self.net[k])
+            high = high * self.ratio[k]
+        m = -self.gain * y
+        # what the motor gives beyond the linear law, at mid-step, from held values: nothing of it enters the Jacobian
+        if self.stage == FINE:
+            middle = self.wish + 0.5 * self.h * (self.slope - self.gain * high * volt / self.lag)
+            m = m + (self.shaped(middle) - middle)
+        if self.stage == CAPTURE:
+            limit = self.brake * self.capture_speed
+            demand = clip(-self.polarity * self.pull * self.u, -limit, limit) + self.drag
+            m = m + clip(demand, -self.torque_max, self.torque_max)
+        m = m + self.load + self.torque + self.noise.rumble - self.viscous * slip
+        self.der.spin = (m - self.H_g / self.K_g * fast) / self.J
+        self.der.theta = slip
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if self.mode != self.mode_last or self.target != self.target_last:
+            self.refuse(
+                not (self.mode == 0.0 or self.mode == 1.0 or self.mode == 2.0 or self.mode == 3.0),
+                "mode = {mode} must be 0 hold, 1 index, 2 rate or 3 servo",
+            )
+            self.refuse(
+                self.mode == 2.0 and fabs(self.target) > self.rate_max,
+                "rate {target} rad/s exceeds rate_max = {rate_max} rad/s",
+            )
+            if self.mode != 3.0:
+                self.stage = DRIVEN
+                goal = self.target if self.mode == 2.0 else 0.0  # the rate that segment 0 leads to
+                t = self.t_last + fabs(goal - self.v) / self.acceleration
+                x = self.x + 0.5 * (self.v + goal) * (t - self.t_last)
+                self.t_s[0] = self.t_last
+                self.x_s[0] = self.x
+                self.v_s[0] = self.v
+                self.a_s[0] = sign(goal - self.v) * self.acceleration
+                for k in range(1, 5):
+                    self.t_s[k] = t
+                    self.x_s[k] = x
+                    self.v_s[k] = goal
+                    self.a_s[k] = 0.0
+                if self.mode == 1.0 and self.target != x:
+                    way = fabs(self.target - x)
+                    s = sign(self.target - x)
+                    peak = minimum(self.index_rate, sqrt(way * self.acceleration))
+                    ramp = peak / self.acceleration
+                    cruise = maximum(way - peak * ramp, 0.0) / peak
+                    self.a_s[1] = s * self.acceleration
+                    self.t_s[2] = t + ramp
+                    self.x_s[2] = x + s * (0.5 * peak * ramp)
+                    self.v_s[2] = s * peak
+                    self.t_s[3] = self.t_s[2] + cruise
+                    self.x_s[3] = self.x_s[2] + s * peak * cruise
+                    self.v_s[3] = s * peak
+                    self.a_s[3] = -s * self.acceleration
+                    self.t_s[4] = self.t_s[3] + ramp
+                    self.x_s[4] = self.target
+            elif self.stage == DRIVEN:
+                self.stage = CAPTURE
+                self.near_for = 0.0 if self.capture == 1.0 else self.capture_hold
+            self.mode_last = self.mode
+            self.target_last = self.target
+
+        if self.stage == DRIVEN:
+            past = self.t - self.t_s[4]
+            self.arrived = 1.0
+            self.acc = 0.0
+            self.v = self.v_s[4]
+            self.x = self.x_s[4] + self.v * past
+            if past < 0.0:
+                self.arrived = 0.0
+                for k in range(4):
+                    if self.t >= self.t_s[k]:
+                        dt = self.t - self.t_s[k]
+                        self.acc = self.a_s[k]
+                        self.v = self.v_s[k] + self.acc * dt
+                        self.x = self.x_s[k] + self.v_s[k] * dt + 0.5 * self.acc * dt * dt
+            self.t_last = self.t
+            self.theta = self.x
+            self.spin = self.base_rate() + self.v
+
+    @sampled(every=1)
+    def servo(self) -> None:
+        volt = self.polarity * self.u
+        ready = 0.0
+        if self.stage == CAPTURE:
+            near = fabs(self.u) < self.near and fabs(self.spin) < self.capture_slow
+            self.near_for = self.near_for + self.h if near else 0.0
+            if self.capture == 0.0 or (near and self.near_for >= self.capture_hold):
+                ready = 1.0
+        if ready == 1.0:
+            self.stage = FINE
+        if self.stage != FINE or ready == 1.0:  # the networks at rest at 0, or preset to what they will see
+            self.filt = ready * volt
+            for k in range(3):
+                self.net[k] = ready * volt
+        self.load = 0.0
+        self.push = 0.0
+        self.wish = 0.0
+        if self.stage == DRIVEN:
+            return
+        slip = self.spin - self.base_rate()
+        if self.friction > 0.0:
+            self.load = -self.friction * tanh(slip / maximum(self.friction_rate, 2.0 * self.h * self.friction / self.J))
+        if self.ripple > 0.0:
+            self.load = self.load + self.ripple * sin(self.ripple_cycles * self.theta + self.ripple_phase)
+        if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0:
+            g = [0.0, 0.0]  # specific force along the table axes at angle 0
+            for i in range(2):
+                row = self.tilted[i][0] * self.f_local[0] + self.tilted[i][1] * self.f_local[1]
+                g[i] = row + self.tilted[i][2] * self.f_local[2]
+            c = cos(self.theta)
+            s = sin(self.theta)
+            fx = c * g[0] + s * g[1]
+            fy = c * g[1] - s * g[0]
+            self.load = self.load - (self.unbalance[0] * fy - self.unbalance[1] * fx)
+        others = self.load + self.torque - self.viscous * slip
+        if self.stage == FINE:
+            fast = -self.filt / self.lag
+            y = self.filt
+            dy = fast
+            for k in range(3):
+                d = self.pole[k] * (y - self.net[k])
+                y = self.net[k] + self.ratio[k] * (y - self.net[k])
+                dy = d + self.ratio[k] * (dy - d)
+            self.wish = -self.gain * y
+            self.slope = -self.gain * dy
+            self.push = self.shaped(self.wish)
+            others = others - self.H_g / self.K_g * (volt / self.lag + fast)
+        else:
+            limit = self.brake * self.capture_speed
+            self.drag = -self.brake * self.spin
+            demand = clip(-self.pull * volt, -limit, limit) + self.drag
+            self.push = clip(demand, -self.torque_max, self.torque_max)
+        self.acc = (self.push + others) / self.J
+        self.x = self.theta
+        self.v = slip
+        self.t_last = self.t
+        self.arrived = 1.0 if self.stage == FINE else 0.0
+
+    def outputs(self) -> None:
+        read = self.theta
+        for k in range(3):
+            if self.encoder_amplitude[k] != 0.0:
+                order = k + 1.0 if k < 2 else self.encoder_fine
+                read = read + self.encoder_amplitude[k] * sin(order * self.theta + self.encoder_phase[k])
+        if self.quantum > 0.0:
+            read = self.quantum * floor(read / self.quantum + 0.5)
+        c = cos(self.theta)
+        s = sin(self.theta)
+        e = [0.0, 0.0, 0.0]  # Earth rate and specific force in base axes, at angle 0
+        g = [0.0, 0.0, 0.0]
+        for i in range(3):
+            row = self.tilted[i][0] * self.omega_local[0] + self.tilted[i][1] * self.omega_local[1]
+            e[i] = row + self.tilted[i][2] * self.omega_local[2]
+            row = self.tilted[i][0] * self.f_local[0] + self.tilted[i][1] * self.f_local[1]
+            g[i] = row + self.tilted[i][2] * self.f_local[2]
+        rate = self.spin - e[2]
+        wx = c * e[0] + s * e[1]
+        wy = c * e[1] - s * e[0]
+        fx = c * g[0] + s * g[1]
+        fy = c * g[1] - s * g[0]
+        for i in range(3):
+            self.omega[i] = self.face[i][0] * wx + self.face[i][1] * wy + self.face[i][2] * self.spin
+            self.alpha[i] = (self.face[i][0] * wy - self.face[i][1] * wx) * rate + self.face[i][2] * self.acc
+            self.f[i] = self.face[i][0] * fx + self.face[i][1] * fy + self.face[i][2] * g[2]
+        self.angle = self.theta
+        self.rate = rate
+        self.angle_read = read
+        self.in_position = self.arrived
+        self.motor = self.push
+        self.saturated = 1.0 if fabs(self.wish) > self.torque_max else 0.0

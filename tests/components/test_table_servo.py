@@ -1,0 +1,467 @@
+"""The table servo: its loop with floated_gyro against the spec's margins, statics, capture, load, encoder."""
+
+import math
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+from wired import BENCH, NO_DRIFT, QUIET, FloatedGyro, TableRate
+
+from gyrobench.component import PartError
+from gyrobench.linearize import state_space
+from gyrobench.packaging import load_part
+
+TableServo = load_part("table_servo", BENCH)
+
+ARCSEC = math.pi / 648000.0
+GCM = 9.80665e-5  # g.cm, N.m
+H = 1e-4
+ALONG = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # input axis along the table axis
+FAST = {"H": 0.04, "J": 1.2e-5, "C": 0.03, "K_sg": 10.0}  # 0.4 ms, the spec's sensor: H/c 4/3
+SLOW = {"H": 0.04, "J": 3e-5, "C": 0.03, "K_sg": 10.0}  # 1 ms
+FREE = {"H": 0.04, "J": 3e-5, "C": 1e-9, "K_sg": 10.0}  # undamped
+
+
+class Loop:
+    """Table and gyro, table first: each sees the newest output of the other."""
+
+    def __init__(self, gyro=SLOW, *, h=H, face=ALONG, inputs=None, gyro_parameters=None, **parameters):
+        self.h, self.k = h, 0
+        self.gyro = FloatedGyro(**{**QUIET, **NO_DRIFT, **gyro, **(gyro_parameters or {})})
+        design = dict(zip(("H_g", "J_g", "C_g", "K_g"), (gyro[n] for n in ("H", "J", "C", "K_sg")), strict=True))
+        self.table = TableServo(**{"capture": 0, **design, **parameters})
+        self.table.mode, self.table.face = 3.0, face
+        for name, x in (inputs or {}).items():
+            setattr(self.table, name, x)
+        self.table.initialize()
+        self.gyro.initialize()
+        self.K_T = self.table.gain * gyro["K_sg"] * gyro["H"] / gyro["C"]
+
+    def run(self, duration, torque=None):
+        track = []
+        for _ in range(round(duration / self.h)):
+            t = self.k * self.h
+            if torque:
+                self.table.torque = torque(t)
+            self.table.u = self.gyro.u
+            self.table.do_step(t, self.h)
+            for name in ("omega", "alpha", "f"):
+                setattr(self.gyro, name, list(getattr(self.table, name)))
+            self.gyro.do_step(t, self.h)
+            self.k += 1
+            part = self.table
+            track.append((t + self.h, part.angle, part.rate, part.motor, part.saturated, part.in_position, self.gyro.b))
+        return np.array(track)
+
+
+def kinematic(**parameters):
+    inputs = {k: parameters.pop(k) for k in ("mode", "target", "face", "omega_local", "f_local") if k in parameters}
+    part = TableServo(**parameters)
+    for key, x in inputs.items():
+        setattr(part, key, x)
+    part.initialize()
+    return part
+
+
+# ------------------------------------------------------------------------------------------ the linear loop
+def margins(loop):
+    loop.run(loop.h)  # the fine loop is closed by the first step
+    table = state_space(loop.table, ["u"], ["omega[1]"])
+    gyro = state_space(loop.gyro, ["omega[1]"], ["u"])
+    loop.table.gain = 0.0  # what is left is the gyro's reaction on the table: part of the plant, not of the cut loop
+    rest = state_space(loop.table, ["u"], ["omega[1]"])
+    cut = -(table - rest) * gyro * control.feedback(1, rest * gyro, sign=1)
+    gains, pm, _, _, w, _ = control.stability_margins(cut, returnall=True)
+    gains = gains[gains > 1e-3]  # below: artefacts of the gyro's resonance, which is not damped
+    return {
+        "f_c": w[0] / (2.0 * math.pi),
+        "PM": pm[0],
+        "GM": 20.0 * math.log10(min(g for g in gains if g > 1.0)),
+        "low": max(g for g in gains if g < 1.0),
+    }
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of python-control, about the float that is not damped
+@pytest.mark.parametrize(
+    "network, gyro, f_c, pm, gm, low, stiffness",
+    [
+        (1, FAST, 50.0, 53.8, 11.6, 0.073, 15876.0),
+        (2, SLOW, 50.0, 53.4, 9.4, 0.074, 13209.0),
+        (3, FREE, 10.0, 45.4, 16.9, 0.098, None),
+        (4, FREE, 10.0, 49.7, 12.0, 0.21, None),
+    ],
+)
+def test_margins_are_those_of_the_spec(network, gyro, f_c, pm, gm, low, stiffness):
+    """TABLE-SERVO, table of compensations: crossover, margins, lower gain limit, static stiffness in g.cm/arcsec."""
+    loop = Loop(gyro, network=network)
+    found = margins(loop)
+    assert found["f_c"] == pytest.approx(f_c, rel=1e-3)
+    assert found["PM"] == pytest.approx(pm, abs=0.06)
+    assert found["GM"] == pytest.approx(gm, abs=0.06)
+    assert found["low"] == pytest.approx(low, abs=0.0006 if low < 0.1 else 0.006)
+    if stiffness:
+        found = loop.K_T / (GCM / ARCSEC)
+        assert found == pytest.approx(stiffness, abs=0.6)
+
+
+def test_gain_outside_its_limits_is_refused_and_unstable():
+    """K_T 13209 g.cm/arcsec may fall to x0.074 and rise by 9.4 dB (x2.95): Routh's table against the poles."""
+    nominal = 13209.15 * GCM / ARCSEC
+    for factor in (0.0745, 2.93):
+        loop = Loop(stiffness=factor * nominal)
+        loop.run(H)
+        table = state_space(loop.table, ["u"], ["omega[1]"])
+        gyro = state_space(loop.gyro, ["omega[1]"], ["u"])
+        closed = control.feedback(-table * gyro, 1)
+        poles = np.sort(closed.poles().real)
+        assert poles[-1] == pytest.approx(0.0, abs=1e-9) and poles[-2] < 0.0  # the angle against the base is free
+    for factor in (0.0735, 2.96):
+        with pytest.raises(PartError, match="the loop is unstable with network 2"):
+            Loop(stiffness=factor * nominal)
+
+
+def test_networks_are_per_gyro():
+    with pytest.raises(PartError, match=r"unstable with network 1 and a gyro of J_g = 0\.0003,"):
+        Loop({**SLOW, "J": 3e-4}, network=1)  # 10 ms
+
+
+def test_own_network():
+    # network 2 by hand: leads r = 5 about 50 Hz, lag-lead at 50 / 12 Hz and a fifth of that
+    w = 100.0 * math.pi
+    r = math.sqrt(5.0)
+    own = Loop(network=0, zeros=[w / r, w / r, w / 12.0], poles=[w * r, w * r, w / 60.0], crossover=w)
+    assert own.table.gain == pytest.approx(Loop().table.gain, rel=1e-14)
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3])
+def test_exact_against_expm(h):
+    """The README's number: fine loop open, random held voltages and torques, against expm of its linearization."""
+    part = Loop(h=h, viscous=0.3, angle0=0.2).table
+    part.omega_local = [0.0, 0.0, 5e-5]
+    part.do_step(0.0, h)
+    a = np.array(part.jacobian())
+    n = len(a)
+    names = ("theta", "spin", "filt", "net")
+    state = lambda: np.hstack([getattr(part, n) for n in names])  # noqa: E731
+    x = state()
+    rng = np.random.default_rng(1)
+    worst = 0.0
+    for k in range(1, 200):
+        part.u, part.torque = rng.normal() * 1e-7, rng.normal() * 0.1
+        f = np.zeros(n)  # constant term: f(0)
+        f[0] = -5e-5
+        f[1] = (part.torque + 0.3 * 5e-5 - 0.04 / 10.0 * part.u / part.lag) / part.J
+        f[2] = part.u / part.lag
+        step = expm(np.block([[a, f[:, None]], [np.zeros((1, n + 1))]]) * h)
+        x = step[:n, :n] @ x + step[:n, n]
+        part.do_step(k * h, h)
+        worst = max(worst, (abs(state() - x) / (abs(x) + 1e-9)).max())
+    assert part.saturated == 0.0
+    assert worst < 1e-10
+
+
+def test_the_linearization_is_that_of_the_fine_loop_in_every_mode():
+    part = Loop().table
+    part.do_step(0.0, H)
+    a = part.jacobian()
+    part.u = 1.0
+    part.friction = 0.1
+    for k in range(1, 5):
+        part.do_step(k * H, H)
+    assert part.saturated == 1.0 and part.jacobian() == a
+    part.mode = 2.0
+    part.do_step(5 * H, H)
+    assert part.stage == 0.0 and part.jacobian() == a
+
+
+# ------------------------------------------------------------------------------------------- statics
+@pytest.mark.parametrize("gyro, network", [(FAST, 1), (SLOW, 2), ({"H": 0.2, "J": 2e-4, "C": 0.2, "K_sg": 10.0}, 2)])
+def test_static_stiffness(gyro, network):
+    """1400 g.cm at 13209 g.cm/arcsec: 0.10599 arcsec against +torque's own sense, and no rate; doubled, the double."""
+    K_T = 13209.0 * GCM / ARCSEC
+    angles = []
+    for m in (1400.0 * GCM, 2800.0 * GCM):
+        track = Loop(gyro, network=network, stiffness=K_T).run(0.9, lambda t, m=m: m)
+        assert abs(track[-1, 2]) < 1e-11
+        angles.append(track[-1, 1] / ARCSEC)
+    # a jump of a held torque is seen by a rate sampled at the end of each step: h2 dM / (12 J) more
+    assert angles[0] == pytest.approx(1400.0 / 13209.0 + H * H / 12.0 * 1400.0 * GCM / 2.56 / ARCSEC, rel=1e-6)
+    assert angles[0] == pytest.approx(0.10599, rel=1e-4)
+    assert angles[1] == pytest.approx(2.0 * angles[0], rel=1e-9)
+
+
+def test_varying_torque_gives_a_rate_error_of_change_over_stiffness_and_time():
+    """5-15: dM over T gives dM / (K_T T); a constant torque gives none."""
+    loop = Loop(h=5e-4)
+    track = loop.run(4.0, lambda t: 0.05 + 0.02 * max(0.0, t - 1.0) / 3.0)
+    rate = track[:, 2]
+    assert rate[(track[:, 0] > 0.9) & (track[:, 0] < 0.99)].mean() == pytest.approx(0.0, abs=1e-11)
+    assert rate[-2000:].mean() == pytest.approx(0.02 / 3.0 / loop.K_T, rel=1e-6)
+
+
+def test_undamped_gyro_holds_the_torque_with_the_float():
+    """5-20: the float integrates the table angle, so that goes back to 0, and G K_g b holds the torque."""
+    loop = Loop(FREE, network=4, h=2.5e-4)
+    track = loop.run(2.0, lambda t: 0.05 * min(1.0, t))
+    assert abs(track[:, 1]).max() > 9e-8  # while the torque grows
+    assert track[-1, 1] == pytest.approx(0.0, abs=1e-9)
+    assert track[-1, 6] * 10.0 * loop.table.gain == pytest.approx(0.05, rel=1e-5)
+
+
+def test_drift_and_earth_rate():
+    """rate = omega_d - omega_E,x (spec d1, 5.0 with omega_M = -omega_d), the drift of 1e-7 rad/s with its sign."""
+    track = Loop(gyro_parameters={"D_F": 1e-7}).run(0.6)
+    assert track[-1, 2] == pytest.approx(1e-7, rel=1e-6)
+    earth = [0.0, 0.0, 5.22e-5]
+    loop = Loop(gyro_parameters={"D_F": 1e-7}, inputs={"omega_local": earth})
+    assert loop.run(1.0)[-1, 2] == pytest.approx(1e-7 - 5.22e-5, rel=1e-9)
+    # input axis against the table axis: w about the axis is -omega_d
+    against = [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    loop = Loop(gyro_parameters={"D_F": 1e-7}, face=against, polarity=-1, inputs={"omega_local": earth})
+    assert loop.run(1.0)[-1, 2] == pytest.approx(-1e-7 - 5.22e-5, rel=1e-9)
+
+
+@pytest.mark.parametrize("h, lost", [(1e-4, 0.0), (1e-3, 0.2)])
+def test_phase_cost_of_the_exchange(h, lost):
+    """Table first: the held rate leads by h/2, the held voltage lags by h/2.  At once: h more, 1.8 deg for 0.1 ms."""
+    loop = Loop()
+    loop.run(H)
+    table = state_space(loop.table, ["u"], ["omega[1]"])
+    gyro = state_space(loop.gyro, ["omega[1]"], ["u"])
+    z = np.exp(100j * math.pi * h)
+    p, q = control.sample_system(table, h)(z), control.sample_system(gyro, h)(z)
+    smooth = (table * gyro)(100j * math.pi)
+    assert np.degrees(np.angle(p * q * z / smooth)) == pytest.approx(0.0, abs=0.01 + lost)
+    assert np.degrees(np.angle(p * q / smooth)) == pytest.approx(-18000.0 * h, abs=0.01 + lost)
+
+
+# ------------------------------------------------------------------------------------------- the motor
+def test_square_law_without_its_root_shaper():
+    """MOTOR-SQUARELAW: static error sqrt(M M_max) / K_T = 0.896 arcsec instead of 0.106 at 1400 g.cm."""
+    loop = Loop(shaper=0, h=2e-4)
+    track = loop.run(1.5, lambda t: 1400.0 * GCM * min(1.0, t / 0.5))
+    assert track[-1, 1] / ARCSEC == pytest.approx(0.8958, rel=2e-3)
+    assert track[-1, 3] == pytest.approx(-1400.0 * GCM, rel=1e-3)
+
+
+@pytest.mark.parametrize("h, error", [(1e-4, 4e-4), (1e-3, 4e-2)])
+def test_torque_limit_against_a_tight_reference(h, error):
+    """The README's number: a voltage of 2e-3 sin(20 t) V drives the demand far beyond the limit and back."""
+    part = Loop(h=h).table
+    part.do_step(0.0, h)
+    voltage = lambda k: 2e-3 * math.sin(20.0 * k * h)  # noqa: E731
+    x = np.hstack([part.theta, part.spin, part.filt, part.net])
+    pole, ratio = np.array(part.pole), np.array(part.ratio)
+
+    def slope(t, x, u):
+        y = x[2]
+        dx = np.empty(6)
+        for j in range(3):
+            dx[3 + j] = pole[j] * (y - x[3 + j])
+            y = x[3 + j] + ratio[j] * (y - x[3 + j])
+        m = min(max(-part.gain * y, -part.torque_max), part.torque_max)
+        fast = (u - x[2]) / part.lag
+        dx[0], dx[1], dx[2] = x[1], (m - part.H_g / part.K_g * fast) / part.J, fast
+        return dx
+
+    limited, worst, peak = 0, 0.0, 0.0
+    for k in range(1, round(0.4 / h)):
+        part.u = voltage(k)
+        part.do_step(k * h, h)
+        x = solve_ivp(slope, (0.0, h), x, "RK45", args=(part.u,), rtol=1e-9, atol=1e-14).y[:, -1]
+        limited += part.saturated
+        worst, peak = max(worst, abs(part.spin - x[1])), max(peak, abs(x[1]))
+    assert 0.3 < limited * h / 0.4 < 0.7
+    assert worst / peak < error
+
+
+# ------------------------------------------------------------------------------------------- capture
+def test_capture_from_two_degrees():
+    """CTRL-CAPTURE: from 2 deg of float angle, pickoff good to 0.5 deg, 1400 g.cm of friction: fine at 2.17 s."""
+    loop = Loop(
+        h=5e-4,
+        capture=1,
+        friction=1400.0 * GCM,
+        friction_rate=1e-4,
+        gyro_parameters={"u_max": 10.0 * math.radians(0.5)},
+    )
+    loop.gyro.float_angle = math.radians(2.0)
+    track = loop.run(3.0)
+    t, b = track[:, 0], track[:, 6]
+    assert t[np.argmax(track[:, 5] == 1.0)] == pytest.approx(2.17, abs=0.02)
+    assert t[np.nonzero(abs(b) > ARCSEC * 4.0 / 3.0)[0][-1]] == pytest.approx(2.31, abs=0.05)
+    assert math.degrees(abs(track[:, 2]).max()) == pytest.approx(1.95, abs=0.02)
+    assert abs(b[-1]) < 0.2 * ARCSEC and track[-1, 4] == 0.0
+
+
+def test_fine_loop_closed_directly_at_two_degrees_does_not_settle():
+    loop = Loop(h=1e-3, capture=0, friction=1400.0 * GCM, friction_rate=1e-4, gyro_parameters={"u_max": 10.0})
+    loop.gyro.float_angle = math.radians(2.0)
+    track = loop.run(5.0)
+    late = track[:, 0] > 4.0
+    assert math.degrees(abs(track[late, 6]).max()) > 2.0 and track[late, 4].mean() > 0.5
+
+
+def test_capture_waits_for_its_time():
+    for hold in (0.0, 0.02):
+        track = Loop(capture=1, capture_hold=hold).run(0.03)
+        assert track[np.argmax(track[:, 5] == 1.0), 0] == pytest.approx(max(hold, H), abs=1.1 * H)
+
+
+# ------------------------------------------------------------------------------------------- load torques
+def settled(loop, duration=1.0):
+    """Torque that the loop holds, from the static angle error of the gyro's pickoff."""
+    loop.run(duration)
+    return loop.gyro.b * 10.0 * loop.table.gain
+
+
+def test_unbalance():
+    """5-36: G m cos(phi) sin(theta): 20 kgf at 0.05 cm with the axis at 15 deg: 966 g.cm where it is largest."""
+    p = math.radians(15.0)
+    axis = [0.0, math.cos(p), math.sin(p)]  # north and 15 deg up; the first axis east: east x down = north, M > 0
+    base = [[1.0, 0.0, 0.0], np.cross(axis, [1.0, 0.0, 0.0]).tolist(), axis]
+    inputs = {"f_local": [0.0, 0.0, 9.80665]}
+    for angle, part in ((0.0, 1.0), (math.pi / 6.0, math.cos(math.pi / 6.0)), (math.pi / 2.0, 0.0)):
+        loop = Loop(h=5e-4, base=base, angle0=angle, unbalance=[20.0 * 0.0005, 0.0], inputs=inputs)
+        assert settled(loop) == pytest.approx(part * 966.0 * GCM, abs=0.2 * GCM)
+    vertical = Loop(h=5e-4, unbalance=[0.01, 0.01], inputs=inputs)
+    assert settled(vertical, 0.3) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_friction_and_viscous_torque_oppose_the_rate_against_the_base():
+    earth = {"omega_local": [0.0, 0.0, 7e-5]}  # the table turns at -7e-5 against its base
+    assert settled(Loop(h=5e-4, friction=0.02, inputs=earth)) == pytest.approx(0.02, rel=1e-6)
+    assert settled(Loop(h=5e-4, viscous=100.0, inputs=earth)) == pytest.approx(7e-3, rel=1e-6)
+
+
+def test_torque_ripple():
+    loop = Loop(h=5e-4, ripple=0.03, ripple_cycles=36, ripple_phase=0.4, angle0=0.1)
+    assert settled(loop) == pytest.approx(0.03 * math.sin(36 * 0.1 + 0.4), rel=1e-5)
+
+
+def test_rumble_gives_the_angle_its_density_over_the_stiffness():
+    """Torque noise well inside the band of the loop: angle density = torque density / K_T; rms by the closed loop."""
+    part = Loop(rumble=1e-4, h=1e-3)
+    track = part.run(6.0)
+    cut = Loop()
+    cut.run(H)
+    table = state_space(cut.table, ["torque", "u"], ["angle", "omega[1]"])
+    gyro = state_space(cut.gyro, ["omega[1]"], ["u"])
+    w = 2.0 * math.pi * np.linspace(0.05, 400.0, 20001)
+    p, q = table(1j * w), gyro(1j * w)
+    response = p[0, 0] + p[0, 1] * q * p[1, 0] / (1.0 - q * p[1, 1])
+    assert abs(response[0]) * part.K_T == pytest.approx(1.0, rel=0.01)
+    # a two-sided density S gives the variance S2 times the two-sided noise bandwidth
+    rms = 1e-4 * math.sqrt(2.0 * np.sum(abs(response) ** 2) * (w[1] - w[0]) / (2.0 * math.pi))
+    assert track[500:, 1].std() == pytest.approx(rms, rel=0.15)
+
+
+# ------------------------------------------------------------------------------------------- angle, frames, modes
+def test_encoder():
+    part = kinematic(
+        mode=2.0,
+        target=1.0,
+        acceleration=1e6,
+        encoder_amplitude=[2e-6, 1e-6, 5e-7],
+        encoder_phase=[0.3, -0.7, 1.1],
+        encoder_fine=360,
+    )
+    for k in range(300):
+        part.do_step(k * 0.02, 0.02)
+        x = part.angle
+        error = 2e-6 * math.sin(x + 0.3) + 1e-6 * math.sin(2 * x - 0.7) + 5e-7 * math.sin(360 * x + 1.1)
+        assert part.angle_read - x == pytest.approx(error, abs=1e-14)
+    coarse = kinematic(mode=2.0, target=-0.3, quantum=1e-3, encoder_amplitude=[0.01, 0.0, 0.0])
+    for k in range(300):
+        coarse.do_step(k * 0.01, 0.01)
+        q = coarse.angle_read / 1e-3
+        assert q == pytest.approx(round(q), abs=1e-9)
+        assert abs(coarse.angle_read - coarse.angle - 0.01 * math.sin(coarse.angle)) <= 0.5e-3 + 1e-12
+
+
+def test_kinematic_modes_are_those_of_table_rate():
+    rng = np.random.default_rng(3)
+    rotation = lambda: Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix().tolist()  # noqa: E731
+    shared = {"base": rotation(), "tilt": [0.01, -0.02], "angle0": 0.3, "acceleration": 0.4, "quantum": 1e-4}
+    face, earth = rotation(), [3e-5, -4e-5, 5e-5]
+    servo, plain = kinematic(**shared), TableRate(**shared)
+    plain.initialize()
+    commands = [(2.0, 0.2), (1.0, 1.5), (2.0, -0.3), (0.0, 0.0), (1.0, -0.2)]
+    for k in range(1500):
+        for part in (servo, plain):
+            part.face, part.omega_local = face, earth
+            part.mode, part.target = commands[k // 300]
+            part.do_step(k * 0.01, 0.01)
+        assert (servo.angle, servo.angle_read, servo.in_position) == (plain.angle, plain.angle_read, plain.in_position)
+        assert servo.rate == pytest.approx(plain.rate, abs=1e-16)
+        assert servo.omega == pytest.approx(plain.omega, abs=1e-16)
+        assert servo.alpha == pytest.approx(plain.alpha, abs=1e-16)
+        assert servo.f == plain.f
+
+
+def test_from_rate_to_servo_and_back_to_an_index():
+    """Capture brakes a table that turns; the next command starts from where the servo left it."""
+    loop = Loop(h=1e-3, capture=1, acceleration=0.5)
+    loop.table.mode, loop.table.target = 2.0, 0.02
+    track = loop.run(0.5)
+    assert track[-1, 2] == pytest.approx(0.02, rel=1e-12)
+    loop.table.mode = 3.0
+    track = loop.run(3.0)
+    assert track[-1, 5] == 1.0 and abs(track[-1, 2]) < 1e-9
+    assert abs(np.diff(track[:, 1])).max() < 1.02e-3 * loop.table.capture_speed  # no jump
+    before = track[-1, 1]
+    loop.table.mode, loop.table.target = 1.0, before + 0.1
+    track = loop.run(2.0)
+    assert track[0, 1] - before == pytest.approx(0.25e-6, rel=1e-3)  # a t2 / 2 from the beginning of the step
+    assert track[-1, 5] == 1.0 and track[-1, 1] == before + 0.1
+
+
+def test_alpha_is_the_derivative_of_omega():
+    loop = Loop(FAST, network=1, inputs={"omega_local": [0.3, -0.2, 0.0]})
+    omega, alpha = [], []
+    for _ in range(600):
+        loop.run(H, lambda t: 0.2 * math.sin(60.0 * t))
+        omega.append(list(loop.table.omega))
+        alpha.append(list(loop.table.alpha))
+    omega, alpha = np.array(omega), np.array(alpha)
+    slope = (omega[2:] - omega[:-2]) / (2.0 * H)
+    assert abs(slope - alpha[1:-1]).max() < 0.02 * abs(alpha).max()  # h/2 of delay: the torque is held
+
+
+# ------------------------------------------------------------------------------------------- refusals
+@pytest.mark.parametrize(
+    "parameters, message",
+    [
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "base is left-handed"),
+        ({"J": 0.0}, "J = 0 kg.m2 must be > 0"),
+        ({"H_g": -0.2}, "H_g = -0.2 N.m.s must be > 0"),
+        ({"C_g": -1.0}, "C_g = -1 N.m.s/rad must be >= 0"),
+        ({"C_g": 0.0, "stiffness": 1e5, "capture": 0}, "undamped gyro .* static stiffness is infinite"),
+        ({"C_g": 0.0, "network": 3}, "capture = 1 needs a damped gyro"),
+        ({"polarity": 0}, "polarity must be 1 or -1"),
+        ({"network": 0}, "network 0 needs a crossover or a stiffness"),
+        ({"torque_max": 0.0}, "torque_max = 0 N.m must be > 0"),
+        ({"quantum": -1.0}, "quantum = -1 rad must be >= 0"),
+        ({"capture_angle": 1e-3}, "capture_angle = 0.001 rad is beyond the linear range"),
+    ],
+)
+def test_refuses(parameters, message):
+    with pytest.raises(PartError, match=message):
+        kinematic(**parameters)
+
+
+@pytest.mark.parametrize(
+    "mode, target, message",
+    [
+        (4.0, 0.0, "mode = 4 must be 0 hold, 1 index, 2 rate or 3 servo"),
+        (2.0, -11.0, "rate -11 rad/s exceeds rate_max = 10"),
+    ],
+)
+def test_refuses_commands(mode, target, message):
+    part = kinematic(mode=mode, target=target)
+    with pytest.raises(PartError, match=message):
+        part.do_step(0.0, H)
