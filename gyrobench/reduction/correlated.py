@@ -9,6 +9,11 @@ Estimates and intervals are the mixture over the candidates, weighted by likelih
 noise models that the data cannot tell apart goes into u.  A single "best" model would be too sure of itself: the
 regressors swallow a good part of the slow noise they are to be judged by.  Deterministic; no iteration.
 
+Measured (tests/reduction/coverage.py, 2000 records each of a nine-term tumble): with 72 windows a turn and 10 in each
+dwell the 95 % intervals hold the truth in 94.0 to 98.2 % of the records for white and for Gauss-Markov noise of 0.5
+to 10 windows, the constant term being the widest; with 36 and 5 windows in 92 to 98.5 %.  Slow noise under white
+noise (8 windows, 30 % of the variance) is the weak spot: 86 to 93 % and, in the short plan, 82 to 91 %.
+
 Standard uncertainty u: standard deviation of the mixture, or the 95 % half width over 1.96 where heavy tails make
 that smaller.  [RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88]
 """
@@ -112,7 +117,7 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     if white < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
-            f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval then holds for this record only."
+            f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval holds for this record only."
         )
     return Estimate(
         tuple(names), beta, covariance, u, half, probability, _dof(half / u), y - X @ beta,

@@ -60,17 +60,21 @@ class Cells:
 
 #: Prior weights of the three families white / Gauss-Markov / both.  Correlation times run from 0.3 windows (1 window
 #: for both) to LONGEST times the root of the length of the record, in windows, with a density proportional to
-#: tau**SLOPE per unit of log tau.  Chosen by Monte Carlo (tests/reduction/coverage.py) so that 95 % intervals of a
-#: nine-term tumble cover whatever the noise is.
+#: tau**slope per unit of log tau.  A short record leans to long times, because its regressors swallow much of the
+#: slow noise: the slopes fall by TILT for each doubling of the 82 windows they are given for.  Chosen by Monte Carlo
+#: (tests/reduction/coverage.py) so that 95 % intervals of a nine-term tumble cover whatever the noise is.
 FAMILIES = (0.5, 0.2, 0.3)
 LONGEST = 2.2
 SLOPES = (0.2, 0.6)
+TILT = (0.2, 0.4)
 
 
 def cells(t0: Array, t1: Array) -> Cells:
     """The grid of candidate models for windows [t0, t1] (s)."""
     window, record = float(np.median(t1 - t0)), float(t1[-1] - t0[0])
     longest = max(LONGEST * np.sqrt(record / window), 3.0) * window
+    doublings = min(max(float(np.log2(t0.size / 82.0)), 0.0), 2.5)
+    slopes = [a - b * doublings for a, b in zip(SLOPES, TILT, strict=True)]
     tau_p = np.geomspace(0.3 * window, longest, 12)
     tau_b = np.repeat(np.geomspace(window, longest, 10), 7)
     v = mean_variance(window / tau_b)
@@ -79,7 +83,7 @@ def cells(t0: Array, t1: Array) -> Cells:
     odds = np.exp(low + np.tile(np.linspace(0.0, 1.0, 7), 10) * (high - low))
     tau = np.concatenate([[window], tau_p, tau_b])
     share = np.concatenate([[0.0], np.ones(12), odds / (1.0 + odds)])
-    prior = np.concatenate([[1.0], _weights(tau_p, SLOPES[0]), _weights(tau_b, SLOPES[1])])
+    prior = np.concatenate([[1.0], _weights(tau_p, slopes[0]), _weights(tau_b, slopes[1])])
     return Cells(tau, share, prior * np.repeat(FAMILIES, (1, 12, 70)))
 
 
