@@ -26,6 +26,8 @@ def words(status: Any) -> str:
     """Simulated time, rate and time left of a :class:`gyrobench.system.loop.Status`."""
     rate = status.steps / max(status.elapsed, 1e-9)
     speed = f"{rate / 1e6:.2f} M steps/s" if rate >= 1e5 else f"{rate:,.0f} steps/s"
+    if status.time >= status.total:  # the ways between the phases of a plan are not known beforehand
+        return f"t = {status.time:,.0f} s, {speed}, soon done"
     return f"t = {status.time:,.0f} of {status.total:,.0f} s, {speed}, {span(status.eta)} left"
 
 

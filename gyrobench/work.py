@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,16 @@ class Job:
 
 def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
+
+
+def tell(notes: Iterable[str]) -> None:
+    """Notes on standard error; what is said of several slots is said once."""
+    slots: dict[str, list[str]] = {}
+    for text in notes:
+        slot, colon, rest = text.partition(": ")
+        slots.setdefault(rest if colon else text, []).append(slot if colon else "")
+    for rest, names in slots.items():
+        note("note: " + ", ".join(filter(None, names)) + (": " if names[0] else "") + rest)
 
 
 def ours(error: BaseException) -> bool:
@@ -145,8 +155,7 @@ def run(job: Job, as_json: bool = False) -> str:
     bench = Bench.find().folder
     with Session(system, job.parts, job.maps, engine=job.engine, isolate=job.isolate, bench=bench) as session:
         folder = run_folder(session, system, job.seed, step or system.step, job.maps, job.out, job.force)
-        for text in session.notes:
-            note(f"note: {text}")
+        tell(session.notes)
         try:
             with Meter(system.name) as meter:
                 record = session.run({}, job.seed, step, None, meter)
@@ -369,6 +378,5 @@ def export(
         raise UsageError(f"--out {path}: a{'n SSP archive' if to == 'ssp' else ' container FMU'} ends in {suffix}")
     check_fmus(parts)
     write = ssp.export_ssp if to == "ssp" else container.export_container
-    for text in write(system, path, parts, maps, None, seed, Bench.find().folder):
-        note(f"note: {text}")
+    tell(write(system, path, parts, maps, None, seed, Bench.find().folder))
     return path

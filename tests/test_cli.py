@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from gyrobench import cli, progress
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.system.loop import Status
 from gyrobench.system.record import Record
+from gyrobench.work import tell
 
 Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
@@ -55,7 +57,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             cwd=folder,
             capture_output=True,
             text=True,
-            env={**__import__("os").environ, "PYTHONPATH": env_path},
+            env={**os.environ, "PYTHONPATH": env_path},
             check=False,
         )
         assert done.returncode == code, done.stderr
@@ -353,6 +355,13 @@ def test_progress_in_lines_where_there_is_no_terminal(
         meter(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
     # 250 of 1000 s are done after 2.5 s: 7.5 s are left; 250,000 steps in 2.5 s
     assert capsys.readouterr().err == "tumble: 25 %, t = 250 of 1,000 s, 0.10 M steps/s, 8 s left\n"
+
+
+def test_a_note_on_several_slots_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    tell(["site: slow: no compiler", "gyro: slow: no compiler", "isolated FMUs run in the reference engine"])
+    assert capsys.readouterr().err == (
+        "note: site, gyro: slow: no compiler\nnote: isolated FMUs run in the reference engine\n"
+    )
 
 
 def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
