@@ -20,7 +20,7 @@ check: $(VENV)/test.stamp
 	$(BIN)/mypy
 
 # Speed against the budgets and against other tools.
-bench: $(VENV)/test.stamp
+bench: $(VENV)/bench.stamp
 	$(BIN)/python tests/benchmarks/run.py
 
 $(BIN)/python:
@@ -37,6 +37,10 @@ $(VENV)/test.stamp: pyproject.toml | $(BIN)/python
 	@echo "installing gyrobench and what its tests need into $(VENV); the first time takes some minutes"
 	$(PIP) -e ".[test]"
 	@touch $@ $(VENV)/demo.stamp
+
+$(VENV)/bench.stamp: pyproject.toml | $(BIN)/python
+	$(PIP) -e ".[test,bench]"
+	@touch $@
 
 clean:
 	rm -rf $(VENV) fmus/*.fmu fmus/*.ssp reports/out build dist
