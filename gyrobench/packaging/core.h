@@ -20,8 +20,16 @@ typedef struct {
     double running, dirty;
 } Numbers; /* all that decides the future */
 
+typedef struct { /* what follows from the numbers, kept because it seldom changes */
+    double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
+    int n, keyed;
+    double seed; /* the seed that the keys of the noise ports were made for */
+    uint64_t key[N_PORTS + 1];
+} Kept;
+
 typedef struct {
     Numbers n;
+    Kept kept;
     int failed;
     char name[128];
     char message[768];
@@ -139,8 +147,11 @@ static double normal_quantile(double p) { /* Wichura, AS 241 (PPND16) */
     return q < 0.0 ? -x : x;
 }
 
-static double normal(uint64_t seed, int port, uint64_t count) {
-    uint64_t key = mix(mix((seed + 1) * GAMMA) + (uint64_t)(port + 1) * GAMMA);
+static uint64_t key_of(uint64_t seed, int port) {
+    return mix(mix((seed + 1) * GAMMA) + (uint64_t)(port + 1) * GAMMA);
+}
+
+static double normal(uint64_t key, uint64_t count) {
     uint64_t z = mix(key + count * GAMMA);
     return normal_quantile(((double)(z >> 11) + 0.5) * 0x1p-53);
 }
@@ -148,14 +159,20 @@ static double normal(uint64_t seed, int port, uint64_t count) {
 static void draw(Part *p, int per) {
 #if N_PORTS > 0
     double *a = value(p);
+    const uint64_t count = (uint64_t)p->n.v.tick;
     int i;
+    if (!p->kept.keyed || p->kept.seed != p->n.v.seed) {
+        for (i = 0; i < N_PORTS; i++) p->kept.key[i] = key_of((uint64_t)p->n.v.seed, i);
+        p->kept.seed = p->n.v.seed;
+        p->kept.keyed = 1;
+    }
     for (i = 0; i < N_PORTS; i++) {
         double x = 0.0, size;
         if (ports[i].per != per) continue;
         size = a[ports[i].parameter];
         if (size != 0.0) {
-            x = size * normal((uint64_t)p->n.v.seed, i, (uint64_t)p->n.v.tick);
-            if (per == 2) x = x / sqrt(p->n.v.h);
+            x = size * normal(p->kept.key[i], count);
+            if (per == 2) x = x / p->kept.root;
         }
         a[ports[i].sample] = x;
     }
@@ -163,6 +180,7 @@ static void draw(Part *p, int per) {
     (void)p;
     (void)per;
     (void)normal;
+    (void)key_of;
 #endif
 }
 
@@ -265,13 +283,21 @@ static void advance(Part *p, double h) {
 #endif
 
 /* --------------------------------------------------------------------------------------- stepping */
-static int finite_range(Part *p, int from, int to, const char *what) {
-    const double *a = value(p);
-    double sum = 0.0;
+static inline int all_finite(const double *a, int n) {
+    double even = 0.0, odd = 0.0; /* NaN as soon as one is not finite; two sums, for they take turns */
     int i;
-    for (i = from; i < to; i++) sum = sum + a[i] * 0.0; /* NaN as soon as one is not finite */
-    if (sum == 0.0) return 1;
-    for (i = from; i < to; i++)
+    for (i = 0; i + 1 < n; i += 2) {
+        even = even + a[i] * 0.0;
+        odd = odd + a[i + 1] * 0.0;
+    }
+    if (i < n) even = even + a[i] * 0.0;
+    return even + odd == 0.0;
+}
+
+static int told_finite(Part *p, int from, int n, const char *what) {
+    const double *a = value(p);
+    int i;
+    for (i = from; i < from + n; i++)
         if (!isfinite(a[i])) {
             fail(p, "%s %s is %g at t = %.9g s", what, names[i], plain(a[i]), p->n.v.t);
             return 0;
@@ -279,9 +305,9 @@ static int finite_range(Part *p, int from, int to, const char *what) {
     return 1;
 }
 
-static int finite(Part *p) {
-    return finite_range(p, Y0, Y0 + N_Y, "output") && finite_range(p, X0, X0 + N_X, "state")
-        && finite_range(p, Q0, Q0 + N_Q, "discrete");
+static inline int finite(Part *p) { /* outputs, states, derivatives, discretes follow one another */
+    if (all_finite(value(p) + Y0, N_REFERENCES - Y0)) return 1;
+    return told_finite(p, Y0, N_Y, "output") && told_finite(p, X0, N_X, "state") && told_finite(p, Q0, N_Q, "discrete");
 }
 
 static void evaluate_start(Part *p) {
@@ -339,11 +365,18 @@ static void do_step(Part *p, double t, double step) {
         return;
     }
     p->n.v.t = t;
-    if (!finite_range(p, U0, U0 + N_U, "input")) return;
+    if (!all_finite(value(p) + U0, N_U) && !told_finite(p, U0, N_U, "input")) return;
     largest = LARGEST_STEP(p, step);
-    n = (int)ceil(step / largest - 1e-9);
-    if (n < 1) n = 1;
-    h = step / n;
+    if (step != p->kept.step || largest != p->kept.largest) {
+        n = (int)ceil(step / largest - 1e-9);
+        p->kept.n = n < 1 ? 1 : n;
+        p->kept.h = step / p->kept.n;
+        p->kept.root = sqrt(p->kept.h);
+        p->kept.step = step;
+        p->kept.largest = largest;
+    }
+    n = p->kept.n;
+    h = p->kept.h;
     p->n.v.h = h;
     for (k = 0; k < n; k++) {
         p->n.v.t = t + k * h;

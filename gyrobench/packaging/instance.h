@@ -56,7 +56,12 @@ static int missing(Instance *m, unsigned reference) {
     return wrong(m, "no variable has the value reference %u", reference);
 }
 
-static inline int has(unsigned reference) { return reference < (unsigned)N_REFERENCES; }
+static inline int in_range(unsigned reference, int first, int n) {
+    const int k = (int)reference;
+    return k >= first && k < first + n;
+}
+
+static inline int has(unsigned reference) { return in_range(reference, 0, N_REFERENCES); }
 
 static int has_all(Instance *m, const unsigned references[], size_t n) {
     size_t i;
@@ -66,19 +71,22 @@ static int has_all(Instance *m, const unsigned references[], size_t n) {
 }
 
 static inline int get_value(Instance *m, unsigned reference, double *x) {
-    const int k = (int)reference;
-    if (!has(reference)) return missing(m, reference);
-    if (k >= Y0 && k < Y0 + N_Y) refresh(&m->part);
-    *x = value(&m->part)[k];
+    if (in_range(reference, Y0, N_Y)) { /* an output */
+        if (m->part.n.dirty != 0.0) refresh(&m->part);
+    } else if (!has(reference)) {
+        return missing(m, reference);
+    }
+    *x = value(&m->part)[reference];
     return 0;
 }
 
 static inline int set_value(Instance *m, unsigned reference, double x) {
-    const int k = (int)reference;
-    if (!has(reference)) return missing(m, reference);
-    if (k < U0 && m->part.n.running != 0.0)
-        return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[k]);
-    value(&m->part)[k] = x;
+    if (!in_range(reference, U0, N_U)) { /* no input */
+        if (!has(reference)) return missing(m, reference);
+        if ((int)reference < U0 && m->part.n.running != 0.0)
+            return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[reference]);
+    }
+    value(&m->part)[reference] = x;
     return 0;
 }
 

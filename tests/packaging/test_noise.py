@@ -30,7 +30,7 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
         '#include "model.c"\n'
         '#define SEEN __attribute__((visibility("default")))\n'
         "SEEN double ask_quantile(double p) { return normal_quantile(p); }\n"
-        "SEEN double ask_normal(uint64_t s, int port, uint64_t k) { return normal(s, port, k); }\n",
+        "SEEN double ask_normal(uint64_t s, int port, uint64_t k) { return normal(key_of(s, port), k); }\n",
         encoding="utf-8",
     )
     compiler.compile_library(folder / "ask.c", folder / "ask.so", (folder,), compiler.this_platform())

@@ -1,0 +1,75 @@
+"""Time of one communication step of 1 ms of every native part: set inputs, step, get outputs.
+
+Run by hand: ``python tests/benchmarks/part_speed.py [part ...]``.  Parameters (noise on) and inputs are those of
+the parts' reference runs, repeated.  The best of many short rounds counts: the machine may be shared.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import tempfile
+from pathlib import Path
+
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.packaging import build, compiler
+from gyrobench.packaging.instance import Fmu
+from gyrobench.packaging.reference import read_reference
+
+STEPS = 20_000
+ROUNDS = 100
+H = 1e-3
+
+
+def driver(folder: Path) -> ctypes.CDLL:
+    source = Path(__file__).with_suffix(".c")
+    compiler.compile_library(source, folder / "driver.so", (folder,), compiler.this_platform())
+    return ctypes.CDLL(str(folder / "driver.so"))
+
+
+def measure(library: ctypes.CDLL, part: str, out: Path) -> float:
+    """Seconds a step."""
+    reference = read_reference(Bench(standard_folder()).part_folder(part) / "reference.csv")
+    one = Fmu(build(part, out=out), part)
+    one.set(reference.parameters)
+    one.set({n: x[0] for n, x in reference.inputs.items()})
+    one.initialize()
+    names = list(reference.inputs)
+    rows = len(reference.time)
+    flat = [reference.inputs[n][k] for k in range(rows) for n in names]
+    inputs = (ctypes.c_double * max(1, len(flat)))(*flat)
+    ins = (ctypes.c_uint * max(1, len(names)))(*(one.variables[n].valueReference for n in names))
+    outs = (ctypes.c_uint * len(reference.outputs))(*(one.variables[n].valueReference for n in reference.outputs))
+    values = (ctypes.c_double * len(outs))()
+    functions = [
+        ctypes.cast(getattr(one.fmu.dll, f"fmi2{n}"), ctypes.c_void_p) for n in ("SetReal", "GetReal", "DoStep")
+    ]
+    size, double, long = ctypes.c_size_t, ctypes.c_double, ctypes.c_long
+    library.time_steps.restype = double
+    best = float("inf")
+    for k in range(ROUNDS):
+        seconds = library.time_steps(
+            ctypes.c_void_p(one.fmu.component), *functions, ins, size(len(names)), inputs, size(rows),
+            outs, size(len(outs)), values, double(H), long(k * STEPS), long(STEPS),
+        )  # fmt: skip
+        if seconds < 0.0:
+            raise SystemExit(f"{part}: status {-seconds:g}: {'; '.join(one.messages)}")
+        best = min(best, seconds / STEPS)
+    one.free()
+    return best
+
+
+def main(parts: list[str]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        library = driver(Path(folder))
+        print(f"{'part':20} us a step of 1 ms")
+        times = []
+        known = Bench(standard_folder()).parts()
+        for part in parts or sorted(n for n, f in known.items() if (f / "reference.csv").exists()):
+            times.append(measure(library, part, Path(folder)))
+            print(f"{part:20} {times[-1] * 1e6:.4f}")
+        print(f"{'mean':20} {sum(times) / len(times) * 1e6:.4f}   (budget 0.10)")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
