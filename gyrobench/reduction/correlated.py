@@ -11,7 +11,7 @@ regressors swallow a good part of the slow noise they are to be judged by.  Dete
 
 Measured by tests/reduction/coverage.py: how often the 95 % intervals of the nine coefficients of a tumble hold the
 truth (lowest to highest of the nine, 1000 to 2000 records), for white noise and for Gauss-Markov noise of 0.5 to 10
-windows: 0.924 to 0.976 with 72 windows a turn and 10 in each dwell, 0.922 to 0.985 with 36 and 5.  White and
+windows: 0.924 to 0.976 with 72 windows a turn and 10 in each dwell, 0.918 to 0.985 with 36 and 5.  White and
 Gauss-Markov noise together are harder where slow noise hides: 3 windows, half of the variance: 0.943 to 0.973 (short
 plan 0.89 to 0.92); 8 windows, 30 % of the variance: 0.83 to 0.89 (short plan 0.81 to 0.90).  Longer records help.
 
