@@ -252,7 +252,7 @@ class TableServo(Component):
         self.arrived = 0.0
         self.stage = DRIVEN
         self.t_last = self.t
-        self.mode_last = -1.0
+        self.mode_last = 0.0
         self.target_last = 0.0
         for k in range(5):
             self.t_s[k] = self.t

@@ -458,6 +458,7 @@ def test_refuses(parameters, message):
     "mode, target, message",
     [
         (4.0, 0.0, "mode = 4 must be 0 hold, 1 index, 2 rate or 3 servo"),
+        (-1.0, 0.0, "mode = -1 must be 0 hold, 1 index, 2 rate or 3 servo"),
         (2.0, -11.0, "rate -11 rad/s exceeds rate_max = 10"),
     ],
 )
