@@ -1,5 +1,5 @@
-"""Static drift models of a single-degree-of-freedom gyro.  [GYRO-STATIC-8/-9/-10; 000_791234d3afc34a0c.txt
-eq. 2-27..2-49]
+"""Static drift models of one- and two-degree-of-freedom gyros.  [GYRO-STATIC-8/-9/-10, GYRO-STATIC-2DOF;
+000_791234d3afc34a0c.txt eq. 2-27..2-49]
 
     omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
 
@@ -7,6 +7,10 @@ omega_d is the drift in precession sign (rate of the rotor axis about the input 
 omega_IA - omega_d), (X, Y, Z) = -f/g0 the specific force along I, O, S in the book's sign, in multiples of g0
 = 9.80665 m/s2. Coefficients are in rad/s (per g0, per g0 squared); at the surface in deg/h, deg/h/g,
 deg/h/g2.
+
+A two-degree-of-freedom gyro has one such set per channel, named Dx_0, Dx_x, Dx_xz ... and Dy_0, Dy_y, Dy_yz ...
+over its axes x, y, z (outer gimbal, inner gimbal, spin).  Each channel is the model above in axes of its own:
+(I, O, S) = (x, y, z) for the x channel, (y, -x, z) for the y channel.
 
 Where |f| does not change, X2 + Y2 + Z2 is a constant: D_OO cannot be told from D_F, D_II and D_SS.
 Not modelled: vibration, orders above two, input rate and torquer command terms, aging, temperature (see the
@@ -44,12 +48,28 @@ MEANING = {
     "D_OS": "compliance, output and spin axes",
     "D_IS": "anisoelasticity, input and spin axes",
 }
-_AXES = {"I": 0, "O": 1, "S": 2}
+_AXES = {"I": 0, "O": 1, "S": 2, "x": 0, "y": 1, "z": 2}
+_OWN = {"x": {"I": "x", "O": "y", "S": "z"}, "y": {"I": "y", "O": "x", "S": "z"}}  # of a channel, signs apart
+
+
+def _axes(name: str) -> str:
+    """The axes a coefficient multiplies: "" for D_F and Dx_0, "IS" for D_IS, "xz" for Dx_xz."""
+    return "".join(a for a in name.partition("_")[2] if a in _AXES)
+
+
+def name_2dof(channel: str, name: str) -> str:
+    """What the coefficient ``name`` is called in the x or y channel of a two-degree-of-freedom gyro: D_IS is
+    Dx_xz and Dy_yz.  Raises KeyError for another channel."""
+    return f"D{channel}_" + ("".join(sorted(_OWN[channel][a] for a in _axes(name))) or "0")
+
+
+#: channel -> coefficient names in the order of NAMES
+NAMES_2DOF = {c: tuple(name_2dof(c, n) for n in NAMES) for c in ("x", "y")}
 
 
 def order(name: str) -> int:
-    """Power of g of a coefficient: D_F 0, D_I 1, D_IS 2."""
-    return 0 if name == "D_F" else len(name) - 2
+    """Power of g of a coefficient: D_F 0, D_I 1, D_IS 2; Dx_0 0, Dx_xz 2."""
+    return len(_axes(name))
 
 
 def surface_unit(name: str) -> str:
@@ -64,24 +84,34 @@ def terms(which: int) -> tuple[str, ...]:
     return TERM_SETS[which]
 
 
+def terms_2dof(channel: str, which: int) -> tuple[str, ...]:
+    """Coefficient names of the ``which``-term model of a channel: x, 9: Dx_0, Dx_x, Dx_y, ... without Dx_yy."""
+    return tuple(name_2dof(channel, n) for n in terms(which))
+
+
 def regressors(xyz: ArrayLike, names: tuple[str, ...] = NAMES) -> NDArray[np.float64]:
-    """Rows of the design: ``xyz`` (..., 3) in multiples of g0, book sign -> (..., len(names))."""
+    """Rows of the design: ``xyz`` (..., 3) in multiples of g0, book sign -> (..., len(names)).
+
+    ``names`` of a two-degree-of-freedom gyro stand over its axes x, y, z, in both channels.
+    """
     v = np.asarray(xyz, dtype=float)
     columns = []
     for name in names:
         product = np.ones(v.shape[:-1])
-        for axis in name[2:] if name != "D_F" else "":
+        for axis in _axes(name):
             product = product * v[..., _AXES[axis]]
         columns.append(product)
     return np.stack(columns, axis=-1)
 
 
 def drift(xyz: ArrayLike, coefficients: Mapping[str, float]) -> NDArray[np.float64]:
-    """omega_d at ``xyz`` (..., 3); unknown names are refused with KeyError."""
-    unknown = [n for n in coefficients if n not in NAMES]
+    """omega_d at ``xyz`` (..., 3), of a gyro or of one channel; names unknown or of two channels: KeyError."""
+    first = next(iter(coefficients), "D_F")
+    known = next((s for s in NAMES_2DOF.values() if first in s), NAMES)
+    unknown = [n for n in coefficients if n not in known]
     if unknown:
-        raise KeyError(f"unknown drift coefficient {', '.join(unknown)}; known: {', '.join(NAMES)}")
-    names = tuple(n for n in NAMES if n in coefficients)
+        raise KeyError(f"unknown drift coefficient {', '.join(unknown)}; known: {', '.join(known)}")
+    names = tuple(n for n in known if n in coefficients)
     out: NDArray[np.float64] = regressors(xyz, names) @ np.array([coefficients[n] for n in names])
     return out
 
@@ -173,6 +203,42 @@ def from_physical(H: float, m: float, physical: Mapping[str, float]) -> dict[str
         "D_IS": ("K_SS-K_II", -q),
     }
     return {n: s * p[key] for n, (key, s) in rule.items() if key in p}
+
+
+def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer: float = 0.0) -> dict[str, float]:
+    """Coefficients of both channels of a two-degree-of-freedom gyro, rad/s per g0^n.  [GYRO-STATIC-2DOF]
+
+    ``m``: mass of rotor and inner gimbal, kg.  ``physical``: M_x, M_y (constant torques, N.m), l_x, l_y, l_z (m),
+    K_ij (m/N; displacement along i per unit force along j) or the differences K_zz-K_xx, K_zz-K_yy.  ``outer``:
+    mass of the outer gimbal times its arm along z, kg.m; it acts about the outer axis only, so that
+    Dy_y = -(m l_z + outer) g0/H and Dx_x = -m l_z g0/H (u_zx and u_zy of the book).  Only what ``physical``
+    determines is returned.  Raises ValueError as :func:`from_physical` does, naming the channel.
+    """
+    _positive(H, m)
+    out: dict[str, float] = {}
+    used: set[str] = set()
+    for channel, own in _OWN.items():
+        here: dict[str, float] = {}
+        for key in PHYSICAL:
+            name = "".join(own.get(letter, letter) for letter in key)
+            if name in physical:
+                here[key] = physical[name] * (-1 if channel == "y" and key.count("O") == 1 else 1)
+                used.add(name)
+        if "K_SS" in here and "K_II" not in here and f"K_{own['O']}{own['O']}" in physical:
+            del here["K_SS"]  # K_zz was meant for the other channel
+        if channel == "y" and "l_S" in here:
+            here["l_S"] += outer / m
+        try:
+            found = from_physical(H, m, here)
+        except ValueError as e:
+            axes = "I, O, S = " + ("x, y, z" if channel == "x" else "y, -x, z")
+            raise ValueError(f"{channel} channel ({axes}): {e}") from e
+        for n, v in found.items():
+            out[name_2dof(channel, n)] = v * (-1 if channel == "y" and n.count("O") == 1 else 1)
+    unknown = sorted(physical.keys() - used)
+    if unknown:
+        raise ValueError(f"physical quantity '{unknown[0]}' unknown for a two-degree-of-freedom gyro")
+    return out
 
 
 def to_physical(H: float, m: float, coefficients: Mapping[str, float]) -> dict[str, float]:

@@ -91,6 +91,47 @@ def test_double_definition_is_refused() -> None:
         drift.to_physical(0.2, 0.25, {"D_O": 1.0})
 
 
+def test_two_channels_are_the_cross_product() -> None:
+    """[STATIC-DRIFT] omega_dx = -M_y/H, omega_dy = +M_x/H; the outer gimbal acts about the outer axis x only."""
+    H, m, outer = 0.2, 0.25, 3e-7
+    M, arm, K = rng.normal(size=3) * 1e-7, rng.normal(size=3) * 1e-6, rng.uniform(0, 1e-7, (3, 3))
+    SF = rng.normal(size=3) * G0
+    torque = M + np.cross(arm, m * SF) + np.cross(K @ (m * SF), m * SF)
+    about_x = torque[0] + np.cross([0.0, 0.0, outer], SF)[0]
+    physical = {"M_x": M[0], "M_y": M[1], "l_x": arm[0], "l_y": arm[1], "l_z": arm[2]}
+    physical |= {f"K_{a}{b}": K[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz")}
+    D = drift.from_physical_2dof(H, m, physical, outer)
+    x = {n: v for n, v in D.items() if n.startswith("Dx")}
+    y = {n: v for n, v in D.items() if n.startswith("Dy")}
+    assert float(drift.drift(SF / G0, x)) == pytest.approx(-torque[1] / H, rel=1e-12)
+    assert float(drift.drift(SF / G0, y)) == pytest.approx(about_x / H, rel=1e-12)
+    # the table of the spec, entry by entry
+    q = m * m * G0 * G0 / H
+    assert D["Dy_xy"] == pytest.approx(-q * K[2, 0]) and D["Dy_xz"] == pytest.approx(q * K[1, 0])
+    assert D["Dy_yz"] == pytest.approx(q * (K[1, 1] - K[2, 2])) and D["Dy_yy"] == pytest.approx(-q * K[2, 1])
+    assert D["Dx_x"] - D["Dy_y"] == pytest.approx(outer * G0 / H)
+
+
+def test_two_channels_names_and_refusals() -> None:
+    assert drift.terms_2dof("x", 8) == tuple(f"Dx_{n}" for n in ("0", "x", "z", "xx", "zz", "xy", "yz", "xz"))
+    assert set(drift.terms_2dof("y", 9)) == {f"Dy_{n}" for n in ("0", "x", "y", "z", "yy", "zz", "xy", "xz", "yz")}
+    assert [drift.order(n) for n in drift.NAMES_2DOF["y"]] == [drift.order(n) for n in drift.NAMES]
+    assert drift.regressors([2.0, 3.0, 5.0], ("Dy_0", "Dy_x", "Dx_yz", "Dy_zz")).tolist() == [1, 2, 15, 25]
+    only = drift.from_physical_2dof(0.2, 0.25, {"K_zz": 3e-9, "K_yy": 1e-9})
+    assert only.keys() == {"Dy_yz"}
+    with pytest.raises(KeyError, match="Dy_x"):
+        drift.drift([0, 0, 1], {"Dx_0": 1.0, "Dy_x": 1.0})
+    for physical, message in (
+        ({"l_q": 1.0}, "'l_q' unknown for a two"),
+        ({"K_zz": 1e-9}, r"x channel \(I, O, S = x, y, z\): D_IS needs K_SS and K_II; K_II is missing"),
+        ({"K_yy": 1e-9}, r"y channel \(I, O, S = y, -x, z\): D_IS needs K_SS and K_II; K_SS is missing"),
+        ({"K_zz": 1e-9, "K_yy": -1e-9, "K_xx": 0.0}, "y channel .*K_II = -1e-09"),
+        ({"M_x": math.nan}, "y channel .*no finite number"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            drift.from_physical_2dof(0.2, 0.25, physical)
+
+
 def test_signs() -> None:
     """[IEEE] SF -> -f changes the linear terms; torque sign changes all."""
     D = dict(zip(drift.NAMES, rng.normal(size=10), strict=True))

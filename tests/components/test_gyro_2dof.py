@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from wired import BENCH, DEG_H, RebalanceAnalog, Wired
 
+from gyrobench import drift as bench_drift
 from gyrobench.component import PartError
 from gyrobench.packaging import load_part
 
@@ -240,6 +241,17 @@ def test_no_nutation_is_the_limit_of_small_inertia():
 
 
 # ---------------------------------------------------------------------------------------- static model
+def test_names_and_terms_are_those_of_the_bench():
+    for c in "xy":
+        declared = {n for n in Gyro2dof.declarations if n.startswith(f"D{c}_")}
+        assert declared == set(bench_drift.NAMES_2DOF[c])
+        part = started(**QUIET, f=[3.0, -4.0, 5.0])
+        some = {n: getattr(part, n) for n in declared}
+        assert some.keys() - bench_drift.terms_2dof(c, 9) == {n for n in declared if n in ("Dx_yy", "Dy_xx")}
+        wanted = float(bench_drift.drift([-3.0 / G0, 4.0 / G0, -5.0 / G0], some))
+        assert getattr(part, f"drift_{c}") == pytest.approx(wanted, rel=1e-13)
+
+
 def test_every_coefficient_multiplies_its_product():
     rng = np.random.default_rng(8)
     some = {name: rng.normal() * DEG_H for name in NO_DRIFT}
