@@ -11,6 +11,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -103,13 +104,23 @@ def _log3(environment: int | None, status: int, _category: bytes, message: bytes
         _logs.setdefault(environment or 0, []).append(message.decode("utf-8", "replace"))
 
 
+@dataclass
+class Unzipped:
+    """The model description of an FMU, as FMPy reads it, and the folder of its files."""
+
+    description: Any
+    folder: Path
+
+
 class Fmu:
     """An FMU of either FMI version, by FMPy.
 
-    ``like`` is an instance of the same FMU, whose unzipped files are used too (it must live longer).
+    ``like`` is an instance of the same FMU, or its files, which are used too and not removed.
     """
 
-    def __init__(self, path: Path, name: str = "part", like: Fmu | None = None, logging: bool = True) -> None:
+    def __init__(
+        self, path: Path, name: str = "part", like: Fmu | Unzipped | None = None, logging: bool = True
+    ) -> None:
         import fmpy
 
         self._own = like is None

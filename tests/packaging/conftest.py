@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import fmpy
 import pytest
 from toybench import FORMS, HEAD, PARTS, TARGETS, TOYS
 
 from gyrobench.component import Component
 from gyrobench.packaging import build, load_part
-from gyrobench.packaging.instance import Fmu, Instance, Plain
+from gyrobench.packaging.instance import Fmu, Instance, Plain, Unzipped
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -27,14 +30,32 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Builds a part of the standard bench (or, with ``toy=True``, of the toys)."""
     out = tmp_path_factory.mktemp("fmus")
 
+    @functools.cache
     def built(part: str, target: str, fmi: int = 2, toy: bool = False) -> Path:
         return build(part, target, fmi=fmi, out=out, bench=TOYS if toy else None)
 
     return built
 
 
+@pytest.fixture(scope="session")
+def unzipped() -> Iterator[Callable[[Path], Unzipped]]:
+    """Files and description of an FMU, shared by the instances of the session."""
+    found: dict[Path, Unzipped] = {}
+
+    def unzip(path: Path) -> Unzipped:
+        if path not in found:
+            found[path] = Unzipped(
+                fmpy.read_model_description(str(path), validate=False), Path(fmpy.extract(str(path)))
+            )
+        return found[path]
+
+    yield unzip
+    for one in found.values():
+        shutil.rmtree(one.folder, ignore_errors=True)
+
+
 @pytest.fixture
-def instance(fmu: Callable[..., Path]) -> Iterator[Callable[..., Instance]]:
+def instance(fmu: Callable[..., Path], unzipped: Callable[[Path], Unzipped]) -> Iterator[Callable[..., Instance]]:
     """Makes instances ("plain", "native", "python", "native-fmi3") and frees them after the test."""
     made: list[Instance] = []
 
@@ -44,7 +65,8 @@ def instance(fmu: Callable[..., Path]) -> Iterator[Callable[..., Instance]]:
             one = Plain(load_part(part, TOYS if toy else None), name)
         else:
             fmi = 3 if target.endswith("fmi3") else 2
-            one = Fmu(fmu(part, target.removesuffix("-fmi3"), fmi, toy), name, logging=logging)
+            path = fmu(part, target.removesuffix("-fmi3"), fmi, toy)
+            one = Fmu(path, name, like=unzipped(path), logging=logging)
         made.append(one)
         return one
 

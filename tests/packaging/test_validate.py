@@ -17,6 +17,7 @@ from gyrobench.packaging.validate import validate
 
 
 def test_parts_have_no_problems(part: str) -> None:
+    """FMPy's validation of the Python FMU and of the native FMUs (FMI 2, FMI 3), units, reference runs."""
     assert validate(part) == []
 
 
