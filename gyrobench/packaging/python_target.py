@@ -2,6 +2,10 @@
 
 pythonfmu shares ``sys.modules`` between the FMUs of a process: every file in ``resources`` therefore
 carries a name that is unique to the part and its content.  Our modelDescription replaces pythonfmu's.
+
+Limits of its host (0.7.0): a failure is fmi2Fatal, not fmi2Error (the message in the log is that of the native
+FMU, and the instance can still be reset and freed); the GUID given at instantiation is not looked at; there are no
+directional derivatives.
 """
 
 from __future__ import annotations

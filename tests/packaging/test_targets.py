@@ -73,7 +73,7 @@ def test_a_difference_is_told(tmp_path: Path) -> None:
 def test_sources_say_how_to_build(part: str, fmu: Callable) -> None:
     """FMI 3: a build description (the standard's own checks of all FMUs are those of test_validate)."""
     (one,) = fmpy.model_description.read_build_description(str(fmu(part, "native", 3)))
-    assert [f.name for s in one.sourceFileSets for f in s.sourceFiles] == ["fmi3.c"]
+    assert [f for s in one.sourceFileSets for f in s.sourceFiles] == ["fmi3.c"]
 
 
 def test_description(part: str, target: str, fmu: Callable) -> None:
@@ -209,17 +209,17 @@ def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callabl
         library.fmi2FreeInstance(ctypes.c_void_p(c))
 
 
-def test_many_python_instances(fmu: Callable, instance: Callable) -> None:
+def test_a_thousand_python_instances(fmu: Callable, instance: Callable) -> None:
     path = fmu("rebalance_analog", "python")
     like = instance("rebalance_analog", "python")
-    many = [Fmu(path, f"i{k}", like=like) for k in range(200)]
+    many = [Fmu(path, f"i{k}", like=like) for k in range(1000)]
     for k, one in enumerate(many):
         one.set({"seed": k})
         one.initialize()
     for n in range(3):
         for one in many:
             one.step(n * 1e-3, 1e-3)
-    assert len({one.get(["i_read"])[0] for one in many}) == 200
+    assert len({one.get(["i_read"])[0] for one in many}) == 1000
     for one in many:
         one.free()
     like.initialize()
