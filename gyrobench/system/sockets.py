@@ -91,6 +91,22 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         Socket(
+            "TwoAxisGyro",
+            "two-degree-of-freedom gyro, case inputs and two torquers in, two pickoffs out",
+            (
+                _in("omega", "rad/s", "inertial rate of the case along x, y, z (outer gimbal, inner gimbal, spin)", 3),
+                _in("alpha", "rad/s2", "angular acceleration of the case along x, y, z", 3, optional=True),
+                _in("f", "m/s2", "specific force along x, y, z", 3),
+                _in("i_x", "A", "current of the torquer about x, which nulls u_y"),
+                _in("i_y", "A", "current of the torquer about y, which nulls u_x"),
+                _out("u_x", "V", "x pickoff voltage: case against rotor about x"),
+                _out("u_y", "V", "y pickoff voltage: case against rotor about y"),
+                _out("drift_x", "rad/s", "drift rate about x, precession sign (diagnostic)", optional=True),
+                _out("drift_y", "rad/s", "drift rate about y, precession sign (diagnostic)", optional=True),
+                _out("saturated", "1", "1 while a pickoff is saturated", optional=True, whole=True),
+            ),
+        ),
+        Socket(
             "Rebalance",
             "torque rebalance: pickoff voltage to torquer current",
             (
