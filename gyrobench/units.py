@@ -174,10 +174,14 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
     return f, p, rest
 
 
+USUAL = ("deg/h", "deg/s", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/h/K")
+
+
 def fitting(name: str) -> list[str]:
-    """Single symbols of the same dimension as ``name``, its SI spelling first."""
+    """Units of the same dimension as ``name``: its SI spelling, usual compounds of this trade, single symbols."""
     u = unit(name)
-    return [u.dimension, *(s for s, (_, p) in _TABLE.items() if p == u.exponents and s != u.dimension)]
+    compounds = [s for s in USUAL if unit(s).exponents == u.exponents]
+    return [u.dimension, *compounds, *(s for s, (_, p) in _TABLE.items() if p == u.exponents and s != u.dimension)]
 
 
 def same_dimension(a: str, b: str) -> bool:

@@ -35,7 +35,7 @@ RUNS: list[tuple[list[str], list[str]]] = [
     (["gyro.D_OO=0.1deg/h/g2", "gyro.terms=10"], ["gyro.D_OO = 0.1 deg/h/g2", "fold=true", "D_F + γ² D_OO"]),
     (["latitude=45m"], ["latitude: '45m'", "units that fit: rad"]),
     (["latitude=45.75"], ["latitude = 45.75: must be <= 1.5708 rad"]),
-    (["rate=10deg"], ["rate: '10deg'", "units that fit: rad/s"]),
+    (["rate=10deg"], ["rate: '10deg'", "units that fit: rad/s, deg/h, deg/s, ERU"]),
     (["gyro.D_I=0.9mA"], ["gyro.D_I: '0.9mA'", "units that fit"]),
     (["gyro.H=nan"], ["gyro.H: 'nan': a finite number"]),
     (["gyro.H=-1"], ["H = -1 N.m.s must be > 0"]),
