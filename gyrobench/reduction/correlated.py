@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction import noise
-from gyrobench.reduction.regression import Design, check_data
+from gyrobench.reduction.regression import Design, RegressionError, check_data, least_squares
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
@@ -127,10 +127,30 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     )  # fmt: skip
 
 
+def ordinary(
+    X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, weights: Array | None = None, limit: float = 1e3
+) -> Estimate:
+    """As :func:`fit` for noise that is taken as white: (weighted) least squares with t intervals of n - p degrees.
+
+    weights (n,): proportional to 1/variance.  For a few readings, from which no noise model can be estimated; slow
+    drift, which would make the intervals too narrow, is not modelled.
+    """
+    design = check_data(X, y, names, limit)
+    check_windows(t0, t1)
+    found = least_squares(X, y, names, weights)
+    root = np.ones_like(y) if weights is None else np.sqrt(weights)
+    spread = found.s / float(np.median(root))
+    density = spread * math.sqrt(float(np.median(t1 - t0)))
+    whitened = found.residual * root / found.s if found.s > 0.0 else np.zeros_like(y)
+    dof = np.full(len(names), float(found.dof))
+    return Estimate(
+        found.names, found.beta, found.covariance, found.u, found.half_width(), found.p, dof, found.residual, whitened,
+        found.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
+    )  # fmt: skip
+
+
 def check_windows(t0: Array, t1: Array) -> None:
     """RegressionError unless every window has a length and starts where or after the one before has ended."""
-    from gyrobench.reduction.regression import RegressionError
-
     length = t1 - t0
     if np.any(~np.isfinite(length)) or np.any(length <= 0.0):
         raise RegressionError("every window needs a finite positive length")

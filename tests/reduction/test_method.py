@@ -1,0 +1,163 @@
+"""The way from a linear fit to a result, by a small user of it: a line with known truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.merge import merge
+from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+TRUTH = {"a": 0.3 * DPH, "b": -0.2 * DPH}  # rate = a + b x, x in 1
+
+
+def line(n: int, sigma: float, seed: int = 1, noise: str = "white", channel: str = "") -> Findings:
+    """n windows of 10 s, x from -1 to 1, noise of sigma deg/h."""
+    x = np.linspace(-1.0, 1.0, n)
+    X = np.column_stack([np.ones(n), x])
+    y = X @ list(TRUTH.values()) + sigma * DPH * np.random.default_rng(seed).normal(size=n)
+    t = 10.0 * np.arange(n)
+    wanted = [
+        Quantity.of(f"a{channel}", "constant", "deg/h", TRUTH["a"], float(y.mean())),
+        Quantity.of(f"b{channel}", "slope", "deg/h", TRUTH["b"]),
+    ]
+    dense = np.linspace(-1.0, 1.0, 5)
+    group = Group("line", np.arange(n), x, "position", "1", (dense, np.column_stack([np.ones(5), dense])))
+    return fit(wanted, X, y, t, t + 10.0, [group], "rate", "°/h", DPH, noise=noise)
+
+
+def result(found: Findings, **more: object) -> Result:
+    return linear_result(
+        found, system="line", title="A line", method="by hand", sources=["RED-OLS"], equation="y = a + b x",
+        conventions=["x counts to the right."], **more,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def test_white_line_by_hand() -> None:
+    """y = (1, 2, 4) at x = (-1, 0, 1): a = 7/3, b = 3/2, residuals (1/6, -1/3, 1/6), s^2 = 1/6 with one degree of
+    freedom, u(a)^2 = s^2/3 = 1/18, u(b)^2 = s^2/2 = 1/12; t quantile of one degree 12.7062.
+    """
+    x = np.array([-1.0, 0.0, 1.0])
+    X, y = np.column_stack([np.ones(3), x]), np.array([1.0, 2.0, 4.0])
+    group = Group("points", np.arange(3), x, "position", "1")
+    wanted = [Quantity("a", "constant", "V", 1.0), Quantity("b", "slope", "mV", 1e-3)]
+    r = result(fit(wanted, X, y, None, None, [group], "voltage", "V", 1.0, noise="white"))
+    a, b = r.coefficients
+    assert (a.estimate, b.estimate) == pytest.approx((7 / 3, 1500.0))
+    assert (a.u, b.u) == pytest.approx((math.sqrt(1 / 18), 1e3 * math.sqrt(1 / 12)))
+    assert a.k == pytest.approx(12.7062, rel=1e-5) and a.dof == 1.0
+    assert b.interval == pytest.approx((1500.0 - 12.7062 * b.u, 1500.0 + 12.7062 * b.u), rel=1e-5)
+    assert r.series[0].residual == pytest.approx([1 / 6, -1 / 3, 1 / 6])
+    assert r.residual_std == pytest.approx(math.sqrt(1 / 6))
+    assert r.noise["model"] == "white (assumed)" and not r.simulated and r.allan == {}
+    assert Result.from_dict(r.as_dict()) == r
+
+
+@pytest.mark.parametrize("noise", ["white", "estimated"])
+def test_truth_and_closed(noise: str) -> None:
+    r = result(line(120, 0.01, noise=noise))
+    assert r.simulated and r.rank == 2 and r.dof == 118.0
+    for c in r.coefficients:
+        assert c.truth == pytest.approx(0.3 if c.name == "a" else -0.2)
+        assert c.z is not None and abs(c.z) < 4.0
+    a = r.coefficients[0]
+    assert a.closed == pytest.approx(a.estimate, abs=0.005) and r.coefficients[1].closed is None
+    assert a.u == pytest.approx(0.01 / math.sqrt(120), rel=0.6 if noise == "estimated" else 0.2)
+    assert [row[0] for row in r.tables[0]["rows"]] == ["a"]
+    assert r.series[0].shown_fit_y == pytest.approx([0.5, 0.4, 0.3, 0.2, 0.1], abs=0.01)
+    assert ("whitened" in r.tests[1].name) == (noise == "estimated")
+    assert r.allan["unit"] == "°/h" and r.psd["unit"] == "(°/h)²/Hz"
+
+
+def test_effects_and_verdicts() -> None:
+    """An error of all data by 0.1 deg/h per unit, of size 0.5, is 0.05 deg/h in a and nothing in b; a design whose
+    second column is 1 % too small makes b 1 % too large.
+    """
+    found = line(60, 0.001)
+    one = found.change(0.1 * DPH)
+    small = found.change(dX=found.X * [0.0, 0.01])
+    assert small == pytest.approx([0.0, -0.01 * found.value[1]], abs=1e-12 * DPH)
+    effects = [Effect("offset", 0.5, "1", one), Effect("scale of x", 0.0, "1", small)]
+    limits = {"a": (0.0, 1.0), "b": (-0.1, None)}
+    r = result(found, effects=effects, specification=limits, warnings=["Mind the step."])
+    a, b = r.coefficients
+    assert a.u == pytest.approx(math.hypot(0.05, a.u_a or 0.0)) and b.u == b.u_a
+    assert a.interval[1] - a.interval[0] == pytest.approx(2 * 1.96 * 0.05, rel=1e-3)
+    assert (a.verdict, b.verdict, r.verdict) == ("pass", "fail", "fail")
+    lines = {(x.source, x.coefficient): x.contribution for x in r.budget}
+    assert lines["offset", "a"] == pytest.approx(0.05)
+    assert ("offset", "b") not in lines and ("scale of x", "b") not in lines
+    assert r.warnings[-1] == "Mind the step." and plus_minus(a).endswith("°/h (95 %)")
+
+
+def test_merge_of_two_channels() -> None:
+    x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
+    parts = {"x channel": result(x, warnings=["same"]), "y channel": result(y, warnings=["same", "other"])}
+    r = merge(parts)
+    assert [c.name for c in r.coefficients] == ["a_x", "b_x", "a_y", "b_y"]
+    matrix = np.array(r.correlation)
+    assert matrix.shape == (4, 4) and not np.any(matrix[:2, 2:]) and np.all(np.diag(matrix) == 1.0)
+    assert (r.rank, r.dof) == (4, 96.0)
+    pooled = (58 * x.residual_std**2 + 38 * y.residual_std**2) / 96
+    assert r.residual_std == pytest.approx(math.sqrt(pooled))
+    assert r.series[1].label == "y channel: line" and r.tests[0].name == "Ljung-Box, residuals, x channel"
+    assert r.warnings == ["same", "y channel: other"] and r.conventions == ["x counts to the right."]
+    assert r.noise["channel of autocorrelation, Allan deviation and spectrum"] == "y channel"
+    assert r.acf == parts["y channel"].acf and r.equation == "y = a + b x"
+    with pytest.raises(ValueError, match="a_x, b_x in more than one channel"):
+        merge({"x": parts["x channel"], "z": replace(parts["x channel"])})
+
+
+def test_derived_quantities() -> None:
+    """c = b/a of a = 2, b = 6 uncorrelated: u(c)^2 = u(b)^2/a^2 + (b/a^2)^2 u(a)^2, by hand; t interval kept."""
+    x = np.linspace(-1.0, 1.0, 21)
+    X = np.column_stack([np.ones(21), x])
+    y = X @ [2.0, 6.0] + 1e-3 * np.cos(7.0 * np.arange(21))
+    found = fit(["a", "b"], X, y, None, None, [], "voltage", "V", 1.0, noise="white")
+    c = found.derive([Quantity("c", "ratio", "1", 1.0, truth=3.0)], lambda v: v[1] / v[0])
+    ua, ub = found.u
+    a, b = found.value
+    assert c.value == pytest.approx([b / a])
+    assert c.u == pytest.approx([math.sqrt((ub / a) ** 2 + (b / a**2 * ua) ** 2)], rel=1e-8)
+    assert c.reported.half_width / c.u == pytest.approx(found.reported.half_width[:1] / ua)
+    assert c.change(0.02) == pytest.approx([-b / a**2 * 0.02], rel=1e-8)
+    r = result(c)
+    assert r.rank == 2 and len(r.coefficients) == 1 and r.coefficients[0].dof == 19.0
+
+
+def test_extra_columns_are_tested() -> None:
+    """A parabola of 0.05 deg/h under the line is found with its size; the line itself hides nothing."""
+    found = line(120, 0.01)
+    x = found.X[:, 1:]
+    bent = fit(found.quantities, found.X, found.y + 0.05 * DPH * x[:, 0] ** 2, found.t_start, found.t_end, [],
+               "rate", "°/h", DPH, noise="white")  # fmt: skip
+    size = bent.f_test("curvature", x**2, "curvature", "the line is bent", "no more than noise")
+    assert size is not None and size[0] == pytest.approx([0.05 * DPH], abs=4 * float(size[1][0]))
+    assert bent.tests[-1].p is not None and bent.tests[-1].p < 1e-6 and "bent" in bent.tests[-1].finding
+    assert any("curvature" in w for w in result(bent).warnings)
+    assert found.f_test("curvature", x**2, "curvature", "bent", "no more than noise") and len(found.tests) == 4
+
+
+def test_ideal_data_claim_nothing() -> None:
+    for noise in ("white", "estimated"):
+        r = result(line(60, 0.0, noise=noise))
+        assert r.noise["model"] == "none (ideal data)" and r.tests == [] and r.allan == {}
+        assert all(c.z is None for c in r.coefficients)
+        assert [c.estimate for c in r.coefficients] == pytest.approx([0.3, -0.2], abs=1e-12)
+
+
+def test_what_cannot_be_fitted() -> None:
+    x = np.ones(5)
+    with pytest.raises(ReductionError, match="do not see a − b"):
+        fit(["a", "b"], np.column_stack([x, x]), x, None, None, [], "y", "V", 1.0, noise="white")
+    with pytest.raises(ValueError, match="noise 'pink'"):
+        fit(["a"], x[:, None], x, None, None, [], "y", "V", 1.0, noise="pink")
