@@ -40,6 +40,7 @@ Map = Annotated[
 Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0)]
 Spec = Annotated[str | None, typer.Option("--spec", metavar="NAME|FILE", help="Acceptance specification to judge by.")]
 Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace another run in --out.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 
 
@@ -223,7 +224,7 @@ def run(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace another run in --out.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Runs a system: record, reduction, report.
@@ -265,6 +266,7 @@ def reduce(
     spec: Spec = None,
     strict: Strict = False,
     out: Out = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Reduces measured data to the same report.
@@ -281,7 +283,7 @@ def reduce(
         return
     if data is None:
         raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
-    judge(work.reduce(system, data, settings(values), spec, out, as_json), strict)
+    judge(work.reduce(system, data, settings(values), spec, out, force, as_json), strict)
 
 
 @app.command()
@@ -341,9 +343,7 @@ def export(
 
 @app.command()
 def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An FMU, or the name of a part.")]) -> None:
-    """Checks an FMU.
-
-    Against FMI, its units, and its reference run.
+    """Checks an FMU: standard, units, reference run.
 
     \b
     Example: gyrobench validate fmus/site.fmu
@@ -366,9 +366,7 @@ def init(
         typer.Option("--copy", metavar="PART|SYSTEM", help="Copy this part or system to change it.  Repeatable."),
     ] = None,
 ) -> None:
-    """Makes a bench of one's own.
-
-    What it lacks is taken from the standard bench.
+    """Makes a bench; what it lacks the standard one has.
 
     \b
     Example: gyrobench init mybench --copy floated_gyro

@@ -262,7 +262,13 @@ def template(name: str) -> str:
 
 
 def reduce(
-    name: str, data: Path, values: Mapping[str, str], spec: str | None, out: Path | None, as_json: bool = False
+    name: str,
+    data: Path,
+    values: Mapping[str, str],
+    spec: str | None,
+    out: Path | None,
+    force: bool = False,
+    as_json: bool = False,
 ) -> str:
     """A laboratory's CSV to a report; returns the verdict."""
     system = measuring(name)
@@ -275,7 +281,7 @@ def reduce(
     result.provenance = dict(record.meta)
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
     folder = out or Bench.find().out / name / f"measured-{identity}"
-    claim(folder, {"system": name, "data": {"file": data.name}}, force=False)
+    claim(folder, {"system": name, "data": {"file": data.name}}, force)
     record.save(folder)
     return publish(result, folder, record, as_json, file)
 

@@ -247,7 +247,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
 
 
 def test_engines_and_isolation_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
-    short = [*TINY[:1], "rate=60deg/s", *TINY[2:]]
+    short = [TINY[0], "rate=60deg/s", *TINY[2:], "--set", "table.index_rate=2"]
     for name, more in (("n", []), ("r", ["--engine", "reference"])):
         assert gyrobench("run", NAME, *short, *more, "--out", name)[0] == 0
     assert Record.load(tmp_path / "n").same_data(Record.load(tmp_path / "r"))
@@ -419,3 +419,8 @@ def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> 
         if c["name"] == "K"
     ]
     assert (k["estimate"], k["unit"]) == (pytest.approx(17.0, rel=1e-12), "°/h/mA")
+    (tmp_path / "t.csv").rename(tmp_path / "u.csv")
+    code, _, err = gyrobench("reduce", "torquer_scale_factor", "--data", "u.csv", "--out", "r")
+    assert code == 2 and "--out r: holds another run (its data differ)" in err
+    assert gyrobench("reduce", "torquer_scale_factor", "--data", "u.csv", "--out", "r", "--force")[0] == 0
+    assert gyrobench("report", "r")[0] == 0

@@ -68,10 +68,10 @@ def test_the_wheel_holds_tool_and_standard_bench(wheel: Path) -> None:
         inside = {n for n in archive.namelist() if not n.endswith("/")}
     tool = {str(f.relative_to(ROOT)) for f in (ROOT / "gyrobench").rglob("*") if f.suffix in (".py", ".c", ".h")}
     assert tool <= inside
-    for room in ("components", "systems", "reports"):
-        files = [f for f in (ROOT / room).rglob("*") if f.is_file()]
-        needed = [f for f in files if not {"__pycache__", "out"} & set(f.parts) and f != ROOT / "reports" / "README.md"]
-        assert {f"gyrobench/_bench/{f.relative_to(ROOT)}" for f in needed} <= inside
+    for room in ("components", "systems", "reports/specs", "reports/templates"):
+        files = [f for f in (ROOT / room).rglob("*") if f.is_file() and "__pycache__" not in f.parts]
+        assert files and {f"gyrobench/_bench/{f.relative_to(ROOT)}" for f in files} <= inside
+    assert "gyrobench/_bench/reports/result.schema.json" in inside
     odd = [n for n in inside if re.search(r"__pycache__|/out/|\.fmu$|^(tests|fmus)/|\.pyc$", n)]
     assert not odd
 
