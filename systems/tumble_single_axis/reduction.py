@@ -126,6 +126,8 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
     coefficients = [_coefficient(setup, n, j, est, book, effects) for j, n in enumerate(names)]
     if found.ideal:  # u is rounding: nothing to compare with
         coefficients = [replace(c, z=None) for c in coefficients]
+    if not setup.tilt:
+        warnings += _tilt_seen(setup, turning, names, y)
     warnings += [*est.warnings, *found.warnings]
     if why:
         warnings.append(f"No closed formulas: {why}.")
@@ -182,6 +184,25 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         instrument=setup.instrument,
         simulated=setup.truth is not None,
     )
+
+
+def _tilt_seen(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], y: Array) -> list[str]:
+    """A warning when the data ask for the tilt of the input axis (above four u), which these terms do not hold.
+
+    It is a step between the mounts; taken for slow noise it leaks into the coefficients.
+    """
+    more = (*names, budget.TILT)
+    try:
+        est = correlated.fit(budget.design(setup, turning, more), y, more, turning.t_start, turning.t_end)
+    except regression.RegressionError:
+        return []
+    tilt, u = (float(v[-1]) / units.factor("arcsec") for v in (est.beta, est.u))
+    if abs(tilt) < max(4.0 * u, 0.01):
+        return []
+    return [
+        f"The record shows a tilt of the input axis towards the output axis of {tilt:.3g}″ (u = {u:.2g}″), which these "
+        "terms take for drift: the coefficients are off by more than u says; set the option tilt."
+    ]
 
 
 def _coefficient(

@@ -78,6 +78,15 @@ def test_input_axis_tilted_towards_the_output_axis(session: Session) -> None:
     assert eps * RATE > 0.1 * DPH  # it is a large disturbance: eps times the table rate
 
 
+def test_tilt_that_is_not_asked_for_is_reported(session: Session) -> None:
+    """With noise: 60 arcsec are seen and named, and no warning comes where there is none."""
+    for eps, seen in ((3e-4, True), (0.0, False)):
+        values = {**SHORT, "gyro.mount": towards_output(eps)}
+        for seed in range(3):
+            result = load().with_values(values).reduce(session.run(values, seed=seed))
+            assert any("shows a tilt of the input axis" in w and "6" in w for w in result.warnings) == seen
+
+
 def test_scale_factor_error_scales_everything(session: Session) -> None:
     """The input rate is 0 everywhere, so y = -k i: k wrong by 1e-3 makes every coefficient wrong by 1e-3."""
     truth = {"gyro.D_F": 0.3 * DPH, "gyro.D_I": 0.9 * DPH, "gyro.D_IS": -0.2 * DPH}
