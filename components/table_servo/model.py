@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, floor, maximum, minimum, pi, sign, sin, sqrt, tanh
+from gyrobench.math import clip, cos, fabs, floor, index, maximum, minimum, pi, sign, sin, sqrt, tanh
 
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
@@ -10,29 +10,22 @@ DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far fro
 class TableServo(Component):
     """Turntable with one axis that a gyro holds still in inertial space.  [TABLE-SERVO, LOOP-TABLE-SERVO, CTRL-CAPTURE]
 
-    Modes 0 hold, 1 index, 2 rate are kinematic and those of table_rate.  In mode 3 the table obeys (w: inertial
-    rate about the axis, e: that of the base, x: angle against the base)
+    Modes 0 hold, 1 index, 2 rate are kinematic, those of table_rate.  Mode 3 (w inertial rate about the axis, e that of
+    the base, x angle against the base, M motor torque with three networks C(s) = prod (1 + s / zero) / (1 + s / pole))
 
-        J w' = M + M_load + torque - D (w - e) - (H_g / K_g) u'          x' = w - e
+        J w' = M + M_load + torque - D (w - e) - (H_g / K_g) u'        x' = w - e        M = -G C(s) u / (1 + lag s)
 
-    with the motor torque M = -G C(s) u / (1 + lag s), limited to torque_max, and the compensator of three networks
-    C(s) = prod (1 + s / zero_i) / (1 + s / pole_i), so that the pickoff voltage u of a gyro with its input axis
-    along the table axis is nulled: w = omega_d, rate = -omega_E - omega_M (spec d1, 5.0).  H_g, J_g, C_g, K_g are the
-    gyro the loop is made for; G follows from the crossover or from the static stiffness K_T = G K_g H_g / C_g:
+    nulls the pickoff voltage u of a gyro with its input axis along the table axis: w = omega_d, x' = -omega_E - omega_M
+    (spec d1, 5.0).  H_g, J_g, C_g, K_g are the gyro; G follows from the crossover or from K_T = G K_g H_g / C_g:
 
         L(s) = G K_g H_g C(s) / ( s [ (J s + D) (J_g s + C_g) + H_g2 ] (1 + lag s) ),   |L(j crossover)| = 1
 
-    Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w are near zero for capture_hold; then
-    the networks are preset and the fine loop closes.  All linear terms are integrated exactly; load torque, limit
-    and square law of the motor are taken once in each internal step and stay out of the linearization.
-
-        M_load = -friction tanh((w - e) / v) + ripple sin(n x + phase) - (unbalance x f)_z + noise
-
-    Encoder: angle_read = x + sum_k amplitude_k sin(n_k x + phase_k), n = 1, 2, encoder_fine, rounded to the quantum.
-    f, omega, alpha in face axes as in table_rate.
+    Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w stay near zero; then the networks are preset
+    and the fine loop closes.  All linear terms are integrated exactly; load, limit and square law of the motor are
+    taken once in each internal step and stay out of the linearization.
 
     Not modelled: stiction before breakaway, wobble, torsion between motor and plate, air bearing and slip-ring
-    follower (their torque comes in by `torque`), carrier and demodulator ripple, stops, drop-out from the fine loop.
+    follower (their torque comes in by `torque`), carrier ripple, stops, drop-out from the fine loop.
     Source: 000_791234d3afc34a0c.txt eq. 3-54, 3-55, 5-1..5-21, ch. 5.5 one-1, 6.1 item 6.
     """
 
@@ -139,10 +132,8 @@ class TableServo(Component):
                 dot = 0.0 if i != j else -1.0
                 for k in range(3):
                     dot = dot + self.base[i][k] * self.base[j][k]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "base is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
+                skew = fabs(dot) > 1e-9
+                self.refuse(skew, "base is no rotation: its rows must be unit vectors at right angles, to 1e-9")
         det = self.base[0][0] * (self.base[1][1] * self.base[2][2] - self.base[1][2] * self.base[2][1])
         det = det - self.base[0][1] * (self.base[1][0] * self.base[2][2] - self.base[1][2] * self.base[2][0])
         det = det + self.base[0][2] * (self.base[1][0] * self.base[2][1] - self.base[1][1] * self.base[2][0])
@@ -153,45 +144,38 @@ class TableServo(Component):
         s2 = sin(self.tilt[1])
         for k in range(3):
             first = self.base[0][k]
-            second = c1 * self.base[1][k] + s1 * self.base[2][k]
             third = c1 * self.base[2][k] - s1 * self.base[1][k]
             self.tilted[0][k] = c2 * first - s2 * third
-            self.tilted[1][k] = second
+            self.tilted[1][k] = c1 * self.base[1][k] + s1 * self.base[2][k]
             self.tilted[2][k] = s2 * first + c2 * third
-
         self.refuse(self.polarity == 0.0, "polarity must be 1 or -1")
         self.refuse(
-            self.C_g == 0.0 and self.stiffness > 0.0,
-            "stiffness = {stiffness} N.m/rad is asked for with an undamped gyro (C_g = 0), whose static "
-            "stiffness is infinite: give the crossover",
+            self.C_g == 0.0 and (self.stiffness > 0.0 or self.capture == 1.0),
+            "stiffness and capture need a damped gyro: with C_g = 0, which integrates the table angle, the static "
+            "stiffness is infinite; give the crossover, and capture = 0",
         )
-        self.refuse(
-            self.network == 0.0 and self.crossover == 0.0 and self.stiffness == 0.0,
-            "network 0 needs a crossover or a stiffness",
-        )
-        w = self.crossover
-        if w == 0.0:
-            w = 100.0 * pi if self.network < 3.0 else 20.0 * pi
+        bare = self.network == 0.0 and self.crossover == 0.0 and self.stiffness == 0.0
+        self.refuse(bare, "network 0 needs a crossover or a stiffness")
+        w = 100.0 * pi if self.network < 3.0 else 20.0 * pi
+        w = self.crossover if self.crossover > 0.0 else w
         # leads: zero w / sqrt(r), pole w sqrt(r); lag-lead (1 + s/w_l) / (1 + 5 s/w_l) with w_l = w / 12
         spread = 2.0 if self.network == 1.0 else sqrt(5.0)
         spread = sqrt(28.0) if self.network == 3.0 else spread
         spread = sqrt(6.5) if self.network == 4.0 else spread
         top = self.K_g * self.H_g
-        zero = [0.0, 0.0, 0.0]
+        zero = [w / spread, w / spread, w / spread]
         for k in range(3):
-            zero[k] = w / spread
             self.pole[k] = w * spread
         if self.network == 1.0 or self.network == 2.0:
             zero[2] = w / 12.0
             self.pole[2] = w / 60.0
         if self.network == 3.0:
             zero[2] = self.pole[2]  # two leads only
-        if self.network == 0.0:
-            for k in range(3):
-                zero[k] = self.zeros[k]
-                self.pole[k] = self.poles[k]
         square = 1.0
         for k in range(3):
+            if self.network == 0.0:
+                zero[k] = self.zeros[k]
+                self.pole[k] = self.poles[k]
             self.ratio[k] = self.pole[k] / zero[k]
             q = w / self.pole[k]
             z = w / zero[k]
@@ -207,12 +191,11 @@ class TableServo(Component):
         if self.stiffness > 0.0:
             self.gain = self.stiffness * self.C_g / top
         n = [self.gain * top, 0.0, 0.0, 0.0]
-        for k in range(3):
-            for j in range(3):
-                n[3 - j] = n[3 - j] + n[2 - j] / zero[k]
         for j in range(6):
             d[6 - j] = d[6 - j] + d[5 - j] * self.lag
         for k in range(3):
+            for j in range(3):
+                n[3 - j] = n[3 - j] + n[2 - j] / zero[k]
             for j in range(7):
                 d[7 - j] = d[7 - j] + d[6 - j] / self.pole[k]
         for k in range(4):
@@ -231,45 +214,34 @@ class TableServo(Component):
                 below = upper[j + 1] - q * lower[j + 1]
                 upper[j] = lower[j]
                 lower[j] = below
-        self.refuse(
-            self.C_g == 0.0 and self.capture == 1.0,
-            "capture = 1 needs a damped gyro (C_g > 0): an undamped one integrates the table angle; set capture = 0",
-        )
         sensitivity = top / self.C_g if self.C_g > 0.0 else self.K_g  # V per rad of table angle
         self.pull = self.J * self.capture_rate * self.capture_rate / sensitivity
         self.brake = 2.0 * self.J * self.capture_rate * self.capture_damping
         self.near = self.capture_angle * sensitivity
-        self.refuse(
-            self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max,
-            "capture_angle = {capture_angle} rad is beyond the linear range of the fine loop, torque_max / stiffness",
-        )
-
+        wide = self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max
+        self.refuse(wide, "capture_angle = {capture_angle} rad is beyond the linear range, torque_max / K_T")
         self.x = self.angle0
         self.theta = self.angle0
-        self.spin = self.base_rate()
-        self.v = 0.0
-        self.acc = 0.0
-        self.arrived = 0.0
-        self.stage = DRIVEN
+        self.spin = self.earth(2)
         self.t_last = self.t
-        self.mode_last = 0.0
-        self.target_last = 0.0
         for k in range(5):
             self.t_s[k] = self.t
             self.x_s[k] = self.angle0
-            self.v_s[k] = 0.0
-            self.a_s[k] = 0.0
 
-    def base_rate(self):
-        row = self.tilted[2][0] * self.omega_local[0] + self.tilted[2][1] * self.omega_local[1]
-        return row + self.tilted[2][2] * self.omega_local[2]
+    def earth(self, i):
+        row = self.tilted[index(i)][0] * self.omega_local[0] + self.tilted[index(i)][1] * self.omega_local[1]
+        return row + self.tilted[index(i)][2] * self.omega_local[2]  # of the base along its axis i
+
+    def force(self, i):
+        row = self.tilted[index(i)][0] * self.f_local[0] + self.tilted[index(i)][1] * self.f_local[1]
+        return row + self.tilted[index(i)][2] * self.f_local[2]
 
     def shaped(self, demand):
         m = clip(demand, -self.torque_max, self.torque_max)
         return m if self.shaper == 1.0 else m * fabs(m) / self.torque_max
 
     def flow(self) -> None:
-        slip = self.spin - self.base_rate()
+        slip = self.spin - self.earth(2)
         volt = self.polarity * self.u if self.stage == FINE else 0.0
         fast = (volt - self.filt) / self.lag
         self.der.filt = fast
@@ -295,14 +267,10 @@ class TableServo(Component):
     @sampled(every=1)
     def tick(self) -> None:
         if self.mode != self.mode_last or self.target != self.target_last:
-            self.refuse(
-                not (self.mode == 0.0 or self.mode == 1.0 or self.mode == 2.0 or self.mode == 3.0),
-                "mode = {mode} must be 0 hold, 1 index, 2 rate or 3 servo",
-            )
-            self.refuse(
-                self.mode == 2.0 and fabs(self.target) > self.rate_max,
-                "rate {target} rad/s exceeds rate_max = {rate_max} rad/s",
-            )
+            known = self.mode == 0.0 or self.mode == 1.0 or self.mode == 2.0 or self.mode == 3.0
+            self.refuse(not known, "mode = {mode} must be 0 hold, 1 index, 2 rate or 3 servo")
+            wild = self.mode == 2.0 and fabs(self.target) > self.rate_max
+            self.refuse(wild, "rate {target} rad/s exceeds rate_max = {rate_max} rad/s")
             if self.mode != 3.0:
                 self.stage = DRIVEN
                 goal = self.target if self.mode == 2.0 else 0.0  # the rate that segment 0 leads to
@@ -335,27 +303,21 @@ class TableServo(Component):
                     self.x_s[4] = self.target
             elif self.stage == DRIVEN:
                 self.stage = CAPTURE
-                self.near_for = 0.0 if self.capture == 1.0 else self.capture_hold
+                self.near_for = 0.0
             self.mode_last = self.mode
             self.target_last = self.target
 
         if self.stage == DRIVEN:
-            past = self.t - self.t_s[4]
-            self.arrived = 1.0
-            self.acc = 0.0
-            self.v = self.v_s[4]
-            self.x = self.x_s[4] + self.v * past
-            if past < 0.0:
-                self.arrived = 0.0
-                for k in range(4):
-                    if self.t >= self.t_s[k]:
-                        dt = self.t - self.t_s[k]
-                        self.acc = self.a_s[k]
-                        self.v = self.v_s[k] + self.acc * dt
-                        self.x = self.x_s[k] + self.v_s[k] * dt + 0.5 * self.acc * dt * dt
+            for k in range(5):
+                if self.t >= self.t_s[k]:
+                    dt = self.t - self.t_s[k]
+                    self.acc = self.a_s[k]
+                    self.v = self.v_s[k] + self.acc * dt
+                    self.x = self.x_s[k] + self.v_s[k] * dt + 0.5 * self.acc * dt * dt
+            self.arrived = 1.0 if self.t >= self.t_s[4] else 0.0
             self.t_last = self.t
             self.theta = self.x
-            self.spin = self.base_rate() + self.v
+            self.spin = self.earth(2) + self.v
 
     @sampled(every=1)
     def servo(self) -> None:
@@ -366,8 +328,7 @@ class TableServo(Component):
             self.near_for = self.near_for + self.h if near else 0.0
             if self.capture == 0.0 or (near and self.near_for >= self.capture_hold):
                 ready = 1.0
-        if ready == 1.0:
-            self.stage = FINE
+                self.stage = FINE
         if self.stage != FINE or ready == 1.0:  # the networks at rest at 0, or preset to what they will see
             self.filt = ready * volt
             for k in range(3):
@@ -377,20 +338,14 @@ class TableServo(Component):
         self.wish = 0.0
         if self.stage == DRIVEN:
             return
-        slip = self.spin - self.base_rate()
+        slip = self.spin - self.earth(2)
         if self.friction > 0.0:
             self.load = -self.friction * tanh(slip / maximum(self.friction_rate, 2.0 * self.h * self.friction / self.J))
         if self.ripple > 0.0:
             self.load = self.load + self.ripple * sin(self.ripple_cycles * self.theta + self.ripple_phase)
         if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0:
-            g = [0.0, 0.0]  # specific force along the table axes at angle 0
-            for i in range(2):
-                row = self.tilted[i][0] * self.f_local[0] + self.tilted[i][1] * self.f_local[1]
-                g[i] = row + self.tilted[i][2] * self.f_local[2]
-            c = cos(self.theta)
-            s = sin(self.theta)
-            fx = c * g[0] + s * g[1]
-            fy = c * g[1] - s * g[0]
+            fx = cos(self.theta) * self.force(0) + sin(self.theta) * self.force(1)
+            fy = cos(self.theta) * self.force(1) - sin(self.theta) * self.force(0)
             self.load = self.load - (self.unbalance[0] * fy - self.unbalance[1] * fx)
         others = self.load + self.torque - self.viscous * slip
         if self.stage == FINE:
@@ -426,22 +381,16 @@ class TableServo(Component):
             read = self.quantum * floor(read / self.quantum + 0.5)
         c = cos(self.theta)
         s = sin(self.theta)
-        e = [0.0, 0.0, 0.0]  # Earth rate and specific force in base axes, at angle 0
-        g = [0.0, 0.0, 0.0]
-        for i in range(3):
-            row = self.tilted[i][0] * self.omega_local[0] + self.tilted[i][1] * self.omega_local[1]
-            e[i] = row + self.tilted[i][2] * self.omega_local[2]
-            row = self.tilted[i][0] * self.f_local[0] + self.tilted[i][1] * self.f_local[1]
-            g[i] = row + self.tilted[i][2] * self.f_local[2]
-        rate = self.spin - e[2]
-        wx = c * e[0] + s * e[1]
-        wy = c * e[1] - s * e[0]
-        fx = c * g[0] + s * g[1]
-        fy = c * g[1] - s * g[0]
+        rate = self.spin - self.earth(2)
+        wx = c * self.earth(0) + s * self.earth(1)
+        wy = c * self.earth(1) - s * self.earth(0)
+        fx = c * self.force(0) + s * self.force(1)
+        fy = c * self.force(1) - s * self.force(0)
+        fz = self.force(2)
         for i in range(3):
             self.omega[i] = self.face[i][0] * wx + self.face[i][1] * wy + self.face[i][2] * self.spin
             self.alpha[i] = (self.face[i][0] * wy - self.face[i][1] * wx) * rate + self.face[i][2] * self.acc
-            self.f[i] = self.face[i][0] * fx + self.face[i][1] * fy + self.face[i][2] * g[2]
+            self.f[i] = self.face[i][0] * fx + self.face[i][1] * fy + self.face[i][2] * fz
         self.angle = self.theta
         self.rate = rate
         self.angle_read = read
