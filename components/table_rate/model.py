@@ -105,7 +105,7 @@ class TableRate(Component):
         self.a = 0.0
         self.arrived = 0.0
         self.t_last = self.t
-        self.mode_last = -1.0
+        self.mode_last = 0.0
         self.target_last = 0.0
         for k in range(5):
             self.t_s[k] = self.t
