@@ -9,8 +9,7 @@ D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, axis wo
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.reduction import attitude
+from gyrobench.reduction.method import Effect, Findings
 
 if TYPE_CHECKING:
     from .reduction import TumbleSetup
@@ -26,17 +26,6 @@ Array = NDArray[np.float64]
 TILT = "ε_IO"  # the tilt of the input axis towards the output axis as an unknown
 TOWARDS_OUTPUT = "input axis towards output axis"
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One source: its standard uncertainty and the change of each estimate (rad/s per g0^n) for one unit of it."""
-
-    source: str
-    size: float
-    unit: str
-    change: Array
-    note: str = ""
 
 
 def design(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], base: Array | None = None) -> Array:
@@ -52,21 +41,18 @@ def design(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...]
     return np.column_stack([X, -along])
 
 
-def effects(
-    setup: TumbleSetup, turning: attitude.Turning, current: Array, names: tuple[str, ...], beta: Array, gain: Array
-) -> list[Effect]:
+def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found: Findings) -> list[Effect]:
     """All sources with their sensitivities; sizes come from ``setup`` and may be 0.
 
-    current (n,) in A with the sign of the precession convention; beta (p,), gain (p, n): estimates = gain y.
+    current (n,) in A with the sign of the precession convention.
     """
-    X = design(setup, turning, names)
+    names, X = found.est.names, found.X
     rate = attitude.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
 
     def geometry(base: Array, turned: attitude.Turning) -> Array:
         dX = design(setup, turned, names, base) - X
         drate = attitude.axis_rate(turned, base, setup.latitude, setup.earth_rate) - rate
-        out: Array = gain @ (drate - dX @ beta) / SMALL
-        return out
+        return found.change(drate, dX) / SMALL
 
     def axis(direction: Array) -> Array:
         return geometry(setup.base @ frames.rotation(direction, SMALL).T, turning)
@@ -75,7 +61,9 @@ def effects(
         tilt = frames.rotation(direction, SMALL)
         return geometry(setup.base, replace(turning, face=tilt @ turning.face))
 
-    read: Callable[[Array], Array] = lambda di: gain @ (-setup.k * di)  # noqa: E731
+    def read(di: Array) -> Array:
+        return found.change(-setup.k * di)
+
     full = float(np.max(np.abs(current))) or 1.0
     one = np.ones_like(current)
     along_i, along_o, along_s = np.eye(3)

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from gyrobench import frames
-from gyrobench.system.measured import DataError, read_measured
+from gyrobench.system.laboratory import read_record
 from gyrobench.system.record import Record
 
 if TYPE_CHECKING:
@@ -40,7 +38,6 @@ TEMPLATE = """\
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
-TEXTS = ("instrument", "operator", "polarity", "date", "report")
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
@@ -48,44 +45,9 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
 
     Raises DataError, and ValueProblem for an option that does not fit.
     """
-    windows, comments = read_measured(data)
-    said = {**comments, **values}
-    for name in values:
-        if name not in system.options and name not in TEXTS and not name.startswith("phase "):
-            system.set(name, values[name])  # says which options there are
-    for name, value in said.items():
-        if name in system.options:
-            system.set(name, value)
-    problems = [
-        f"'{n}' is not given: write '# {n} = ...' in the file or --set {n}=..." for n in ("k",) if not system[n]
-    ]
-    if "latitude" not in said:
-        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
-    known = frames.tumble_faces(system["latitude"])
-    plan = []
-    for phase in sorted({int(p) for p in windows["phase"]}):
-        face = said.get(f"phase {phase}")
-        if face not in known:
-            there = f"{face!r} is no attitude" if face else "its attitude is not given"
-            problems.append(f"phase {phase}: {there}: write '# phase {phase} = ...' with one of {', '.join(known)}")
-            continue
-        mode = "rate" if face.startswith("mount") else "hold"
-        plan.append({"phase": phase, "label": face, "mode": mode, "face": face})
-    if problems:
-        raise DataError(data, problems)
-    count = len(windows["phase"])
-    windows.setdefault("std", np.full(count, np.nan))
-    windows.setdefault("n", np.ones(count, dtype=np.int64))
-    windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
-    meta = {
-        "system": system.name,
-        "title": system.title,
-        "spec": list(system.spec),
-        "measured": True,
-        "complete": True,
-        "options": dict(system.values),
-        "parameters": {},
-        "plan": plan,
-        **{n: said[n] for n in TEXTS if n in said},
-    }
-    return Record(windows, {}, meta)
+
+    def attitudes() -> dict[str, str]:
+        faces = frames.tumble_faces(system["latitude"])
+        return {face: "rate" if face.startswith("mount") else "hold" for face in faces}
+
+    return read_record(system, data, values, needed={"k": "...", "latitude": "45.75deg"}, attitudes=attitudes)

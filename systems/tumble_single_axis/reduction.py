@@ -20,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import attitude, correlated, regression, uncertainty
+from gyrobench.reduction import attitude, correlated, recorded, regression
 from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.result import BudgetLine, Coefficient, Result
+from gyrobench.reduction.method import Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Coefficient, Result
+from gyrobench.reduction.turns import Turns
 
-from . import budget, closed, diagnostics
+from . import budget, closed
 from .refusals import plan_problems, refusals, setup_problems
 
 __all__ = ["ReductionError", "TumbleSetup", "from_record", "reduce", "refusals"]
@@ -107,32 +109,21 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
     if setup.tilt:
         names = (*names, budget.TILT)
     X = budget.design(setup, turning, names)
-    try:
-        est = correlated.fit(X, y, names, turning.t_start, turning.t_end)
-    except regression.RegressionError as error:
-        raise ReductionError(str(error)) from None
     book, fits, why = closed.reduce(
         phase, turning.angle_start, turning.angle_end, turning.t_end - turning.t_start, y, setup.faces, setup.latitude,
         setup.gravity,
     )  # fmt: skip
-    effects = budget.effects(setup, turning, current, names, est.beta, est.gain)
+    quantities = [_quantity(setup, n, book) for n in names]
+    groups = [_group(setup, turning, phase, X, names, p) for p in setup.faces]
+    found = fit(quantities, X, y, turning.t_start, turning.t_end, groups, "drift rate", "°/h", DPH)
+    turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
+    turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
+    turns.test()
+    effects = budget.effects(setup, turning, current, found)
     tilt_line = next(e for e in effects if e.source == budget.TOWARDS_OUTPUT)
     j = names.index("D_O") if "D_O" in names else 0
-    if abs(float(tilt_line.change[j])) * tilt_line.size > float(est.u[j]):
-        warnings = ["The tilt of the input axis makes most of the uncertainty of D_O; the option tilt estimates it."]
-    else:
-        warnings = []
-    found = diagnostics.Findings(setup, phase, turning, y, X, est, book, fits)
-    coefficients = [_coefficient(setup, n, j, est, book, effects) for j, n in enumerate(names)]
-    if found.ideal:  # u is rounding: nothing to compare with
-        coefficients = [replace(c, z=None) for c in coefficients]
-    if not setup.tilt:
-        warnings += _tilt_seen(setup, turning, names, y)
-    warnings += [*est.warnings, *found.warnings]
-    if why:
-        warnings.append(f"No closed formulas: {why}.")
-    if est.design.condition > 100.0:
-        warnings.append(f"Condition {est.design.condition:.3g}: hardly seen is {est.design.weakest}.")
+    dominant = abs(float(tilt_line.change[j])) * tilt_line.size > float(found.u[j])
+    warnings = []
     if setup.fold:
         warnings.append(
             "D_OO is folded: at constant |g| only D_F + γ² D_OO, D_II − D_OO and D_SS − D_OO can be had (γ = g/g0 = "
@@ -143,7 +134,8 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         warnings.append(
             f"{', '.join(missing)} is simulated but not in the {setup.terms}-term model: the others are biased."
         )
-    return Result(
+    result = linear_result(
+        found,
         system="tumble_single_axis",
         title="Single-axis tumble test of a floated gyro",
         method="Torque-rebalance tumble about the polar axis in two mounts with two dwells; least squares over all "
@@ -155,35 +147,26 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         ],
         equation=_equation(names),
         conventions=_conventions(setup),
-        coefficients=coefficients,
-        series=found.series(),
-        correlation=regression.correlation(est.covariance).tolist(),
-        condition=est.design.condition,
-        rank=est.design.rank,
-        dof=float(y.size - len(names)),
-        noise=found.noise(),
-        tests=found.tests(),
-        residual_std=found.residual_std,
-        residual_unit="°/h",
-        acf=found.acf(),
-        allan=found.allan(),
-        psd=found.psd(),
-        harmonics=found.harmonics(),
-        budget=_budget_lines(names, setup, est, effects),
-        repeatability=found.repeatability(),
-        tables=found.tables(),
-        warnings=warnings,
-        summary=_summary(coefficients, found),
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.overall(c.verdict for c in coefficients),
-        site={
-            "latitude / °": math.degrees(setup.latitude),
-            "gravity / (m/s²)": setup.gravity,
-            "Earth rate / (rad/s)": setup.earth_rate,
-        },
+        effects=effects,
+        specification=setup.specification,
+        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
         instrument=setup.instrument,
         simulated=setup.truth is not None,
+        no_closed=why,
+        closed_caption="From the same windows; the formulas weigh all windows alike, D_F and D_O rest on the dwells",
+        tables=turns.table("θ = −angle"),
+        harmonics=turns.harmonics(fits),
+        repeatability=turns.repeatability(),
+        warnings=warnings,
     )
+    first = []
+    if dominant:
+        first.append("The tilt of the input axis makes most of the uncertainty of D_O; the option tilt estimates it.")
+    if not setup.tilt:
+        first += _tilt_seen(setup, turning, names, y)
+    result.warnings[:0] = first
+    result.summary = _summary(result.coefficients, found)
+    return result
 
 
 def _tilt_seen(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], y: Array) -> list[str]:
@@ -205,66 +188,35 @@ def _tilt_seen(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, 
     ]
 
 
-def _coefficient(
-    s: TumbleSetup, name: str, j: int, est: correlated.Estimate, book: Mapping[str, float], effects: list[budget.Effect]
-) -> Coefficient:
-    contributions = [float(e.change[j]) * e.size for e in effects]
-    u, U = uncertainty.combine(float(est.u[j]), float(est.half_width[j]), contributions)
-    value, truth = float(est.beta[j]), None
-    unit, scale = _surface(name)
-    if s.truth is not None and name != budget.TILT:
+def _quantity(s: TumbleSetup, name: str, book: Mapping[str, float]) -> Quantity:
+    if name == budget.TILT:
+        return Quantity.of(name, "tilt of the input axis towards the output axis", "arcsec")
+    truth = None
+    if s.truth is not None:
         oo = s.truth.get("D_OO", 0.0)
         extra = {"D_F": oo * (s.gravity / frames.G0) ** 2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
-        truth = (s.truth.get(name, 0.0) + extra) / scale
-    meaning = "tilt of the input axis towards the output axis" if name == budget.TILT else drift.MEANING[name]
-    shown = FOLDED.get(name, name) if s.fold else name
-    spec = s.specification or {}
-    limit = spec.get(shown, spec.get(name))
-    estimate, u_s, U_s = value / scale, u / scale, U / scale
-    u_a = float(est.u[j]) / scale
-    dof = float(est.dof[j])
-    return Coefficient(
-        name=shown,
-        meaning=meaning + (", with D_OO folded in" if shown != name else ""),
-        unit=unit,
-        estimate=estimate,
-        u=u_s,
-        k=U / u if u > 0.0 else uncertainty.NORMAL,
-        interval=(estimate - U_s, estimate + U_s),
-        t=estimate / u_a if u_a > 0.0 else None,
-        p=float(est.p[j]) if u_a > 0.0 else None,
-        u_a=u_a,
-        dof=dof if math.isfinite(dof) else None,
-        closed=book[name] / scale if name in book else None,
-        truth=truth,
-        z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
-        limit=limit,
-        verdict=uncertainty.verdict(estimate, U_s, limit),
-    )
+        truth = s.truth.get(name, 0.0) + extra
+    folded = FOLDED.get(name) if s.fold else None
+    q = Quantity.drift(name, truth, book.get(name))
+    return replace(q, meaning=f"{q.meaning}, with D_OO folded in", shown=folded) if folded else q
 
 
-def _surface(name: str) -> tuple[str, float]:
-    """Printed unit of an estimate and its SI value (coefficients are per multiple of g0, so theirs is in rad/s)."""
-    unit, per = ("arcsec", "arcsec") if name == budget.TILT else (drift.surface_unit(name), "deg/h")
-    return units.display(unit), units.factor(per)
-
-
-def _budget_lines(
-    names: tuple[str, ...], s: TumbleSetup, est: correlated.Estimate, effects: list[budget.Effect]
-) -> list[BudgetLine]:
-    lines = []
-    for j, name in enumerate(names):
-        unit, scale = _surface(name)
-        shown = FOLDED.get(name, name) if s.fold else name
-        u_a = float(est.u[j]) / scale
-        note = "type A, from the residuals under the estimated noise"
-        lines.append(BudgetLine("random drift and reading noise", u_a, unit, 1.0, "1", u_a, unit, shown, note))
-        for e in effects:
-            change = abs(float(e.change[j])) / scale
-            if e.size > 0.0 and change * e.size > 1e-9 * u_a:
-                per = unit if e.unit == "1" else f"{unit}/{e.unit}"
-                lines.append(BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, unit, shown, e.note))
-    return lines
+def _group(
+    s: TumbleSetup, turning: attitude.Turning, phase: NDArray[np.int_], X: Array, names: tuple[str, ...], p: int
+) -> Group:
+    """Drift against table angle where the table turns, against time in a dwell."""
+    mine = phase == p
+    if not s.turns(p):
+        middle = (turning.t_start + turning.t_end) / 2.0
+        return Group(s.label(p), mine, middle[mine] - turning.t_start[mine][0], "time in the dwell", "s")
+    angle = np.degrees(np.mod(((turning.angle_start + turning.angle_end) / 2.0)[mine], 2.0 * math.pi))
+    dense = np.radians(np.arange(0.0, 361.0, 3.0))
+    face = np.broadcast_to(np.asarray(s.faces[p], dtype=float), (dense.size, 3, 3))
+    still = attitude.Turning(dense, dense, np.zeros_like(dense), np.ones_like(dense), face)
+    curve = budget.design(s, still, names)
+    if budget.TILT in names:
+        curve[:, -1] = float(np.mean(X[mine, -1]))  # the table turns, the plotted one does not
+    return Group(s.label(p), mine, angle, "table angle", "°", (np.degrees(dense), curve))
 
 
 def _equation(names: tuple[str, ...]) -> str:
@@ -301,12 +253,12 @@ def _conventions(s: TumbleSetup) -> list[str]:
     ]
 
 
-def _summary(coefficients: list[Coefficient], found: diagnostics.Findings) -> list[str]:
+def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
     first = coefficients[0]
     linear = max((c for c in coefficients if c.unit == "°/h/g"), key=lambda c: abs(c.estimate))
     return [
-        f"Constant drift {first.name} = {diagnostics.plus_minus(first)}.",
-        f"Largest drift per g: {linear.name} = {diagnostics.plus_minus(linear)}.",
+        f"Constant drift {first.name} = {plus_minus(first)}.",
+        f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         found.noise_sentence(),
     ]
 
@@ -319,29 +271,18 @@ def setup_of(
     Scale factor: option ``k``, else the gyro's parameter ``k``.  Truth only where the gyro part has the coefficients.
     """
     options, parameters = dict(meta.get("options", {})), dict(meta.get("parameters", {}))
-    latitude = float(options["latitude"])
-    gravity = float(options.get("gravity") or parameters.get("site.gravity") or 0.0)
-    if gravity == 0.0:
-        gravity = frames.normal_gravity(latitude, float(options.get("height", 0.0)))
-    k = options.get("k") or parameters.get("gyro.k")
-    if k is None:
-        raise ReductionError("torquer scale factor unknown: the gyro has no parameter k; give the option k")
-    ideal = frames.tumble_faces(latitude)
-    plan = meta["plan"]
-    unknown = sorted({r["face"] for r in plan} - set(ideal))
-    if unknown:
-        raise ReductionError(f"mount {', '.join(unknown)} unknown; there are {', '.join(ideal)}")
-    truth = {n: float(parameters[f"gyro.{n}"]) for n in drift.NAMES if f"gyro.{n}" in parameters}
-    sizes = ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
+    site = recorded.Site.of(meta)
+    ideal = frames.tumble_faces(site.latitude)
+    plan = recorded.phases(meta, ideal)
     return TumbleSetup(
-        latitude=latitude,
-        gravity=gravity,
-        k=float(k),
-        faces={int(r["phase"]): ideal[r["face"]] for r in plan},
-        earth_rate=float(parameters.get("site.earth_rate", frames.EARTH_RATE)),
-        labels={int(r["phase"]): str(r["label"]) for r in plan},
-        modes={int(r["phase"]): "rate" if r["mode"] == "rate" else "dwell" for r in plan},
-        truth=truth or None,
+        latitude=site.latitude,
+        gravity=site.gravity,
+        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
+        faces={p: ideal[r["face"]] for p, r in plan.items()},
+        earth_rate=site.earth_rate,
+        labels={p: str(r["label"]) for p, r in plan.items()},
+        modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
+        truth=recorded.truth_of(meta, drift.NAMES),
         terms=int(options.get("terms", 9)),
         fold=bool(options.get("fold", False)),
         tilt=bool(options.get("tilt", False)),
@@ -349,16 +290,10 @@ def setup_of(
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
-        **{n: float(options.get(n, 0.0)) for n in sizes},
+        **recorded.sizes(meta, ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")),
     )
 
 
 def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
     """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
-    result = reduce(record.windows, setup_of(record.meta, specification))
-    result.provenance = dict(record.meta)
-    if not record.meta.get("complete", True):
-        result.warnings.insert(
-            0, f"The run stopped at {record.meta.get('stopped_at', 0.0):.6g} s, before its plan was done."
-        )
-    return result
+    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
