@@ -1,9 +1,9 @@
 """Do the 95 % intervals of the tumble cover?  Monte Carlo on the whole co-simulation: FMUs, loop, sampler, reduction.
 
-    python tests/benchmarks/coverage_tumble.py --runs 1000 [--case white ...] [--turns 2] [--windows 36]
+    python tests/benchmarks/coverage_tumble.py --runs 1000 [--case white ...] [--turns 3] [--windows 36]
 
 Each run draws a gyro (nine coefficients in the book's ranges, both signs) and new noise.  The plan is the book's, both
-senses and two turns in each, with the table at 0.3 rad/s instead of 7.3e-4: 36 windows of 0.58 s a turn and dwells of
+senses and three turns in each, with the table at 0.3 rad/s instead of 7.3e-4: 36 windows of 0.58 s a turn and dwells of
 twenty windows.  Noise is set so that a shortened window is to the noise what a window of the full test is:
 
   white         0.0178 deg/h/sqrt(Hz), the standard gyro's: 0.023 deg/h a window
@@ -12,6 +12,10 @@ twenty windows.  Noise is set so that a shortened window is to the noise what a 
 The pickoff noise (blue in the current: it telescopes over a window) is scaled to the share of the full test, one
 tenth of the white noise; the meter's noise stays.  The lag of the loop at this rate is 9e-5 of the first harmonics,
 a thirtieth of u.  The reduction is told nothing about the noise.
+
+Measured, 1000 runs each, three turns: white 0.941 .. 0.962, markov 1 0.935 .. 0.946, markov 5 0.936 .. 0.956 over the nine
+coefficients.  Less data leaves more open about the noise: with a single turn in one sense and dwells of ten windows,
+white 0.954 .. 0.971, markov 1 0.938 .. 0.986, markov 5 0.917 .. 0.968 (D_IS and D_IO lowest, D_F and D_O highest).
 """
 
 from __future__ import annotations
@@ -37,7 +41,7 @@ SIGMA = 0.04 * DPH
 CASES = {"white": 0.0, "markov 1": 1.0, "markov 5": 5.0}  # correlation time in windows
 
 
-def values(case: str, windows: int = 36, turns: int = 2) -> dict[str, Any]:
+def values(case: str, windows: int = 36, turns: int = 3) -> dict[str, Any]:
     """Options and noise parameters of a case."""
     window = 2.0 * math.pi / RATE / windows
     tau = CASES[case] * window
@@ -55,7 +59,7 @@ def values(case: str, windows: int = 36, turns: int = 2) -> dict[str, Any]:
 
 
 def coverage(
-    case: str, runs: int, windows: int = 36, turns: int = 2, seed: int = 1, tell: Callable[[int], None] | None = None
+    case: str, runs: int, windows: int = 36, turns: int = 3, seed: int = 1, tell: Callable[[int], None] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Intervals that hold the truth (count per coefficient), and root mean square of u over that of the errors."""
     system = load()
@@ -87,7 +91,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--windows", type=int, default=36, help="a turn")
-    parser.add_argument("--turns", type=int, default=2, help="in each mount and sense")
+    parser.add_argument("--turns", type=int, default=3, help="in each mount and sense")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     bad = []
