@@ -26,22 +26,22 @@ def _list(rows: NDArray[np.intp], shown: int = 5) -> str:
     return text + (f" and {rows.size - shown} more" if rows.size > shown else "")
 
 
-def window_problems(windows: Mapping[str, Array]) -> list[str]:
+def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQUIRED) -> list[str]:
     """What is wrong with the rows of a record, as sentences; rows count from 1.
 
-    Columns phase, t_start, t_end, angle_start, angle_end, mean (flagged optional), in SI: all finite, times strictly
-    increasing, no window twice, none flagged (saturated torquer, lost lock).
+    Columns ``required`` (t_start and t_end among them) in SI: all finite, times strictly increasing, no window twice,
+    none flagged (saturated torquer, lost lock) in any column whose name begins with "flagged".
     """
-    missing = [c for c in REQUIRED if c not in windows]
+    missing = [c for c in required if c not in windows]
     if missing:
-        return [f"column {', '.join(missing)} is missing; a record has {', '.join(REQUIRED)}"]
-    sizes = {c: len(windows[c]) for c in REQUIRED}
+        return [f"column {', '.join(missing)} is missing; a record has {', '.join(required)}"]
+    sizes = {c: len(windows[c]) for c in required}
     if len(set(sizes.values())) > 1:
         return [f"columns of different length: {sizes}"]
-    if sizes["mean"] == 0:
+    if sizes["t_start"] == 0:
         return ["the record holds no windows"]
     found = []
-    for c in REQUIRED:
+    for c in required:
         bad = np.flatnonzero(~np.isfinite(np.asarray(windows[c], dtype=float)))
         if bad.size:
             found.append(f"column {c}: non-finite number in row {_list(bad)}")
@@ -59,11 +59,12 @@ def window_problems(windows: Mapping[str, Array]) -> list[str]:
     back = np.flatnonzero((np.diff(t0) < -slack) | ((t0[1:] < t1[:-1] - slack) & (np.diff(t0) > slack))) + 1
     if back.size:
         found.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
-    if "flagged" in windows:
-        bad = np.flatnonzero(np.asarray(windows["flagged"]) > 0)
+    for c in (c for c in windows if c.startswith("flagged")):
+        bad = np.flatnonzero(np.asarray(windows[c]) > 0)
         if bad.size:
+            channel = "" if c == "flagged" else f" ({c})"
             found.append(
-                f"flagged windows (saturated torquer or lost lock) in row {_list(bad)}; a flagged mean is no "
+                f"flagged windows{channel} (saturated torquer or lost lock) in row {_list(bad)}; a flagged mean is no "
                 "measurement: repeat the phase or leave these rows out"
             )
     return found

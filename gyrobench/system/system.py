@@ -96,10 +96,10 @@ class Windows:
     columns: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, slot: str = "sampler") -> Windows:
-        """The columns of the Sampler socket."""
+    def of(cls, slot: str = "sampler", **more: str) -> Windows:
+        """The columns of the Sampler socket, and ``more``: mean_y="sampler_y.mean"."""
         names = ("t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged")
-        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}})
+        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}, **more})
 
 
 class System:

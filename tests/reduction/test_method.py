@@ -10,10 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from gyrobench import units
-from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction import harmonic, recorded
+from gyrobench.reduction.checks import ReductionError, window_problems
 from gyrobench.reduction.merge import merge
 from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.turns import Turns
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
@@ -161,3 +163,68 @@ def test_what_cannot_be_fitted() -> None:
         fit(["a", "b"], np.column_stack([x, x]), x, None, None, [], "y", "V", 1.0, noise="white")
     with pytest.raises(ValueError, match="noise 'pink'"):
         fit(["a"], x[:, None], x, None, None, [], "y", "V", 1.0, noise="pink")
+
+
+# ------------------------------------------------------------------------------------------ turns, run.json, checks
+def turning(cosine3: float, step: float) -> tuple[Findings, Turns]:
+    """Two turns of 36 windows: rate 0.3 deg/h + 0.1 cos theta, noise 0.002, cosine3 cos 3 theta, and ``step`` between
+    the turns, all in deg/h.
+    """
+    edge = np.radians(np.arange(0.0, 721.0, 10.0))
+    start, end = edge[:-1], edge[1:]
+    middle = (start + end) / 2.0
+    X, _ = harmonic.columns(start, end, (0, 1))
+    y = 0.3 + 0.1 * X[:, 1] + cosine3 * harmonic.columns(start, end, (3,))[0][:, 0] + step * (middle > 2 * math.pi)
+    y += 0.002 * np.random.default_rng(4).normal(size=y.size)
+    t = 240.0 * np.arange(y.size)
+    found = fit(["A0", "A1", "B1"], X, y * DPH, t, t + 240.0, [], "rate", "°/h", DPH, noise="white")
+    turns = Turns(found, [("mount 1", np.ones(y.size, dtype=bool))], start, end, held=1)
+    turns.test()
+    return found, turns
+
+
+def test_turns() -> None:
+    found, turns = turning(0.0, 0.0)
+    named = {t.name: t for t in found.tests}
+    assert (named["harmonics 2 and higher"].p or 0.0) > 0.01 and (named["turn to turn"].p or 0.0) > 0.01
+    rows = turns.table()[0]["rows"]
+    assert [r[:2] for r in rows] == [["mount 1", 1], ["mount 1", 2]]
+    assert rows[0][2:] == pytest.approx([0.3, 0.1, 0.0], abs=0.002)
+    assert list(turns.repeatability())[3:] == [f"scatter of {n} / (°/h)" for n in ("A0", "A1", "B1")]
+
+    found, turns = turning(0.02, 0.0)
+    third = next(h for h in turns.harmonics({}) if h["n"] == 3)
+    assert (third["a"], third["b"]) == pytest.approx((0.02, 0.0), abs=5 * third["u"]) and third["u"] < 1e-3
+    assert (next(t for t in found.tests if t.name == "harmonics 2 and higher").p or 0.0) < 1e-6
+
+    found, turns = turning(0.0, 0.02)  # two turns apart by 0.02: standard deviation of two values 0.02/sqrt(2)
+    assert turns.repeatability()["p"] < 1e-6
+    assert turns.repeatability()["scatter of A0 / (°/h)"] == pytest.approx(0.02 / math.sqrt(2.0), abs=1e-3)
+
+
+def test_what_a_run_says() -> None:
+    meta = {"options": {"latitude": 0.8, "k": 0.0, "u_axis": 1e-4}, "plan": [{"phase": 2, "face": "up"}],
+            "parameters": {"gyro.k": 3.0, "gyro.D_F": 1e-6, "site.gravity": 9.81}}  # fmt: skip
+    site = recorded.Site.of(meta)
+    assert (site.latitude, site.gravity) == (0.8, 9.81) and site.shown()["gravity / (m/s²)"] == 9.81
+    assert recorded.Site.of({"options": {"latitude": 0.8}}).gravity == pytest.approx(9.8067, abs=1e-3)
+    assert recorded.number(meta, "k", "gyro.k") == 3.0
+    assert recorded.truth_of(meta, ("D_F", "D_I")) == {"D_F": 1e-6} and recorded.truth_of({}, ("D_F",)) is None
+    assert recorded.sizes(meta, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
+    assert recorded.phases(meta, ("up", "down")) == {2: {"phase": 2, "face": "up"}}
+    with pytest.raises(ReductionError, match="mount up unknown; there are down"):
+        recorded.phases(meta, ("down",))
+    with pytest.raises(ReductionError, match="scale factor unknown: the gyro has no parameter K; give the option K"):
+        recorded.number(meta, "K", "gyro.K", "scale factor")
+    with pytest.raises(ReductionError, match="latitude"):
+        recorded.Site.of({})
+
+
+def test_windows_of_two_channels() -> None:
+    t = np.arange(3.0)
+    w = {"t_start": t, "t_end": t + 1.0, "mean_x": t, "mean_y": t, "flagged_y": np.array([0, 1, 0])}
+    need = ("t_start", "t_end", "mean_x", "mean_y")
+    assert window_problems(w, need)[0].startswith("flagged windows (flagged_y)")
+    del w["flagged_y"]
+    assert window_problems(w, need) == []
+    assert window_problems({**w, "mean_y": t * np.nan}, need) == ["column mean_y: non-finite number in row 1, 2, 3"]
