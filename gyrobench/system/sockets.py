@@ -107,6 +107,17 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         Socket(
+            "Accelerometer",
+            "accelerometer with its own rebalance: specific force in, current out",
+            (
+                _in("f", "m/s2", "specific force along x, y, z (input, output, pendulum axis)", 3),
+                _out("i", "A", "rebalance current"),
+                _out("i_read", "A", "rebalance current as measured"),
+                _out("theta", "rad", "angle of the pendulum (diagnostic)", optional=True),
+                _out("saturated", "1", "1 while the current is limited", optional=True, whole=True),
+            ),
+        ),
+        Socket(
             "Rebalance",
             "torque rebalance: pickoff voltage to torquer current",
             (
