@@ -16,7 +16,8 @@ class Sequencer(Component):
         move    until the table reports in_position (after at least GUARD = 3 samples: the report may be that
                 of the phase before, one step old)
         settle  t - t_move >= settle
-        open    the gate is open: 1 (hold and index phases; windows by time) until t - t_open >= dwell,
+        open    the gate is open: 1 (hold, index and servo phases; windows by time) until t - t_open >= dwell
+                and, in a servo phase, |angle - angle_open| >= travel too;
                 2 (rate phases; windows by angle) until |angle - angle_open| >= travel + window / 100
         close   GUARD further samples with the gate open
 
@@ -35,12 +36,12 @@ class Sequencer(Component):
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
     phases = Parameter(1, int, "number of phases", min=1, max=99)
-    modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate")
+    modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate, 3 servo")
     targets = Parameter([0.0] * 99, "1", "target of each phase: angle in rad (index), rate in rad/s (rate)")
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
-    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index)")
-    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate)")
-    windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index) or rad (rate)")
+    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo)")
+    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate; servo: at least)")
+    windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo) or rad (rate)")
     face_of = Parameter([1] * 99, int, "which of the faces each phase uses, from 1")
     faces = Parameter([IDENTITY] * 12, "1", "mounts: rows of the face matrix one after the other")
 
@@ -71,8 +72,8 @@ class Sequencer(Component):
             self.bad_phase = p + 1.0
             rate = self.modes[p] == 2.0
             self.refuse(
-                not (self.modes[p] == 0.0 or self.modes[p] == 1.0 or rate),
-                "phase {bad_phase}: unknown mode; modes are 0 hold, 1 index, 2 rate",
+                not (self.modes[p] == 0.0 or self.modes[p] == 1.0 or rate or self.modes[p] == 3.0),
+                "phase {bad_phase}: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo",
             )
             self.refuse(
                 self.face_of[p] < 1.0 or self.face_of[p] > 12.0 or self.face_of[p] != floor(self.face_of[p]),
@@ -88,13 +89,13 @@ class Sequencer(Component):
             )
             self.refuse(
                 not rate and self.dwell[p] <= 0.0,
-                "phase {bad_phase}: a hold or index phase needs a dwell above 0 s",
+                "phase {bad_phase}: a hold, index or servo phase needs a dwell above 0 s",
             )
             self.refuse(self.windows[p] <= 0.0, "phase {bad_phase}: the window must be above 0")
             longest = (self.travel[p] if rate else self.dwell[p]) * (1.0 + 1e-9)
             self.refuse(
                 self.windows[p] > longest,
-                "phase {bad_phase}: the window is longer than the dwell (hold, index) or travel (rate)",
+                "phase {bad_phase}: the window is longer than the dwell (hold, index, servo) or travel (rate)",
             )
             self.bad_face = self.face_of[p]
             for i in range(3):
@@ -140,7 +141,9 @@ class Sequencer(Component):
                 if fabs(self.angle - self.angle_ref) >= far:
                     self.stage = CLOSE
             elif self.t - self.t_ref > self.dwell[index(self.now - 1.0)] - half:
-                self.stage = CLOSE
+                turned = fabs(self.angle - self.angle_ref) >= self.travel[index(self.now - 1.0)]
+                if turned or self.modes[index(self.now - 1.0)] != 3.0:
+                    self.stage = CLOSE
         elif self.stage == CLOSE:
             self.waited = self.waited + 1.0
             if self.waited >= GUARD:

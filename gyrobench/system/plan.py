@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-MODES = {"hold": 0, "index": 1, "rate": 2}
+MODES = {"hold": 0, "index": 1, "rate": 2, "servo": 3}
 LIMIT = 99  # phases
 FACES = 12  # different mounts
 
@@ -15,9 +15,10 @@ FACES = 12  # different mounts
 class Phase:
     """One phase: the table goes to its target, settles, then windows are averaged until dwell or travel is reached.
 
-    mode "hold": stay where the table is; "index": go to the angle ``target`` (rad); "rate": turn at ``target`` (rad/s).
-    settle: s before the first window.  dwell: s of windows (hold, index).  travel: rad of windows (rate).
-    window: length of one window, s (hold, index) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
+    mode "hold": stay where the table is; "index": go to the angle ``target`` (rad); "rate": turn at ``target`` (rad/s);
+    "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned.
+    settle: s before the first window.  dwell: s of windows (hold, index, servo).  travel: rad of windows (rate).
+    window: length of one window, s (hold, index, servo) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
     """
 
     label: str

@@ -74,6 +74,20 @@ def test_rate_phase_opens_by_angle_and_keeps_the_gate_a_hair_longer():
     assert changes(play(part, 80, angle=lambda t: -t)) == [(8, 1.0, 2.0, 0.0), (62, 1.0, 0.0, 1.0)]
 
 
+def test_servo_phase_lasts_until_time_and_angle_have_passed():
+    # windows by time; opens at sample 3 + 5.  Dwell 0.2 s alone: closes at 28 + 3.  With a travel of 0.5 rad at
+    # 1 rad/s, 0.01 rad a sample: opened at 8 having seen 0.07, 0.57 is seen at 57 -> sample 58; three more: 61.
+    servo = {"mode": 3, "settle": 0.05, "dwell": 0.2, "window": 0.1}
+    part = started([servo])
+    assert changes(play(part, 80, angle=lambda t: t)) == [(8, 1.0, 1.0, 0.0), (31, 1.0, 0.0, 1.0)]
+    assert part.mode == 0.0
+    part = started([{**servo, "travel": 0.5}])
+    assert part.mode == 3.0
+    assert changes(play(part, 80, angle=lambda t: -t)) == [(8, 1.0, 1.0, 0.0), (61, 1.0, 0.0, 1.0)]
+    part = started([{"mode": 0, "settle": 0.05, "dwell": 0.2, "window": 0.1, "travel": 0.5}])  # not of a hold phase
+    assert changes(play(part, 80, angle=lambda t: 0.0)) == [(8, 1.0, 1.0, 0.0), (31, 1.0, 0.0, 1.0)]
+
+
 def test_phases_follow_and_faces_change():
     part = started(
         [
@@ -136,13 +150,13 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
 @pytest.mark.parametrize(
     "phase, message",
     [
-        ({**OK, "mode": 3}, "phase 2: unknown mode; modes are 0 hold, 1 index, 2 rate"),
+        ({**OK, "mode": 4}, "phase 2: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo"),
         ({**OK, "face": 13}, "phase 2: face_of must be 1 to 12"),
         ({**OK, "face": 0}, "phase 2: face_of must be 1 to 12"),
         ({**RATE, "target": 0.0}, "phase 2: the table does not turn"),
         ({**RATE, "travel": 0.0}, "phase 2: a rate phase needs a travel above 0 rad"),
-        ({**OK, "dwell": 0.0}, "phase 2: a hold or index phase needs a dwell above 0 s"),
-        ({**OK, "mode": 1, "dwell": -1.0}, "phase 2: a hold or index phase needs a dwell above 0 s"),
+        ({**OK, "dwell": 0.0}, "phase 2: a hold, index or servo phase needs a dwell above 0 s"),
+        ({**OK, "mode": 1, "dwell": -1.0}, "phase 2: a hold, index or servo phase needs a dwell above 0 s"),
         ({**OK, "window": 0.0}, "phase 2: the window must be above 0"),
         ({**OK, "window": 1.1}, "phase 2: the window is longer than the dwell"),
         ({**RATE, "window": 6.1}, "phase 2: the window is longer than the dwell"),

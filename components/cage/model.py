@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Input, Output, Parameter
+from gyrobench.math import clip
+
+SERVO = 3.0  # mode of the table in which the gyro holds it
+
+
+class Cage(Component):
+    """Electrical caging: the torquer holds the float near its zero while the gyro does not hold the table.
+
+        i = K_p u limited to +-i_max        while mode is not 3 (servo)
+        i = 0                               in mode 3: the torquer is idle, as a servo test wants it
+
+    With u = K_sg b and the precession -k i of the torquer, b' = (H / C) (omega_IA - omega_d - k i): the float follows
+    with the rate (H / C) K_sg k K_p, 100 1/s with the default sizes, and stands off by (omega_IA - omega_d) over it.
+    A gyro that is not caged while its table is moved keeps the angle, and servo mode turns the table back by it.
+
+    Not modelled: float stops, the switching transient of a real torquer.
+    Source: 000_791234d3afc34a0c.txt ch. 3, section 3 (torquer idle while the table is held); caging is our own.
+    """
+
+    version = "1.0.0"
+
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
+    K_p = Parameter(120.0, "A/V", "gain", min=0.0)
+    i_max = Parameter(0.1, "A", "current limit", above=0.0)
+
+    u = Input(0.0, "V", "pickoff voltage")
+    mode = Input(0.0, "1", "mode of the table: 3 servo, caged in any other")
+
+    i = Output("A", "torquer current")
+    saturated = Output("1", "1 while the current is limited")
+
+    def outputs(self) -> None:
+        wish = 0.0 if self.mode == SERVO else self.K_p * self.u
+        self.i = clip(wish, -self.i_max, self.i_max)
+        self.saturated = 1.0 if self.i != wish else 0.0
