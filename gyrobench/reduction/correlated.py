@@ -57,10 +57,16 @@ class Estimate:
     density: tuple[float, float, float]  # density N of the white part (unit sqrt(s)): likeliest, 5 % and 95 % point
     best: tuple[float, float]  # tau and share of the most likely model
     warnings: tuple[str, ...]
+    reading: float = 0.0  # share of reading errors in the most likely model
+    sigma_reading: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of one reading: likeliest, 5 % and 95 % point
 
 
-def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3) -> Estimate:
+def fit(
+    X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False
+) -> Estimate:
     """Coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
+
+    readings: the data are differences of readings at t0 and t1, neighbours share one.
 
     Raises RegressionError (a ValueError) for data that cannot carry the model and for windows without length or out
     of order.  u, half width and interval are in the unit of the coefficients.
@@ -68,23 +74,20 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     design = check_data(X, y, names, limit)
     check_windows(t0, t1)
     n, p = X.shape
-    grid = noise.cells(t0, t1)
+    grid = noise.cells(t0, t1, readings)
     scale = np.linalg.norm(X, axis=0)
     Q, R = np.linalg.qr(X / scale)
     start = Q.T @ y
     rest = y - Q @ start
-    Z, logdet = noise.whiten(t0, t1, np.column_stack([Q, rest]), grid.tau, grid.share)
-    Z = Z.transpose(1, 0, 2)
-    zx, zy = Z[:, :, :p], Z[:, :, p]
-    M = zx.transpose(0, 2, 1) @ zx
-    xy = np.einsum("gnp,gn->gp", zx, zy)
+    both = np.column_stack([Q, rest])
+    M, xy, yy, logdet = _moments(t0, t1, both, grid)
     Mi = np.linalg.inv(M)
     b = np.einsum("gpq,gq->gp", Mi, xy)
-    rss = np.maximum(np.einsum("gn,gn->g", zy, zy) - np.einsum("gp,gp->g", xy, b), 0.0)
+    rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
     ll = -0.5 * (logdet + np.linalg.slogdet(M)[1] + (n - p) * np.log(np.maximum(rss, 1e-300)))
     ll += np.log(grid.prior)
     if np.linalg.norm(rest) <= 1e-12 * np.linalg.norm(y):  # ideal data: what is left is rounding, no noise
-        ll = np.where(grid.share == 0.0, 0.0, -np.inf)
+        ll = np.where((grid.share == 0.0) & (grid.reading == 0.0), 0.0, -np.inf)
     w = np.exp(ll - ll.max())
     w /= w.sum()
 
@@ -104,18 +107,21 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     probability = _tails(w, off, sd_each, n - p, np.abs(beta))
 
     k = int(np.argmax(ll))
-    Lk = zx[k] @ Mi[k]
-    scatter = zy[k] - zx[k] @ b[k]
-    gain = T @ _gain(Lk, t0, t1, grid.tau[k], grid.share[k])
+    Z = _whitened(t0, t1, both, grid, slice(k, k + 1))[0][0]
+    Lk = Z[:, :p] @ Mi[k]
+    scatter = Z[:, p] - Z[:, :p] @ b[k]
+    gain = T @ (Lk.T @ _whitened(t0, t1, np.eye(n), grid, slice(k, k + 1))[0][0])
     window = float(np.median(t1 - t0))
     v = noise.mean_variance(window / grid.tau)
-    white = float(w[grid.share == 0.0].sum())
+    white = float(w[(grid.share == 0.0) & (grid.reading == 0.0)].sum())
+    left = s2 * (1.0 - grid.reading)
     tau = _spread(w, grid.tau, k, grid.share > 0.0)
-    sigma = _spread(w, np.sqrt(s2 * grid.share / v), k)
-    density = _spread(w, np.sqrt(s2 * (1.0 - grid.share) * window), k)
+    sigma = _spread(w, np.sqrt(left * grid.share / v), k)
+    density = _spread(w, np.sqrt(left * (1.0 - grid.share) * window), k)
     record = float(t1[-1] - t0[0])
     warnings = []
-    if white < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
+    slow = float(w[grid.share == 0.0].sum()) < 0.5
+    if slow and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
             f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval holds for this record only."
@@ -123,7 +129,8 @@ def fit(X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: f
     return Estimate(
         tuple(names), beta, covariance, u, half, probability, _dof(half / u), y - X @ beta,
         scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
-        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings),
+        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings), float(grid.reading[k]),
+        _spread(w, np.sqrt(s2 * grid.reading / 2.0) * window, k),
     )  # fmt: skip
 
 
@@ -201,8 +208,20 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     return float(values[k]), low, high
 
 
-def _gain(projector: Array, t0: Array, t1: Array, tau: float, share: float) -> Array:
-    """(p, n): projector' times the whitening matrix of one model."""
-    eye, _ = noise.whiten(t0, t1, np.eye(t0.size), np.array([tau]), np.array([share]))
-    out: Array = projector.T @ eye[:, 0, :]
-    return out
+def _whitened(t0: Array, t1: Array, columns: Array, grid: noise.Cells, which: slice) -> tuple[Array, Array]:
+    """(G, n, c) and log determinants (G,) of some models of the grid."""
+    Z, logdet = noise.whiten(t0, t1, columns, grid.tau[which], grid.share[which], grid.reading[which])
+    return Z.transpose(1, 0, 2), logdet
+
+
+def _moments(t0: Array, t1: Array, columns: Array, grid: noise.Cells) -> tuple[Array, Array, Array, Array]:
+    """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model; some at a time."""
+    p, size = columns.shape[1] - 1, grid.tau.size // np.unique(grid.reading).size
+    parts = []
+    for start in range(0, grid.tau.size, size):
+        Z, logdet = _whitened(t0, t1, columns, grid, slice(start, start + size))
+        zx, zy = Z[:, :, :p], Z[:, :, p]
+        xy, yy = np.einsum("gnp,gn->gp", zx, zy), np.einsum("gn,gn->g", zy, zy)
+        parts.append((zx.transpose(0, 2, 1) @ zx, xy, yy, logdet))
+    M, xy, yy, logdet = (np.concatenate(v) for v in zip(*parts, strict=True))
+    return M, xy, yy, logdet

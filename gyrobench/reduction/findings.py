@@ -109,7 +109,8 @@ def fit(
 
     quantities: one for each column; a name alone for an unknown that is only a step to a derived quantity.
     noise: "estimated" (white, Gauss-Markov or both, from the data; wants some tens of windows) or "white" (assumed;
-    few readings; then ``weights`` (n,) may be given, and times may be None).  limit: largest condition number.
+    few readings; then ``weights`` (n,) may be given, and times may be None); "readings": estimated, of data that are
+    differences of readings at t_start and t_end (angles over time).  limit: largest condition number.
     Raises ReductionError for data that cannot carry the model.
     """
     n = len(y)
@@ -120,10 +121,10 @@ def fit(
     try:
         if noise == "white":
             est = correlated.ordinary(X, y, names, t_start, t_end, weights, limit)
-        elif noise == "estimated" and weights is None:
-            est = correlated.fit(X, y, names, t_start, t_end, limit)
+        elif noise in ("estimated", "readings") and weights is None:
+            est = correlated.fit(X, y, names, t_start, t_end, limit, noise == "readings")
         else:
-            raise ValueError(f"noise '{noise}': 'estimated', or 'white' with or without weights")
+            raise ValueError(f"noise '{noise}': 'estimated', 'readings', or 'white' with or without weights")
     except RegressionError as error:
         raise ReductionError(str(error)) from None
     reported = Estimates(est.beta, est.covariance, est.u, est.half_width, est.p, est.dof, est.gain)
@@ -251,6 +252,7 @@ class Findings:
             return {**found, f"standard deviation / ({unit})": self.residual_std}
         share = e.best[1]
         model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
+        model += " with reading errors" if e.reading > 0.0 else ""
         found = {
             "model": "none (ideal data)" if self.ideal else model,
             "weight of white noise alone": e.white,
@@ -259,7 +261,10 @@ class Findings:
             f"Gauss-Markov rms / ({unit})": e.sigma[0] / scale,
             f"Gauss-Markov rms, 90 % range / ({unit})": [v / scale for v in e.sigma[1:]],
         }
-        if e.white < 0.5 and not self.ideal:
+        if e.sigma_reading[2] > 0.0:
+            found[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
+            found[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
+        if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
             found["correlation time / s"] = e.tau[0]
             found["correlation time, 90 % range / s"] = list(e.tau[1:])
         return found
@@ -272,7 +277,8 @@ class Findings:
         if self.white:
             return text + ", taken as white noise."
         if self.est.best[1] == 0.0:
-            return text + ", compatible with white noise."
+            more = " and errors of the readings" if self.est.reading > 0.0 else ""
+            return text + f", compatible with white noise{more}."
         return text + f", correlated over about {self.est.tau[0]:.3g} s; the intervals allow for it."
 
     # ------------------------------------------------------------------------------------------ tests
@@ -316,7 +322,8 @@ class Findings:
             Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
         else:
             tau, share = self.est.best
-            Z = noise_model.whiten(self.t_start, self.t_end, columns, np.array([tau]), np.array([share]))[0][:, 0, :]
+            model = np.array([tau]), np.array([share]), np.array([self.est.reading])
+            Z = noise_model.whiten(self.t_start, self.t_end, columns, *model)[0][:, 0, :]
         z, A, p = Z[:, -1], Z[:, :-1], self.X.shape[1]
         plain = np.linalg.lstsq(A[:, :p], z, rcond=None)[0]
         q, r = np.linalg.qr(A)

@@ -9,7 +9,10 @@ x stationary and running on through the gaps.  With r = T/tau, a = (1 - exp(-r))
     var e_i = N^2/T_i + sigma^2 v_i,    cov(e_i, e_j) = sigma^2 a_i a_j exp(-gap/tau)   (gap: end of i to start of j)
 
 exactly, whatever the window lengths.  A constant (turn-on bias) is no noise here: it belongs to the constant term.
-Not modelled: flicker noise, random walk, quantization.  [RED-GLS; own derivation, proved by tests]
+
+Data that are differences of readings, (angle_i - angle_{i-1}) / T_i, also carry the errors n of the readings, white and
+shared by neighbours: var += 2 s^2 / T^2, cov of neighbours -= s^2 / (T_i T_{i+1})  [RED-RATE: lag-1 correlation -1/2].
+Not modelled: flicker noise, random walk, quanta that are no white error.  [RED-GLS; own derivation, proved by tests]
 """
 
 from __future__ import annotations
@@ -50,12 +53,14 @@ def process_covariance(t0: Array, t1: Array, tau: float) -> Array:
 class Cells:
     """Candidate noise models: correlation time, correlated share of the variance of a window, prior weight.
 
-    share = sigma^2 v / (N^2/T + sigma^2 v) for a window of the typical length.
+    share = sigma^2 v / (N^2/T + sigma^2 v) for a window of the typical length; reading: what reading errors make of
+    its whole variance.
     """
 
     tau: Array  # s, (G,)
     share: Array  # (G,)
     prior: Array  # (G,), sums to 1
+    reading: Array  # (G,)
 
 
 #: Prior weights of the three families white / Gauss-Markov / both.  Correlation times run from 0.3 windows (1 window
@@ -67,10 +72,12 @@ FAMILIES = (0.5, 0.2, 0.3)
 LONGEST = 2.2
 SLOPES = (0.2, 0.6)
 TILT = (0.2, 0.4)
+#: Shares of reading errors where data are differences of readings, with their prior weights.
+READING = ((0.0, 0.25), (0.1, 0.15), (0.3, 0.15), (0.6, 0.15), (0.85, 0.15), (0.97, 0.15))
 
 
-def cells(t0: Array, t1: Array) -> Cells:
-    """The grid of candidate models for windows [t0, t1] (s)."""
+def cells(t0: Array, t1: Array, readings: bool = False) -> Cells:
+    """The grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
     window, record = float(np.median(t1 - t0)), float(t1[-1] - t0[0])
     longest = max(LONGEST * np.sqrt(record / window), 3.0) * window
     doublings = min(max(float(np.log2(t0.size / 82.0)), 0.0), 2.5)
@@ -84,7 +91,13 @@ def cells(t0: Array, t1: Array) -> Cells:
     tau = np.concatenate([[window], tau_p, tau_b])
     share = np.concatenate([[0.0], np.ones(12), odds / (1.0 + odds)])
     prior = np.concatenate([[1.0], _weights(tau_p, slopes[0]), _weights(tau_b, slopes[1])])
-    return Cells(tau, share, prior * np.repeat(FAMILIES, (1, 12, 70)))
+    prior = prior * np.repeat(FAMILIES, (1, 12, 70))
+    if not readings:
+        return Cells(tau, share, prior, np.zeros_like(tau))
+    size, weight = np.array(READING).T
+    return Cells(
+        np.tile(tau, size.size), np.tile(share, size.size), np.outer(weight, prior).ravel(), np.repeat(size, tau.size)
+    )
 
 
 def _weights(tau: Array, slope: float) -> Array:
@@ -92,11 +105,15 @@ def _weights(tau: Array, slope: float) -> Array:
     return out
 
 
-def whiten(t0: Array, t1: Array, columns: Array, tau: Array, share: Array) -> tuple[Array, Array]:
+def whiten(
+    t0: Array, t1: Array, columns: Array, tau: Array, share: Array, reading: Array | None = None
+) -> tuple[Array, Array]:
     """``columns`` (n, c) made white for each of G models: (n, G, c), and log determinant of the covariance (G,).
 
     The covariance is scaled so that a window of the median length has variance 1.  Innovations of the process, O(n).
     """
+    if reading is not None and np.any(reading > 0.0):
+        return _whiten_readings(t0, t1, columns, tau, share, reading)
     n, c = columns.shape
     length = (t1 - t0)[:, None]
     window = float(np.median(length))
@@ -122,5 +139,41 @@ def whiten(t0: Array, t1: Array, columns: Array, tau: Array, share: Array) -> tu
             g = pause[i]
             m *= g[:, None]
             p = g * g * p + (1.0 - g * g) * size
+    out /= np.sqrt(variance)[:, :, None]
+    return out, np.log(variance).sum(axis=0)
+
+
+def _whiten_readings(
+    t0: Array, t1: Array, columns: Array, tau: Array, share: Array, reading: Array
+) -> tuple[Array, Array]:
+    """:func:`whiten` with reading errors: the state is the process x and the error n of the window's first reading."""
+    n, c = columns.shape
+    length = (t1 - t0)[:, None]
+    window = float(np.median(length))
+    rest = 1.0 - reading
+    size = rest * share / mean_variance(window / tau)
+    q = reading * window**2 / 2.0  # variance of one reading error
+    r = length / tau
+    phi, a, v = np.exp(-r), mean_gain(r), mean_variance(r)
+    noise = np.maximum(v - a * a, 0.0) * size + rest * (1.0 - share) * window / length + q / length**2
+    cross, drive = a * (1.0 - phi) * size, (1.0 - phi * phi) * size
+    gap = np.append(t0[1:] - t1[:-1], 0.0)
+    pause = np.exp(-np.maximum(gap, 0.0)[:, None] / tau)
+    px, pn, both = np.array(size), np.array(q), np.zeros_like(q)
+    x, first = np.zeros((tau.size, c)), np.zeros((tau.size, c))
+    out, variance = np.empty((n, tau.size, c)), np.empty((n, tau.size))
+    for i in range(n):
+        ai, fi, ti = a[i], phi[i], float(length[i, 0])
+        s = ai * ai * px - 2.0 * ai * both / ti + pn / ti**2 + noise[i]
+        e = columns[i] - ai[:, None] * x + first / ti
+        variance[i], out[i] = s, e
+        kx, kn = (fi * (ai * px - both / ti) + cross[i]) / s, q / ti / s
+        x = fi[:, None] * x + kx[:, None] * e
+        first = kn[:, None] * e
+        px, pn, both = fi * fi * px + drive[i] - kx * kx * s, q - kn * kn * s, -kx * kn * s
+        g = pause[i]
+        x, px, both = g[:, None] * x, g * g * px + (1.0 - g * g) * size, g * both
+        if gap[i] > 1e-6 * window:  # a reading of its own
+            first, pn, both = np.zeros_like(first), np.array(q), np.zeros_like(both)
     out /= np.sqrt(variance)[:, :, None]
     return out, np.log(variance).sum(axis=0)

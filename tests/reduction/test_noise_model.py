@@ -204,3 +204,49 @@ def test_ordinary_least_squares_does_not_cover() -> None:
         fit = least_squares(X, e, drift.terms(9))
         hits += np.abs(fit.beta) <= fit.half_width()
     assert hits[0] / 200 < 0.75 and hits.mean() / 200 < 0.85
+
+
+def reading_covariance(t0, t1, tau, share, reading):
+    """Dense covariance of window means of the process and white noise, and of differences of readings."""
+    window = float(np.median(t1 - t0))
+    size = share / float(noise.mean_variance(np.array(window / tau)))
+    rate = size * noise.process_covariance(t0, t1, tau) + np.diag((1.0 - share) * window / (t1 - t0))
+    points = np.unique(np.round(np.concatenate([t0, t1]), 9))
+    D = np.zeros((t0.size, points.size))
+    for i, (a, b) in enumerate(zip(t0, t1, strict=True)):
+        D[i, np.searchsorted(points, round(b, 9))] = 1.0 / (b - a)
+        D[i, np.searchsorted(points, round(a, 9))] = -1.0 / (b - a)
+    return (1.0 - reading) * rate + reading * window**2 / 2.0 * D @ D.T
+
+
+@pytest.mark.parametrize("reading", [0.0, 0.3, 0.97])
+@pytest.mark.parametrize("share", [0.0, 0.6, 1.0])
+def test_reading_errors_are_shared_by_neighbours(share, reading):
+    """Whitened data against the dense covariance: same quadratic form, same log determinant; gap and odd windows."""
+    t0 = np.array([0.0, 10.0, 20.0, 30.0, 55.0, 65.0, 71.0, 85.0])
+    t1 = np.array([10.0, 20.0, 30.0, 40.0, 65.0, 71.0, 81.0, 95.0])
+    V = reading_covariance(t0, t1, 17.0, share, reading)
+    if reading > 0.0:
+        window2 = (t1 - t0)[0] * (t1 - t0)[1]
+        both = (1.0 - reading) * share * noise.process_covariance(t0, t1, 17.0)[0, 1]
+        both /= float(noise.mean_variance(np.array(10.0 / 17.0)))
+        assert V[0, 1] == pytest.approx(both - reading * 100.0 / 2.0 / window2)  # lag-1 of the readings: -1/2
+    y = np.random.default_rng(3).normal(size=(t0.size, 2))
+    z, logdet = noise.whiten(t0, t1, y, np.array([17.0]), np.array([share]), np.array([reading]))
+    form = z[:, 0, :].T @ z[:, 0, :]
+    np.testing.assert_allclose(form, y.T @ np.linalg.solve(V, y), rtol=1e-10)
+    assert logdet[0] == pytest.approx(np.linalg.slogdet(V)[1], rel=1e-10, abs=1e-10)
+
+
+def test_readings_are_told_from_white_rate_noise():
+    """300 windows of reading errors alone: the mean is known to sqrt2 s / (N T), not s_r / sqrt N [RED-RATE]."""
+    rng = np.random.default_rng(8)
+    n, T, s = 300, 100.0, 0.1
+    t0 = T * np.arange(n)
+    y = 5.0 + np.diff(rng.normal(0.0, s, n + 1)) / T
+    found = correlated.fit(np.ones((n, 1)), y, ("mean",), t0, t0 + T, readings=True)
+    assert found.reading > 0.9 and found.sigma_reading[0] == pytest.approx(s, rel=0.1)
+    naive = np.std(y) / np.sqrt(n)
+    assert found.u[0] < 0.4 * naive
+    assert found.u[0] > 0.5 * np.sqrt(2.0) * s / (n * T)
+    assert abs(found.beta[0] - 5.0) < 4.0 * found.u[0]
