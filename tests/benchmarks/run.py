@@ -94,7 +94,7 @@ def tumble(quick: bool) -> None:
     try:
         loop = folder / "tumble_loop"
         subprocess.run(["cc", "-O2", str(HERE / "tumble_loop.c"), "-o", str(loop), "-lm"], check=True)
-        command = [sys.executable, "-m", "gyrobench.cli", "run", "tumble_single_axis", "--out", str(folder / "run")]
+        command = [sys.executable, "-m", "gyrobench.cli", "run", "tumble_single_axis", "--force", "--out", str(folder / "run")]
         subprocess.run([*command, "--set", "rate=2deg/s", "--set", "dwell=30s"], capture_output=True, check=True)
         whole, floor = [], []
         for _ in range(1 if quick else ROUNDS):
