@@ -1,0 +1,328 @@
+"""Reduction of the multi-position test: the polynomial of an accelerometer from its currents under gravity.
+
+    lambda i/g0 = k0 + k1 X + k2 X2 + k3 X3 + k4 X Y + k5 X Z,       (X, Y, Z) at theta + theta_0, see geometry.py
+
+All readings of one visit of a position are one datum (an error of the position is common to them).  Least squares over
+both mounts, by Gauss-Newton in the two theta_0, all else being linear; the closed formulas of each mount stand beside
+it.  k are multiples of g0 = 9.80665 m/s2 (per g0^n).  [TEST-ACC-MULTI; 000_791234d3afc34a0c.txt eq. 3-38..3-46]
+
+Not modelled: a tilt of the axis of the head (k4, k5 times the tilt in k1, and half its square), a change of the
+coefficients during the test, a mount error other than theta_0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.frames import G0
+from gyrobench.reduction import recorded
+from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+from . import closed
+from .geometry import zero_angle
+from .model import Model, Setup, Visits, visits
+from .refusals import position_problems, record_problems, setup_problems, zero_problems
+
+__all__ = ["ReductionError", "Setup", "from_record", "reduce"]
+
+Array = NDArray[np.float64]
+UG, ARCSEC = 1e-6, math.pi / 648000.0
+ENOUGH = 24  # visits from which the noise model is estimated; fewer are taken as white
+KS = ("k0", "k1", "k2", "k3", "k4", "k5")
+MEANING = {
+    "k0": ("bias", "µg", UG),
+    "k1": ("scale factor against λ", "g/g", 1.0),
+    "k2": ("second order in the specific force along the input axis", "µg/g²", UG),
+    "k3": ("third order in the specific force along the input axis", "µg/g³", UG),
+    "k4": ("cross term of input and output axis", "µg/g²", UG),
+    "k5": ("cross term of input and pendulum axis", "µg/g²", UG),
+}
+SEEN = {  # what four positions see, see closed.py
+    ("a",): {"k0": "k0 + ½k5γ² tan 2θ₀", "k2": "k2 − k5 tan 2θ₀"},
+    ("b",): {"k0": "k0 − ½k4γ² tan 2θ₀", "k2": "k2 + k4 tan 2θ₀"},
+    ("a", "b"): {"k0": "k0 + ¼γ²(k5 tan 2θ₀a − k4 tan 2θ₀b)", "k2": "k2 − ½(k5 tan 2θ₀a − k4 tan 2θ₀b)"},
+}
+for _shown in SEEN.values():
+    _shown["k1"] = "k1 + k3γ²"
+SOURCES = [
+    "TEST-ACC-MULTI, ACC-EXACT; 000_791234d3afc34a0c.txt eq. 3-38..3-46",
+    "RED-OLS, RED-GLS; 000_791234d3afc34a0c.txt eq. 4-64..4-88, divisor n − p",
+]
+
+
+def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+    """Coefficients with uncertainties from the windows of a record (columns as in gyrobench.reduction.checks, SI).
+
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    problems = setup_problems(setup) + window_problems(windows)
+    if not problems:
+        problems = record_problems(setup, windows)
+    if problems:
+        raise ReductionError(problems)
+    v, gamma = visits(windows, setup), setup.gamma
+    if problems := position_problems(v.mount, v.angle):
+        raise ReductionError(problems)
+    if np.all(v.y == v.y[0]):
+        raise ReductionError("the current is the same in all positions: no accelerometer was read")
+    four = closed.spacing(v.angle[v.mount == v.mounts[0]])[0] == 4
+    model = Model(v.mounts, four)
+    zeros, k = model.solve(v, gamma)
+    if all(abs(z) > 0.5 * math.pi for z in zeros.values()):
+        raise ReductionError(
+            "the current is positive with the input axis up, the book's sign is the opposite: turn its sign round "
+            "(or the sense of the angle)"
+        )
+    if problems := zero_problems(zeros):
+        raise ReductionError(problems)
+    C, D = model.columns(v, zeros, gamma), model.slopes(v, zeros, gamma, k)
+    # theta_0 enters as a correction to where the model is linearized, so that the data stay the data
+    steps = [*model.terms, *(f"correction of θ₀ {m}" for m in model.mounts)]
+    noise = "estimated" if v.y.size >= ENOUGH else "white"
+    book, fits, why = _closed(v, setup, four)
+    linear = fit(
+        steps, np.column_stack([C, D]), v.y, v.t_start, v.t_end, _groups(v, model, zeros, gamma, k), "λi/g₀", "µg", UG,
+        noise=noise,
+    )  # fmt: skip
+    start = np.concatenate([np.zeros(C.shape[1]), [zeros[m] for m in model.mounts]])
+    found = linear.derive(_quantities(setup, model, book), lambda b: start + b)
+    _f_tests(found, v)
+    result = linear_result(
+        found, system="accelerometer_multipoint", title="Multi-position test of a pendulous accelerometer",
+        method=f"{closed.spacing(v.angle)[0]} positions about a horizontal axis, {_mounts(v)}; least squares over all "
+        "positions [TEST-ACC-MULTI]",
+        sources=SOURCES, equation=_equation(model), conventions=_conventions(setup, model),
+        effects=_effects(found, model, v, zeros, setup), specification=setup.specification, site=setup.site,
+        instrument=setup.instrument, simulated=setup.truth is not None, no_closed=why,
+        closed_caption="From the same data; where both mounts give a coefficient, the mean of the two",
+        tables=_tables(fits), harmonics=_harmonics(v, four, linear), repeatability=_repeatability(found, v),
+        warnings=_warnings(model, setup), random="noise of the accelerometer and scatter of the positions",
+    )  # fmt: skip
+    result.summary = _summary(result, found)
+    return result
+
+
+def _mounts(v: Visits) -> str:
+    return "mounts a and b" if len(v.mounts) == 2 else f"mount {v.mounts[0]}"
+
+
+def _groups(v: Visits, model: Model, zeros: Mapping[str, float], gamma: float, k: Array) -> list[Group]:
+    out = []
+    for m in model.mounts:
+        rows = np.flatnonzero(v.mount == m)
+        dense = np.radians(np.arange(0.0, 361.0, 3.0))
+        many = Visits(np.full(dense.size, m), dense, dense, dense, np.zeros_like(dense), math.nan)
+        X = np.column_stack([model.columns(many, zeros, gamma), model.slopes(many, zeros, gamma, k)])
+        shown = np.degrees(np.mod(v.angle[rows] + closed.EQUAL, 2.0 * math.pi) - closed.EQUAL)
+        out.append(Group(f"mount {m}", rows, shown, "angle of the head", "°", (np.degrees(dense), X)))
+    return out
+
+
+def _closed(v: Visits, s: Setup, four: bool) -> tuple[dict[str, float], dict[str, dict[str, float]], str]:
+    """Closed formulas: the mean of the mounts, those of each mount, and why there are none ("" when there are)."""
+    fits = {}
+    for m in v.mounts:
+        mine = v.mount == m
+        _, uneven = closed.spacing(v.angle[mine])
+        if uneven:
+            return {}, {}, f"the positions of mount {m} are not equally spaced ({uneven})"
+        if four:
+            fits[m] = closed.four_points(v.angle[mine], v.y[mine], s.gamma)
+        else:
+            fits[m] = closed.formulas(closed.harmonics(v.angle[mine], v.y[mine]), m, s.gamma)
+    out = {f"θ₀ {m}": f["theta0"] for m, f in fits.items()}
+    for name in KS:
+        values = [f[name] for f in fits.values() if name in f]
+        if values:
+            out[name] = float(np.mean(values))
+    return out, fits, ""
+
+
+def _quantities(s: Setup, model: Model, book: Mapping[str, float]) -> list[Quantity]:
+    truth: dict[str, float] = dict(s.truth or {})
+    zeros = {m: (s.zeros or {}).get(m, 0.0) for m in model.mounts}
+    shown: Mapping[str, str] = {}
+    note = ""
+    if model.four:
+        if truth:
+            truth |= closed.stands_for(truth, zeros, s.gamma)
+        shown = SEEN[tuple(model.mounts)]
+        note = ", as four positions see it"
+    out = []
+    for name in model.terms:
+        meaning, unit, size = MEANING[name]
+        out.append(Quantity(name, meaning + note, unit, size, truth.get(name), book.get(name), shown.get(name, "")))
+    for m in model.mounts:
+        meaning = f"zero of the head and error of the input axis, mount {m}"
+        out.append(Quantity(f"θ₀ {m}", meaning, "″", ARCSEC, (s.zeros or {}).get(m), book.get(f"θ₀ {m}")))
+    return out
+
+
+def _effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float], s: Setup) -> list[Effect]:
+    terms = len(model.terms)
+    step = 1e-4
+    stretched = np.zeros_like(found.X)
+    stretched[:, :terms] = (
+        model.columns(v, zeros, s.gamma * (1.0 + step)) - model.columns(v, zeros, s.gamma * (1.0 - step))
+    ) / (2.0 * step * s.gravity)
+    slope = found.X[:, terms:].sum(axis=1)  # of the data per rad of angle
+    station = np.rint(np.mod(v.angle + closed.EQUAL, 2.0 * math.pi) / (10.0 * closed.EQUAL)).astype(int)
+    alone = np.array([found.change(np.where(station == p, slope, 0.0)) for p in np.unique(station)])
+    offset = found.change(s.scale / G0)
+    return [
+        Effect("scale λ", s.u_scale, "1", found.change(v.y), "relative"),
+        Effect("zero of the current meter", s.u_current, "A", offset),
+        Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
+        Effect("gravity", s.u_gravity, "m/s²", found.change(dX=stretched)),
+        Effect(
+            "positions of the head", s.u_angle, "rad", np.sqrt(np.sum(alone**2, axis=0)),
+            "independent, the same in each turn and mount",
+        ),
+    ]  # fmt: skip
+
+
+def _f_tests(found: Findings, v: Visits) -> None:
+    """Harmonics beyond the third, and turn against turn, as far as the data allow."""
+    columns, later = [], []
+    for m in v.mounts:
+        mine = v.mount == m
+        n, uneven = closed.spacing(v.angle[mine])
+        for h in range(4, min(6, (n - 1) // 2) + 1):
+            columns += [np.where(mine, f(h * v.angle), 0.0) for f in (np.cos, np.sin)]
+        if not uneven:
+            turn = np.cumsum(mine) - 1
+            for k in range(1, int(mine.sum()) // n):
+                here = mine & (turn // n == k)
+                later += [np.where(here, f, 0.0) for f in (np.ones_like(v.y), np.cos(v.angle), np.sin(v.angle))]
+    empty = np.empty((v.y.size, 0))
+    found.f_test(
+        "harmonics 4 and higher", np.column_stack(columns) if columns else empty,
+        "errors of the head's positions and terms beyond the third order",
+        "something goes with the angle that the model does not hold", "no more than noise",
+    )  # fmt: skip
+    found.f_test(
+        "turn to turn", np.column_stack(later) if later else empty, "change of bias and scale factor between turns",
+        "the turns differ by more than the noise", "the turns agree within the noise",
+    )  # fmt: skip
+
+
+def _repeatability(found: Findings, v: Visits) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for test in found.tests:
+        if test.name == "turn to turn":
+            out |= {"F": test.statistic, "p": test.p, "finding": test.finding}
+    if math.isfinite(v.within):
+        out["scatter of the readings within a position / µg"] = v.within / UG
+    return out
+
+
+def _harmonics(v: Visits, four: bool, linear: Findings) -> list[dict[str, Any]]:
+    out: list[dict[str, Any]] = []
+    for m in v.mounts:
+        mine = v.mount == m
+        if closed.spacing(v.angle[mine])[1] or four:
+            continue
+        h = closed.harmonics(v.angle[mine], v.y[mine])
+        u = linear.residual_std / math.sqrt(mine.sum())
+        for n in range(4):
+            b = h[f"B{n}"] / UG if n else None
+            size = u * (math.sqrt(2.0) if n else 1.0)
+            out.append({"series": f"mount {m}", "n": n, "a": h[f"A{n}"] / UG, "b": b, "u": size, "unit": "µg"})
+    return out
+
+
+def _tables(fits: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+    if len(fits) < 2:
+        return []
+    rows: list[list[Any]] = []
+    for name in ("k0", "k1", "k2", "k3"):
+        if name in fits["a"]:
+            _, unit, size = MEANING[name]
+            a, b = fits["a"][name] / size, fits["b"][name] / size
+            rows.append([name, a, b, a - b, unit])
+    caption = "Closed formulas of each mount alone: the difference should be scatter"
+    head = ["coefficient", "mount a", "mount b", "difference", "unit"]
+    return [{"title": "The two mounts apart", "caption": caption, "columns": head, "rows": rows}]
+
+
+def _equation(model: Model) -> str:
+    cross = {"k4": " + k_4 X Y", "k5": " + k_5 X Z"}
+    more = "" if model.four else " + k_3 X^3" + "".join(cross[k] for k in model.terms[4:])
+    return "(lambda i)/g_0 = k_0 + k_1 X + k_2 X^2" + more + ", quad X = -gamma sin(theta + theta_0)"
+
+
+def _conventions(s: Setup, model: Model) -> list[str]:
+    return [
+        "X, Y, Z = −f/g0 along input, output and pendulum axis (book sign: an axis that points up reads −γ); "
+        "g0 = 9.80665 m/s². Against +f/g0 (IEEE) k1 and k3 change sign; k0, k2, k4, k5 do not.",
+        f"k are multiples of g0 with λ = {s.scale / G0 * 1e-3:.9g} g0/mA; γ = g/g0 = {s.gamma:.7f}.",
+        "θ counts from where the input axis is level, in the sense in which it rises; θ₀ is the zero of the head and "
+        "the error of the input axis together, which no multi-position test separates.",
+        "All readings of one visit of a position are one datum.",
+        *(f"k{4 if m == 'a' else 5} is not seen in mount {m} and not estimated." for m in model.mounts
+          if len(model.mounts) == 1 and not model.four),
+    ]  # fmt: skip
+
+
+def _warnings(model: Model, s: Setup) -> list[str]:
+    out = []
+    if model.four:
+        out.append(
+            "Four positions: the third order is in k1 (k1 + k3 γ²), and k0 and k2 hold the cross term times tan 2θ₀; "
+            "8 positions or more tell them apart."
+        )
+    if s.u_angle > 0.0 and not model.four:
+        out.append(
+            "Errors of the head with sin θ look like k4 and k5, those with cos θ like k0 and k2: see the budget."
+        )
+    return out
+
+
+def _summary(result: Result, found: Findings) -> list[str]:
+    by = {c.name.split(" ")[0]: c for c in result.coefficients}
+    third = max((c for c in result.coefficients if "/g" in c.unit and "µ" in c.unit), key=lambda c: abs(c.estimate))
+    return [
+        f"Bias {by['k0'].name} = {plus_minus(by['k0'])}; scale factor {by['k1'].name} = {plus_minus(by['k1'])}.",
+        f"Largest nonlinearity: {third.name} = {plus_minus(third)}.",
+        found.noise_sentence("positions"),
+    ]
+
+
+def setup_of(
+    meta: Mapping[str, Any], specification: Mapping[str, tuple[float | None, float | None]] | None = None
+) -> Setup:
+    """The setup a run.json describes.  Truth only where the accelerometer has the coefficients."""
+    options, parameters = meta.get("options", {}), meta.get("parameters", {})
+    site = recorded.Site.of(meta)
+    measured = bool(meta.get("measured", False))
+    plan = recorded.phases(meta, ("a", "b"))
+    mounts = {p: str(r["face"]) for p, r in plan.items()}
+    truth = recorded.truth_of(meta, KS, "accelerometer")
+    zeros = None
+    if truth is not None and set(truth) == set(KS):
+        axes = parameters.get("accelerometer.mount", np.eye(3))
+        zeros = {m: zero_angle(m, axes) for m in sorted(set(mounts.values()))}
+    return Setup(
+        gravity=site.gravity,
+        scale=recorded.number(meta, "scale", "accelerometer.scale", "scale λ"),
+        mounts=mounts,
+        truth=truth if zeros is not None else None,
+        zeros=zeros,
+        specification=specification,
+        quantum=float(parameters.get("accelerometer.resolution", 0.0)),
+        instrument=str(meta.get("instrument", "")),
+        site={"gravity / (m/s²)": site.gravity} if measured else site.shown(),
+        **recorded.sizes({"options": options}, ("u_scale", "u_current", "u_gravity", "u_angle")),
+    )
+
+
+def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)

@@ -1,0 +1,89 @@
+"""What makes a multi-position test impossible: number and spacing of the positions, mount, setup, record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closed import spacing
+from .geometry import FACES
+
+if TYPE_CHECKING:
+    from .model import Setup
+
+Array = NDArray[np.float64]
+ZERO = math.radians(1.0)  # largest theta_0
+STILL = 1e-6  # rad, largest motion within a window
+
+
+def points_problems(points: int, mounts: str = "both", turns: int = 1) -> list[str]:
+    """Why ``points`` equally spaced positions cannot give the coefficients, as sentences."""
+    if points < 4:
+        return [f"{points} positions a turn: at least 4 are needed, 7 for the third order"]
+    if points < 7:
+        if points > 4:
+            return [
+                f"{points} positions a turn: three harmonics need at least 7 [ACC-MINPTS]; take 8, 12 or 24, or 4 for "
+                "k0, k1 + k3 γ² and k2 alone"
+            ]
+        if mounts != "both" and turns < 2:
+            return ["4 positions of one mount, once: four data for four unknowns say nothing of their scatter; turns=2"]
+    return []
+
+
+def zero_problems(zeros: Mapping[str, float]) -> list[str]:
+    """Mounts whose input axis is not level at angle 0; ``zeros``: mount -> theta_0, rad."""
+    return [
+        f"mount {m}: θ₀ = {math.degrees(z):.4g}°: the input axis must be horizontal at angle 0 to 1° (head zero and "
+        "mount together); a larger angle is a mistake of the mount"
+        for m, z in zeros.items()
+        if abs(z) > ZERO
+    ]
+
+
+def setup_problems(s: Setup) -> list[str]:
+    found = []
+    if not 9.7 <= s.gravity <= 9.9:
+        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
+    if not (math.isfinite(s.scale) and s.scale > 0.0):
+        found.append(f"scale λ = {s.scale:g} m/s²/A: a finite positive number is expected")
+    unknown = sorted({m for m in s.mounts.values() if m not in FACES})
+    if unknown:
+        found.append(f"mount {', '.join(unknown)} unknown; there are {', '.join(FACES)}")
+    return found
+
+
+def record_problems(s: Setup, windows: Mapping[str, Array]) -> list[str]:
+    """Phases without a mount and windows in which the head moved; rows count from 1."""
+    phase = np.asarray(windows["phase"]).astype(int)
+    strange = sorted(set(phase.tolist()) - set(s.mounts))
+    found = [f"phase {p}: its mount is not given" for p in strange]
+    turned = np.abs(np.asarray(windows["angle_end"], dtype=float) - np.asarray(windows["angle_start"], dtype=float))
+    for k in np.flatnonzero(turned > STILL)[:5]:
+        found.append(
+            f"row {k + 1}: the head moved by {math.degrees(float(turned[k])):.3g}° while its reading was taken; a "
+            "reading belongs to one position"
+        )
+    return found
+
+
+def position_problems(mount: NDArray[np.str_], angle: Array) -> list[str]:
+    """Mounts with too few positions, or few that are not equally spaced."""
+    found = []
+    for m in sorted(set(mount.tolist())):
+        here = angle[mount == m]
+        n, uneven = spacing(here)
+        problems = points_problems(n, turns=2)
+        if not problems and n == 4:
+            quarters = np.abs(here - np.rint(here / (math.pi / 2.0)) * (math.pi / 2.0))
+            if uneven or float(quarters.max()) > ZERO:
+                problems = [f"4 positions must be 0°, 90°, 180° and 270°, each as often as the others; {uneven}"]
+        found += [f"mount {m}: {p}" for p in problems]
+    counts = {m: spacing(angle[mount == m])[0] for m in sorted(set(mount.tolist()))}
+    if not found and len(counts) == 2 and 4 in counts.values() and len(set(counts.values())) > 1:
+        found.append("one mount with 4 positions, the other with more: reduce them apart")
+    return found
