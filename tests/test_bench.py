@@ -49,8 +49,8 @@ def test_unknown_names_are_answered_with_names_that_are_near(tmp_path: Path) -> 
     bench = Bench(standard_folder())
     with pytest.raises(BenchError, match=r"no part 'floated_gyr'; did you mean floated_gyro\?"):
         bench.part_folder("floated_gyr")
-    with pytest.raises(BenchError, match=r"no system 'tumble'; did you mean tumble_single_axis\?"):
-        bench.system_folder("tumble")
+    with pytest.raises(BenchError, match=r"no system 'tumble_single_axes'; did you mean tumble_single_axis\?"):
+        bench.system_folder("tumble_single_axes")
     with pytest.raises(BenchError, match=r"is no bench: it has no folder components/ \(make one: gyrobench init NAME"):
         Bench.find(tmp_path)
     assert nearest("xyz", ["site", "table"]) == "there are: site, table"

@@ -127,7 +127,7 @@ def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path
 # --------------------------------------------------------------------------------------------- refused
 REFUSED = [
     (["run", "tumbl_single_axis"], "no system 'tumbl_single_axis'; did you mean tumble_single_axis?"),
-    (["show", "tumble"], "did you mean tumble_single_axis?"),
+    (["show", "tumble_single"], "did you mean tumble_single_axis"),
     (["run", NAME, "--set", "latitud=45deg"], "latitud: no such option of tumble_single_axis; options: latitude"),
     (["run", NAME, "--set", "gyr.D_I=3"], "--set gyr.D_I: no slot 'gyr'; did you mean gyro?"),
     (["run", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),

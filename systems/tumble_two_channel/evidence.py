@@ -1,0 +1,111 @@
+"""Beside the coefficients of the two-channel tumble: plots, tests of harmonics and turns, terms left out, budget."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.reduction import attitude
+from gyrobench.reduction.method import Effect, Findings, Group
+from gyrobench.reduction.turns import Turns
+
+from . import geometry
+from .setup import OTHER, TwoChannelSetup, design
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
+
+
+def groups(s: TwoChannelSetup, c: str, phase: Array, t: attitude.Turning, X: Array) -> list[Group]:
+    out = []
+    for p in s.faces:
+        rows = np.flatnonzero(phase == p)
+        if not s.turns(p):
+            x = (t.t_start[rows] + t.t_end[rows]) / 2.0 - t.t_start[rows][0]
+            out.append(Group(s.label(p), rows, x, "time in the dwell", "s"))
+            continue
+        x = np.degrees(np.mod((t.angle_start[rows] + t.angle_end[rows]) / 2.0, 2.0 * math.pi))
+        angle = np.radians(np.arange(0.0, 361.0, 3.0))
+        face = np.broadcast_to(np.asarray(s.faces[p], dtype=float), (angle.size, 3, 3))
+        curve = design(s, c, attitude.Turning(angle, angle, np.zeros_like(angle), np.ones_like(angle), face))
+        if s.tilt:
+            curve[:, -1] = float(np.mean(X[rows, -1]))  # the table turns, the plotted one does not
+        out.append(Group(s.label(p), rows, x, "table angle", "°", (np.degrees(angle), curve)))
+    return out
+
+
+def turns(s: TwoChannelSetup, found: Findings, phase: Array, t: attitude.Turning) -> Turns:
+    """Tests of the harmonics that the model does not hold and of turn against turn, over theta = -angle."""
+    phases = [(s.label(p), phase == p) for p in s.faces if s.turns(p)]
+    out = Turns(found, phases, -t.angle_start, -t.angle_end, 1 if s.model == "simple" else 2)
+    out.test()
+    return out
+
+
+def left_out(
+    s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turning
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """What simulated terms outside the model do to the coefficients: a table and a warning."""
+    names = s.names(c)
+    into = geometry.FOLD[c][0]
+    extra = [n for n in drift.NAMES_2DOF[c] if n not in names and (s.truth or {}).get(n, 0.0) != 0.0]
+    if s.model == "nine":
+        extra = [n for n in extra if n != into]
+    if not extra:
+        return [], []
+    assert s.truth is not None
+    more = attitude.regressors(turning, s.base, s.gravity, tuple(extra)) @ np.array([s.truth[n] for n in extra])
+    shift = found.gain @ more / DPH
+    rows = [[q.title, float(v), q.unit] for q, v in zip(found.quantities, shift, strict=True)]
+    caption = f"Predicted shift by {', '.join(extra)}, which are simulated and outside the model; likeliest noise model"
+    table = {"title": "Terms left out", "caption": caption, "columns": ["coefficient", "shift", "unit"], "rows": rows}
+    return [table], [
+        f"{', '.join(extra)} is simulated but not in the {s.model} model: the others are shifted as the table says."
+    ]
+
+
+def effects(s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turning, current: Array) -> list[Effect]:
+    axis = geometry.AXIS[c]
+    X, rate = found.X, attitude.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis)
+
+    def geometric(base: Array, turned: attitude.Turning) -> Array:
+        dX = design(s, c, turned, base) - X
+        drate = attitude.axis_rate(turned, base, s.latitude, s.earth_rate, axis) - rate
+        return found.change(drate, dX) / SMALL
+
+    def tilted(direction: Array) -> Array:
+        return geometric(s.base @ frames.rotation(direction, SMALL).T, turning)
+
+    def mounted(direction: Array) -> Array:
+        return geometric(s.base, replace(turning, face=frames.rotation(direction, SMALL) @ turning.face))
+
+    k, full = s.k[OTHER[c]], float(np.max(np.abs(current))) or 1.0
+    quantum = s.quantum.get(OTHER[c], 0.0)
+    one = np.ones_like(current)
+    return [
+        Effect("table axis off the pole, about east", s.u_axis, "rad", tilted(s.base[0])),
+        Effect("table axis off the pole, about p × east", s.u_axis, "rad", tilted(s.base[1])),
+        *(
+            Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
+            for n, d in zip("xyz", np.eye(3), strict=True)
+        ),
+        Effect(
+            "torquer scale factor", s.u_scale_factor, "1", found.change(-k * current),
+            "relative, the same for all currents",
+        ),
+        Effect(
+            "torquer nonlinearity", s.u_nonlinearity, "1", found.change(-k * current * np.abs(current) / full),
+            f"relative departure from proportionality at {full * 1e3:.3g} mA",
+        ),
+        Effect("offset of the current reading", s.u_current, "A", found.change(-k * one)),
+        Effect(
+            "resolution of the current reading", quantum / 12.0**0.5, "A", found.change(-k * one),
+            "as if never dithered",
+        ),
+    ]  # fmt: skip

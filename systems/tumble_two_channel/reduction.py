@@ -1,0 +1,238 @@
+"""Reduction of the two-channel tumble: drift coefficients of both channels from averaged torquer currents.
+
+    x channel   omega_x - k_y i_y = omega_dx        y channel   omega_y - k_x i_x = omega_dy        [spec d1, 4.1]
+
+Each channel is a least squares problem of its own: every window is a row, regressors are averaged over the window as
+the current is, and the noise of each channel is estimated from the same record.  The book's closed formulas stand
+beside the estimates.  [TEST-TUMBLE1-2DOF-A, -B; 000_791234d3afc34a0c.txt eq. 3-22..3-37]
+
+Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), noise common to both channels,
+independent mount errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames, units
+from gyrobench.reduction import attitude, recorded
+from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.merge import merge
+from gyrobench.reduction.method import Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.regression import Fit
+from gyrobench.reduction.result import Result
+
+from . import closed, evidence, geometry
+from .refusals import plan_problems, setup_problems
+from .setup import OTHER, Limits, TwoChannelSetup, design, setup_of
+
+__all__ = ["ReductionError", "TwoChannelSetup", "from_record", "reduce", "setup_of"]
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+COLUMNS = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean_x", "mean_y")
+
+
+def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> Result:
+    """Coefficients of both channels with uncertainties from the windows of a record (SI).
+
+    Columns phase, t_start, t_end, angle_start, angle_end, mean_x, mean_y (A; currents of the torquers about x and y).
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    s = setup
+    problems = setup_problems(s) + window_problems(windows, COLUMNS)
+    if not problems:
+        problems = plan_problems(s, windows)
+    if problems:
+        raise ReductionError(problems)
+    phase = np.asarray(windows["phase"]).astype(int)
+    t0, t1, a0, a1 = (np.asarray(windows[c], dtype=float) for c in ("t_start", "t_end", "angle_start", "angle_end"))
+    face = np.array([np.asarray(s.faces[p], dtype=float) for p in phase.tolist()])
+    turning = attitude.Turning(a0, a1, t0, t1, face)
+    sign = 1.0 if s.polarity == "project" else -1.0
+    current = {a: sign * np.asarray(windows[f"mean_{a}"], dtype=float) for a in "xy"}
+    y = {}
+    for c, axis in geometry.AXIS.items():
+        y[c] = attitude.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis) - s.k[OTHER[c]] * current[OTHER[c]]
+    book, fits, why = _closed(s, phase, turning, y)
+    results = {}
+    for c in "xy":
+        results[f"{c} channel"] = _channel(s, c, phase, turning, y[c], current[OTHER[c]], book, fits.get(c, {}), why)
+    parts = list(results.values())
+    coefficients = [c for r in parts for c in r.coefficients]
+    linear = max((c for c in coefficients if c.unit == "°/h/g"), key=lambda c: abs(c.estimate))
+    summary = [
+        f"Constant drift {' and '.join(f'{r.coefficients[0].name} = {plus_minus(r.coefficients[0])}' for r in parts)}.",
+        f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
+        " ".join(f"{name}: {r.summary[0]}" for name, r in results.items()),
+    ]
+    return merge(results, summary=summary, tables=_book_table(s, coefficients, book))
+
+
+def _channel(
+    s: TwoChannelSetup, c: str, phase: Array, turning: attitude.Turning, y: Array, current: Array,
+    book: Mapping[str, float], fits: Mapping[str, Fit], why: str,
+) -> Result:  # fmt: skip
+    names = s.names(c)
+    X = design(s, c, turning)
+    found = fit(
+        [_quantity(s, c, n, book) for n in names], X, y, turning.t_start, turning.t_end,
+        evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
+    )  # fmt: skip
+    turns = evidence.turns(s, found, phase, turning)
+    left_out, warnings = evidence.left_out(s, c, found, turning)
+    if s.model == "nine" and s.fold:
+        square, into = geometry.FOLD[c]
+        warnings.append(
+            f"{square} is folded: at constant |g| only {into[0]} + γ² {square}, {into[1]} − {square} and {into[2]} − "
+            f"{square} can be had (γ = g/g0 = {s.gravity / frames.G0:.6f}); separating them needs a centrifuge."
+        )
+    part = (
+        "A: simple model, two mounts" if s.model == "simple" else "B: nine terms a channel, two mounts and two dwells"
+    )
+    return linear_result(
+        found,
+        system="tumble_two_channel",
+        title="Single-axis tumble test of a two-degree-of-freedom gyro",
+        method="Torque-rebalance tumble of both channels about the polar axis; least squares of each channel over all "
+        f"windows under an estimated noise model [TEST-TUMBLE1-2DOF-{part}]",
+        sources=[
+            "TEST-TUMBLE1-2DOF-A, TUM2A; 000_791234d3afc34a0c.txt eq. 3-22..3-25, signs corrected by E24"
+            if s.model == "simple"
+            else "TEST-TUMBLE1-2DOF-B, TUM2B-REDUCE; 000_791234d3afc34a0c.txt eq. 3-26..3-37, corrected by E25-E29",
+            "GYRO-STATIC-2DOF; 000_791234d3afc34a0c.txt eq. 2-29..2-46",
+            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+        ],
+        equation=_equation(c, names),
+        conventions=_conventions(s),
+        effects=evidence.effects(s, c, found, turning, current),
+        specification=s.specification,
+        site=recorded.Site(s.latitude, s.gravity, s.earth_rate).shown(),
+        instrument=s.instrument,
+        simulated=s.truth is not None,
+        no_closed=why,
+        closed_caption="From the same windows; the formulas weigh all windows of a mount alike",
+        tables=[*turns.table("θ = −angle"), *left_out],
+        harmonics=turns.harmonics(fits),
+        repeatability=turns.repeatability(),
+        warnings=[*warnings, *geometry.cautions(s.latitude)],
+        summary=[found.noise_sentence()],
+    )
+
+
+def _quantity(s: TwoChannelSetup, c: str, name: str, book: Mapping[str, float]) -> Quantity:
+    if name == geometry.TILT[c]:
+        return Quantity.of(name, f"tilt of the {c} axis towards the spin axis", "arcsec")
+    truth = None
+    square, into = geometry.FOLD[c]
+    folded = s.model == "nine" and s.fold and name in into
+    if s.truth is not None:
+        gamma2 = (s.gravity / frames.G0) ** 2
+        extra = s.truth.get(square, 0.0) * (gamma2 if name == into[0] else -1.0) if s.model == "nine" else 0.0
+        truth = s.truth.get(name, 0.0) + (extra if name in into else 0.0)
+    q = Quantity.drift(name, truth, book.get(name))
+    if not folded:
+        return q
+    shown = f"{name} + γ² {square}" if name == into[0] else f"{name} − {square}"
+    return replace(q, shown=shown, meaning=f"{q.meaning}, with {square} folded in")
+
+
+# --------------------------------------------------------------------------------------------- closed formulas
+def _closed(
+    s: TwoChannelSetup, phase: Array, turning: attitude.Turning, y: Mapping[str, Array]
+) -> tuple[dict[str, float], dict[str, dict[str, Fit]], str]:
+    """Coefficients by the book's formulas (SI), the harmonic fits of each channel, and why not."""
+    ideal = geometry.faces(s.model, s.latitude)
+    roles: dict[int, str] = {}
+    for p, face in s.faces.items():
+        found = [n for n, f in ideal.items() if np.allclose(face, f, atol=1e-6)]
+        if not found:
+            return {}, {}, f"phase {p} is not one of the book's attitudes; least squares only"
+        roles[p] = found[0]
+    fits: dict[str, dict[str, Fit]] = {}
+    for c in "xy":
+        fits[c], why = closed.amplitudes(phase, turning.angle_start, turning.angle_end, y[c], roles)
+        if why:
+            return {}, {}, why
+    named = {c: {m: closed.named(f) for m, f in fits[c].items()} for c in "xy"}
+    out: dict[str, float] = {}
+    if s.model == "simple":
+        rate = {c: [{n: -v for n, v in named[c][m].items()} for m in ("mount 1", "mount 2")] for c in "xy"}
+        symbols = closed.simple(*rate["y"], *rate["x"], s.latitude, s.gravity)  # k_x i_x is of the y channel
+        out = {name: sign * symbols[b] for b, (name, sign) in closed.BOOK.items()}
+        return out, fits, ""
+    length = turning.t_end - turning.t_start
+    for c in "xy":
+        dwell = []
+        for rest in ("static 3", "static 4"):
+            rows = np.isin(phase, [p for p, r in roles.items() if r == rest])
+            dwell.append(float(np.average(y[c][rows], weights=length[rows])))
+        out |= closed.nine(c, named[c]["mount 1"], named[c]["mount 2"], *dwell, s.latitude, s.gravity)
+    return out, fits, ""
+
+
+def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, float]) -> list[dict[str, Any]]:
+    """The simple model in the book's symbols."""
+    if s.model != "simple":
+        return []
+    by_name, rows = {c.name: c for c in coefficients}, []
+    for symbol, (name, sign) in closed.BOOK.items():
+        c = by_name[name]
+        formula = sign * book[name] / DPH if name in book else None
+        rows.append([symbol, f"{'−' if sign < 0 else ''}{name}", sign * c.estimate, c.u, formula, c.unit])
+    caption = (
+        "R = M/H (R_x, the torque about x, appears in the drift about y), u = m g0 l/H, Q = m² g0² ΔK/H; u_zx with "
+        "and u_zy without the outer gimbal"
+    )
+    head = ["symbol", "is", "least squares", "u", "closed formula", "unit"]
+    return [{"title": "The book's quantities", "caption": caption, "columns": head, "rows": rows}]
+
+
+def _equation(c: str, names: tuple[str, ...]) -> str:
+    parts = []
+    for n in names:
+        if n == geometry.TILT[c]:
+            continue
+        axes = n.split("_")[1]
+        if axes == "0":
+            parts.append(f'D_"{c}0"')
+            continue
+        upper = axes.upper()
+        power = f"{upper[0]}^2" if len(axes) == 2 and axes[0] == axes[1] else " ".join(upper)
+        parts.append(f'D_"{c},{axes}" {power}')
+    left = f"omega_{c} - k_{OTHER[c]} i_{OTHER[c]}"
+    tilt = f' = omega_"d{c}" - epsilon_"{c}z" omega_z, quad' if geometry.TILT[c] in names else " ="
+    return f'{left}{tilt} omega_"d{c}" = {" + ".join(parts)}'
+
+
+def _conventions(s: TwoChannelSetup) -> list[str]:
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    k = {a: f"{v * 1e-3 / DPH:.6g} °/h/mA" for a, v in s.k.items()}
+    return [
+        "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
+        "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (book sign: a body axis that "
+        "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        f"Torquer currents: {sign}; the current i_y measures the x channel and i_x the y channel. k_x = {k['x']}, "
+        f"k_y = {k['y']}.",
+        "Gyro axes right-handed; local frame east, north, up; table angle right-handed about the pole, so that turning "
+        "against the Earth is negative; the book's θ is minus the table angle.",
+        *(["Terms outside the simple model are taken as zero."] if s.model == "simple" else []),
+        *(
+            []
+            if s.fold or s.model == "simple"
+            else [
+                "Dx_yy and Dy_xx are taken as zero; if not, Dx_0 holds γ² Dx_yy, Dx_xx and Dx_zz hold −Dx_yy; y alike."
+            ]
+        ),
+    ]
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    result = reduce(record.windows, setup_of(record.meta, specification))
+    return recorded.finish(result, record)

@@ -1,0 +1,107 @@
+"""Where and how a record of the two-channel tumble was taken, and its design matrix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames
+from gyrobench.reduction import attitude, recorded
+
+from . import geometry
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+SIZES = ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
+OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about the other axis
+
+
+@dataclass(frozen=True)
+class TwoChannelSetup:
+    """Where and how the record was taken; SI throughout, matrices with rows = axes.
+
+    k: scale factors of the torquers about x and y, rad/s/A.  faces: phase -> gyro axes x, y, z in table axes.  model:
+    simple or nine.  modes: phase -> "rate" or "dwell".  truth: simulated coefficients, rad/s per g0^n.  fold: Dx_yy and
+    Dy_xx may be there and are folded into others.  tilt: the tilts of the measuring axes towards the spin axis are
+    estimated.  u_*: standard uncertainties of type B (u_nonlinearity: relative, at the largest current).  quantum:
+    resolution of each current reading.  polarity: "project" k i = omega_IA - omega_d, "book" k i = omega_d - omega_IA.
+    """
+
+    latitude: float
+    gravity: float
+    k: Mapping[str, float]
+    faces: Mapping[int, Array]
+    modes: Mapping[int, str]
+    model: str = "nine"
+    earth_rate: float = frames.EARTH_RATE
+    base: Array = field(default_factory=lambda: np.empty((0, 0)))  # empty: table axis on the pole
+    labels: Mapping[int, str] = field(default_factory=dict)
+    truth: Mapping[str, float] | None = None
+    fold: bool = False
+    tilt: bool = False
+    specification: Limits | None = None
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_scale_factor: float = 0.0
+    u_nonlinearity: float = 0.0
+    u_current: float = 0.0
+    quantum: Mapping[str, float] = field(default_factory=dict)
+    polarity: str = "project"
+    instrument: str = ""
+
+    def __post_init__(self) -> None:
+        if np.size(self.base) == 0 and math.isfinite(self.latitude) and abs(self.latitude) <= math.pi / 2:
+            object.__setattr__(self, "base", frames.polar_base(self.latitude))
+
+    def label(self, phase: int) -> str:
+        return self.labels.get(phase, f"phase {phase}")
+
+    def turns(self, phase: int) -> bool:
+        return self.modes[phase] == "rate"
+
+    def names(self, channel: str) -> tuple[str, ...]:
+        """The unknowns of a channel."""
+        return (*geometry.terms(self.model, channel), *((geometry.TILT[channel],) if self.tilt else ()))
+
+
+def design(s: TwoChannelSetup, channel: str, turning: attitude.Turning, base: Array | None = None) -> Array:
+    """Window means (n, p) of the regressors; the column of a tilt is minus the rate along z, rad/s."""
+    base = s.base if base is None else base
+    X = attitude.regressors(turning, base, s.gravity, geometry.terms(s.model, channel))
+    if not s.tilt:
+        return X
+    return np.column_stack([X, -attitude.axis_rate(turning, base, s.latitude, s.earth_rate, 2)])
+
+
+def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoChannelSetup:
+    """The setup a run.json describes: options, plan and the parameters of the parts (slot.name, SI).
+
+    Scale factors: options ``k_x``, ``k_y``, else the gyro's parameters.  Truth only where the gyro has coefficients.
+    """
+    options, parameters = meta.get("options", {}), meta.get("parameters", {})
+    site, model = recorded.Site.of(meta), str(options.get("model", "nine"))
+    ideal = geometry.faces(model, site.latitude)
+    plan = recorded.phases(meta, ideal)
+    return TwoChannelSetup(
+        latitude=site.latitude,
+        gravity=site.gravity,
+        k={a: recorded.number(meta, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}") for a in "xy"},
+        faces={p: ideal[r["face"]] for p, r in plan.items()},
+        modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
+        model=model,
+        earth_rate=site.earth_rate,
+        labels={p: str(r["label"]) for p, r in plan.items()},
+        truth=recorded.truth_of(meta, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
+        fold=bool(options.get("fold", False)),
+        tilt=bool(options.get("tilt", False)),
+        specification=specification,
+        quantum={a: float(parameters.get(f"rebalance_{a}.resolution", 0.0)) for a in "xy"},
+        polarity=str(meta.get("polarity", "project")),
+        instrument=str(meta.get("instrument", "")),
+        **recorded.sizes(meta, SIZES),
+    )

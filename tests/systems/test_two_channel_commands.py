@@ -1,0 +1,149 @@
+"""Two-channel tumble: what is refused before it runs, a laboratory's record, the README."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from two_channels import NAME, SHORT, load
+
+from gyrobench.bench import Bench
+from gyrobench.system.record import Record
+from gyrobench.system.run import Session
+
+Command = Callable[..., tuple[int, str, str]]
+
+RUNS: list[tuple[list[str], list[str]]] = [
+    (["latitude=0deg"], ["latitude 0°", "10° to 80°", "x channel: rank 5 of 9", "y channel: rank 5 of 9"]),
+    (["latitude=90deg"], ["latitude 90°", "x channel: rank 4 of 9"]),
+    (["latitude=0deg", "model=simple"], ["x channel: rank 2 of 4", "Dx_z"]),
+    (["latitude=-9deg"], ["latitude -9°", "condition", "hardly seen is"]),
+    (["latitude=81deg", "model=simple"], ["latitude 81°", "condition"]),
+    (["model=eight"], ["model = eight", "simple and nine"]),
+    (["rate=0"], ["rate = 0: the table does not turn"]),
+    (["tilt=true"], ["tilt: at one table rate", "both_senses=true"]),
+    (["gyro.mount[1,1]=0.999"], ["gyro.mount", "not orthonormal"]),
+    (["sequencer.faces[2,1]=0.5"], ["sequencer.faces, mount 2", "not orthonormal"]),
+    (["gyro.Dx_yy=0.1deg/h/g2", "gyro.terms_x=10"], ["gyro.Dx_yy = 0.1 deg/h/g2", "fold=true", "Dx_0 + γ² Dx_yy"]),
+    (["gyro.Dy_xx=0.1deg/h/g2", "gyro.terms_y=10"], ["gyro.Dy_xx = 0.1 deg/h/g2", "Dy_yy − Dy_xx"]),
+    (["gyro.terms_x=7"], ["terms_x = 7"]),
+    (["windows=4"], ["windows = 4: must be >= 5"]),
+    (["k_x=17deg/h"], ["k_x: '17deg/h'", "units that fit"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("values", "words"), RUNS, ids=[" ".join(v) for v, _ in RUNS])
+def test_run_is_refused(command: Command, tmp_path: Path, values: list[str], words: list[str]) -> None:
+    code, out, err = command("run", NAME, *(w for v in values for w in ("--set", v)), "--out", tmp_path / "run")
+    assert code == 2, err
+    assert out == "" and "Traceback" not in err
+    for word in words:
+        assert word in err, err
+    assert not (tmp_path / "run" / "run.json").exists()
+
+
+@pytest.fixture(scope="module")
+def records() -> dict[str, Record]:
+    """All noise on, both senses, a southern site."""
+    values = {**SHORT, "rate": 0.1, "windows": 24, "both_senses": True, "latitude": math.radians(-33.9)}
+    values |= {"table.index_rate": 0.003, "settle": 5.0}
+    with Session(NAME) as session:
+        return {m: session.run({**values, "model": m}, seed=9) for m in ("simple", "nine")}
+
+
+def laboratory(record: Record, polarity: str = "project", drop: str = "") -> str:
+    """The record as a laboratory would write it: minutes, degrees, milliamperes."""
+    sign = -1.0 if polarity == "book" else 1.0
+    w = record.windows
+    lines = ["# latitude = -33.9deg", "# k_x = 17.227deg/h/mA", "# k_y = 17.180 deg/h/mA", f"# polarity = {polarity}"]
+    lines += [f"# model = {record.meta['options']['model']}", "# instrument = DTG 4"]
+    lines += [f"# phase {p['phase']} = {p['face']}" for p in record.meta["plan"]]
+    lines = [line for line in lines if not drop or drop not in line]
+    lines.append("phase,t_start [min],t_end [min],angle_start [deg],angle_end [deg],mean_y [mA],mean_x [mA]")
+    scale = {"t_start": 60.0, "t_end": 60.0, "angle_start": math.pi / 180, "angle_end": math.pi / 180}
+    for j in range(len(w["phase"])):
+        cells = [repr(float(w[n][j] / s)) for n, s in scale.items()]
+        cells += [repr(float(sign * w[n][j] * 1e3)) for n in ("mean_y", "mean_x")]
+        lines.append(",".join([str(int(w["phase"][j])), *cells]))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(("model", "polarity"), [("simple", "book"), ("nine", "project")])
+def test_laboratory_record(
+    command: Command, records: dict[str, Record], tmp_path: Path, model: str, polarity: str
+) -> None:
+    record = records[model]
+    expected = load().reduce(record)
+    file = tmp_path / "lab.csv"
+    file.write_text(laboratory(record, polarity), encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")
+    assert code == 0, err
+    found: dict[str, Any] = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    assert [c["name"] for c in found["coefficients"]] == [c.name for c in expected.coefficients]
+    for c, e in zip(found["coefficients"], expected.coefficients, strict=True):
+        assert c["estimate"] == pytest.approx(e.estimate, abs=1e-8)
+        assert c["u"] == pytest.approx(e.u, rel=1e-5) and c["truth"] is None
+        assert c["closed"] == (e.closed if e.closed is None else pytest.approx(e.closed, abs=1e-8))
+    assert found["simulated"] is False and found["instrument"] == "DTG 4"
+    sign = "k i = ω_d − ω_IA" if polarity == "book" else "k i = ω_IA − ω_d"
+    assert any(sign in t for t in found["conventions"])
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "x channel" in page and ("The book" in page) == (model == "simple")
+
+
+@pytest.mark.parametrize(("drop", "word"), [
+    ("latitude", "'latitude' is not given"), ("k_y", "'k_y' is not given"), ("phase 2", "phase 2: its attitude"),
+    ("model", "'static 3'"),
+])  # fmt: skip
+def test_what_a_laboratory_forgets(
+    command: Command, records: dict[str, Record], tmp_path: Path, drop: str, word: str
+) -> None:
+    text = laboratory(records["nine"], drop=drop)
+    if drop == "model":
+        text = text.replace("# latitude", "# model = simple\n# latitude", 1)
+    file = tmp_path / "lab.csv"
+    file.write_text(text, encoding="utf-8")
+    code, out, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")
+    assert code == 2 and out == "" and word in err, err
+
+
+def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
+    code, template, err = command("reduce", NAME, "--template")
+    assert code == 0, err
+    file = tmp_path / "empty.csv"
+    file.write_text(template, encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", file)
+    assert code == 2 and "no rows below the header" in err
+    header = template.splitlines()[-1]
+    assert header.startswith("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean_x [mA],mean_y [mA]")
+
+
+def test_report_of_a_run(command: Command, tmp_path: Path) -> None:
+    """A run by command gives the report; outside 20 to 70 degrees it warns."""
+    values = {**SHORT, "rate": 0.1, "windows": 24, "settle": 5.0, "latitude": "75deg", "model": "simple"}
+    words = [w for k, v in values.items() for w in ("--set", f"{k}={v}")]
+    code, out, err = command("run", NAME, *words, "--out", tmp_path)
+    assert code == 0, err
+    assert "outside 20° to 70°" in out + err and "Dx_xz" in out
+    result = json.loads((tmp_path / "result.json").read_text("utf-8"))
+    assert sum("outside 20° to 70°" in w for w in result["warnings"]) == 1
+    assert any("not in the simple model" in w for w in result["warnings"])
+
+
+def test_readme() -> None:
+    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
+    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
+    system = load()
+    for name, option in system.options.items():
+        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
+        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
+        assert cells[2:] == [unit, option.doc], name
+        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
+    assert not rows
+    for heading in ("Principle", "Geometry", "Model", "Plan", "Reduction", "Accuracy", "Not modelled", "Sources"):
+        assert f"\n## {heading}\n" in text

@@ -1,0 +1,127 @@
+"""Two-channel tumble: random gyros at random latitudes through the whole dynamic co-simulation; do intervals cover?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+from two_channels import DPH, LOOP, NAME, NAMES, RATE, SHORT, gyro, latitude, load, quasi_static, quiet
+
+from gyrobench.reduction.result import Result
+from gyrobench.system.run import Session, run
+
+LIMIT = 1e-6  # deg/h per g^n
+RUNS = 40
+RISK = 1e-4  # of a false alarm for each coefficient, were the coverage 0.93
+
+
+@pytest.fixture(scope="module")
+def session() -> Iterator[Session]:
+    with Session(NAME) as prepared:
+        yield prepared
+
+
+def errors(result: Result, values: dict[str, Any]) -> dict[str, float]:
+    """Estimate minus truth, deg/h per g^n."""
+    return {c.name: c.estimate - values[f"gyro.{c.name}"] / DPH for c in result.coefficients}
+
+
+@pytest.mark.parametrize("model", ["simple", "nine"])
+@pytest.mark.parametrize("seed", range(4))
+def test_random_gyros_at_random_latitudes(session: Session, model: str, seed: int) -> None:
+    """Every error is below 1e-6 deg/h, and is that of the loops' lag as worked out in two_channels.quasi_static."""
+    rng = np.random.default_rng(seed)
+    values = {**SHORT, **quiet(load()), **gyro(rng, model), "latitude": latitude(rng), "model": model}
+    record = session.run(values)
+    system = load().with_values(values)
+    result: Result = system.reduce(record)
+    found = errors(result, values)
+    predicted = errors(system.reduce(quasi_static(record, values, lag=True)), values)
+    ideal = errors(system.reduce(quasi_static(record, values, lag=False)), values)
+    assert sorted(found) == sorted(NAMES[model])
+    largest = max(abs(v) for v in predicted.values())
+    for c in result.coefficients:
+        assert abs(found[c.name]) < LIMIT, c.name
+        assert abs(ideal[c.name]) < 1e-9
+        assert found[c.name] == pytest.approx(predicted[c.name], abs=0.1 * largest), c.name
+        assert c.closed == pytest.approx(c.estimate, abs=LIMIT)
+        assert c.truth == pytest.approx(values[f"gyro.{c.name}"] / DPH, rel=1e-12)
+
+
+def test_lag_of_the_unbalance_by_hand(session: Session) -> None:
+    """Simple model, turning at -n against the Earth: w_x = -Dx_x gamma c cos theta, w_y = -Dy_y gamma c sin theta in
+    mount 1.  With 1/b = 1e-3 s2 the currents read Dx_x too large by n (n Dx_x + omega_z Dy_y)/b, and omega_z = W - n in
+    mount 1, n - W in mount 2, where w_y is reversed too: n2 (Dx_x - Dy_y)/b.
+    """
+    rng = np.random.default_rng(50)
+    values = {**SHORT, **quiet(load()), **gyro(rng, "simple"), "model": "simple"}
+    found = errors(load().with_values(values).reduce(session.run(values)), values)
+    x, y = (values[f"gyro.{n}"] / DPH for n in ("Dx_x", "Dy_y"))
+    size = LOOP * RATE**2
+    small = 0.01 * size * (abs(x) + abs(y))  # W beside n, and scale factors that are not 17.2 deg/h/mA
+    assert found["Dx_x"] == pytest.approx(size * (x - y), abs=small)
+    assert found["Dy_y"] == pytest.approx(size * (y - x), abs=small)
+    assert abs(found["Dx_0"]) < 1e-9 and abs(found["Dy_z"]) < 1e-9
+
+
+def test_both_senses_several_turns_and_tilt(session: Session) -> None:
+    rng = np.random.default_rng(20)
+    values = {**SHORT, **quiet(load()), **gyro(rng), "latitude": latitude(rng)}
+    values |= {"turns": 2, "both_senses": True, "tilt": True}
+    angle = 2e-5
+    values["gyro.mount"] = [[1.0, 0.0, angle], [0.0, 1.0, 0.0], [-angle, 0.0, 1.0]]  # x towards z
+    result = load().with_values(values).reduce(session.run(values))
+    for c in result.coefficients:
+        if c.name.startswith("ε"):
+            assert c.estimate == pytest.approx(np.degrees(angle) * 3600 if "xz" in c.name else 0.0, abs=1e-3)
+        else:
+            assert abs(c.estimate - c.truth) < 1e-4, c.name  # the tilted gyro's gravity: angle times the coefficients
+    assert any("turn to turn" in t.name for t in result.tests)
+    labels = [s.label for s in result.series]
+    assert sum("with the Earth" in t for t in labels) == sum("against the Earth" in t for t in labels) == 4
+
+
+def test_halving_the_step_and_engines(session: Session) -> None:
+    """Half the step changes nothing that matters; both engines give the same record."""
+    hasty = {
+        "rate": 3.0,
+        "windows": 6,
+        "dwell": 0.6,
+        "settle": 0.3,
+        "table.acceleration": 20.0,
+        "table.index_rate": 3.0,
+    }
+    hasty |= {"rebalance_x.i_max": 100.0, "rebalance_y.i_max": 100.0, "gyro.u_max": 100.0}
+    native = run(NAME, values=hasty, seed=7, engine="native")
+    assert native.same_data(run(NAME, values=hasty, seed=7, engine="reference"))
+    values = {**SHORT, **quiet(load())}
+    whole, half = (load().reduce(session.run(values, step=h)) for h in (1e-3, 5e-4))
+    for a, b in zip(whole.coefficients, half.coefficients, strict=True):
+        assert a.estimate == pytest.approx(b.estimate, abs=1e-7)
+
+
+@pytest.mark.parametrize("model", ["simple", "nine"])
+def test_intervals_cover(session: Session, model: str) -> None:
+    """At least 30 of 40 for every coefficient (probability 1e-4 of less, were the coverage 0.93); all together more
+    sharply.
+    """
+    least = int(stats.binom.ppf(RISK, RUNS, 0.93))
+    assert least == 30
+    rng = np.random.default_rng(3)
+    values = {**SHORT, **gyro(rng, model), "model": model, "rate": 0.05, "dwell": 34.9}
+    values["gyro.markov_tau"] = 5.0  # one and a half windows; what is as long as the record looks like a constant
+    system = load().with_values(values)
+    hits: dict[str, int] = dict.fromkeys(NAMES[model], 0)
+    squares = dict.fromkeys(NAMES[model], 0.0)
+    for seed in range(RUNS):
+        for c in system.reduce(session.run(values, seed=100 + seed)).coefficients:
+            hits[c.name] += c.interval[0] <= c.truth <= c.interval[1]
+            squares[c.name] += c.z**2
+    assert min(hits.values()) >= least, hits
+    total = len(hits) * RUNS
+    assert sum(hits.values()) >= int(stats.binom.ppf(RISK, total, 0.93)), hits
+    ratio = np.sqrt(np.array(list(squares.values())) / RUNS)
+    assert ratio.min() > 0.5 and ratio.max() < 1.5
