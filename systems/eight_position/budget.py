@@ -1,0 +1,79 @@
+"""Type B uncertainties of the eight positions: each source's effect on every coefficient, by perturbing the model.
+
+An attitude error turns the gyro by a small angle about one of its axes in one position (independent: the squares of
+the eight add up) or in all of them (mount).  Largest: W eps, 7.3e-4 deg/h for 10 arcsec.  A latitude error delta
+changes k by -tan(latitude) delta relative.  Not modelled: products of gravity components that an attitude error lets
+in (D_xy eps and the like), drift of the meters.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames
+from gyrobench.reduction.method import Effect, Findings
+
+from . import model, positions
+
+Array = NDArray[np.float64]
+SMALL = 1e-5  # rad
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def turned(axis: str, angle: float, numbers: tuple[int, ...]) -> dict[int, Array]:
+    """Attitudes with the gyro turned by ``angle`` (rad) about its own ``axis`` in the positions ``numbers``."""
+    R = frames.rotation(AXES[axis], angle)
+    return {n: R.T @ positions.ATTITUDES[n] for n in numbers}
+
+
+def attitude_change(
+    channel: str, setup: model.Setup, found: Findings, lin: model.Linear, position: NDArray[np.int_],
+    attitudes: dict[int, Array],
+) -> Array:  # fmt: skip
+    """Change (q,) of the estimates when the positions truly were ``attitudes`` while the nominal ones are believed."""
+    believed = model.directions(position, setup.latitude)
+    real = model.directions(position, setup.latitude, attitudes)
+    # y = w - k I is formed with the believed w while k I = w_real - drift_real
+    dw = model.rate(channel, real, setup.earth_rate) - model.rate(channel, believed, setup.earth_rate)
+    D = model.drift_columns(channel, real, setup.terms) - model.drift_columns(channel, believed, setup.terms)
+    return found.change(D @ lin.start - dw)
+
+
+def effects(
+    channel: str, setup: model.Setup, found: Findings, lin: model.Linear, current: Array, position: NDArray[np.int_]
+) -> list[Effect]:
+    """All sources with their sensitivities for one current (A); sizes come from ``setup`` and may be 0."""
+
+    def turn(axis: str, numbers: tuple[int, ...]) -> Array:
+        return attitude_change(channel, setup, found, lin, position, turned(axis, SMALL, numbers)) / SMALL
+
+    every = tuple(positions.ATTITUDES)
+    alone = np.array([turn(axis, (n,)) for n in every for axis in AXES])
+    step = replace(setup, latitude=setup.latitude + SMALL)
+    d0, d1 = (model.directions(position, s.latitude) for s in (setup, step))
+    dw = model.rate(channel, d1, setup.earth_rate) - model.rate(channel, d0, setup.earth_rate)
+    full = float(np.max(np.abs(current))) or 1.0
+    offset = found.change(-lin.k0)
+    quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
+    return [
+        Effect(
+            "attitude of each position", setup.u_attitude, "rad", np.sqrt(np.sum(alone**2, axis=0)),
+            "about each axis, the positions independent of one another",
+        ),
+        *(
+            Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turn(axis, every))
+            for axis in AXES
+        ),
+        Effect("latitude", setup.u_latitude, "rad", found.change(-dw) / SMALL),
+        Effect(f"zero of the {channel} current meter", setup.u_current, "A", offset),
+        Effect(f"resolution of the {channel} current meter", quantum, "A", offset, "as if never dithered"),
+        Effect(
+            f"nonlinearity of the torquer about {channel}", setup.u_nonlinearity, "1",
+            found.change(-lin.k0 * current * np.abs(current) / full),
+            f"relative departure from proportionality at {full * 1e3:.3g} mA",
+        ),
+    ]  # fmt: skip
