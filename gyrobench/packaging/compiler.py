@@ -12,7 +12,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-FLAGS = ("-O3", "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+FLAGS = ("-O3", "-fno-tree-vectorize", "-fno-tree-slp-vectorize", "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 #: FMI 2 platform folder -> (library suffix, zig target)
 PLATFORMS = {
     "linux64": (".so", "x86_64-linux-gnu.2.17"),
