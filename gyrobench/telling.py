@@ -91,7 +91,8 @@ def _phase(p: Mapping[str, Any]) -> list[str]:
     if turning:
         size = f"{quantity(p['travel'], 'rad')} at {quantity(p['target'], 'rad/s')}"
     else:
-        where = f" at {quantity(p['target'], 'rad')}" if p["mode"] == "index" else ""
+        second = f", {quantity(p['target_y'], 'rad')}" if "target_y" in p else ""
+        where = f" at {quantity(p['target'], 'rad')}{second}" if p["mode"] == "index" else ""
         size = f"{p['dwell']:g} s{where}"
     return [
         str(p["phase"]),

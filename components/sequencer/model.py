@@ -11,7 +11,8 @@ GUARD = 3.0  # samples
 class Sequencer(Component):
     """Runs the plan of a test: up to 99 labelled phases.  [TABLE-PROGRAM; 000_791234d3afc34a0c.txt ch. 5.4, 6.1]
 
-    Each phase gives the table a mode, a target and a mount (face), and goes through
+    Each phase gives the table a mode, a target (and a second one, for a table with two axes) and a mount (face), and
+    goes through
 
         move    until the table reports in_position (after at least GUARD = 3 samples: the report may be that
                 of the phase before, one step old)
@@ -38,6 +39,7 @@ class Sequencer(Component):
     phases = Parameter(1, int, "number of phases", min=1, max=99)
     modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate, 3 servo")
     targets = Parameter([0.0] * 99, "1", "target of each phase: angle in rad (index), rate in rad/s (rate)")
+    targets_y = Parameter([0.0] * 99, "1", "target of each phase for a second axis, same mode: rad or rad/s")
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
     dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo)")
     travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate; servo: at least)")
@@ -51,6 +53,7 @@ class Sequencer(Component):
     phase = Output("1", "number of the running phase, from 1")
     mode = Output("1", "table mode")
     target = Output("1", "table target, rad or rad/s by mode")
+    target_y = Output("1", "target of a second axis, rad or rad/s by mode")
     face = Output("1", "mount: rows are the gyro axes in table axes", shape=(3, 3))
     gate = Output("1", "0 closed, 1 windows by time, 2 windows by angle")
     window = Output("1", "window length, s or rad by gate")
@@ -158,6 +161,7 @@ class Sequencer(Component):
         self.phase = self.now
         self.mode = self.modes[index(self.now - 1.0)]
         self.target = self.targets[index(self.now - 1.0)]
+        self.target_y = self.targets_y[index(self.now - 1.0)]
         self.window = self.windows[index(self.now - 1.0)]
         for i in range(3):
             for j in range(3):
@@ -169,4 +173,5 @@ class Sequencer(Component):
         if self.stage == DONE:
             self.mode = 0.0
             self.target = 0.0
+            self.target_y = 0.0
             self.done = 1.0

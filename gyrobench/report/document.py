@@ -120,6 +120,7 @@ def _phase(phase: Mapping[str, Any]) -> dict[str, Any]:
         "mode": name,
         "face": phase.get("face"),
         "angle_deg": None if turning else _times(phase.get("target"), degree),
+        "angle_y_deg": None if turning else _times(phase.get("target_y"), degree),
         "rate_deg_per_h": _times(phase.get("target"), degree * 3600.0) if turning else None,
         "settle_s": phase.get("settle"),
         "dwell_s": None if turning else phase.get("dwell"),

@@ -19,6 +19,7 @@ class Phase:
     "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned.
     settle: s before the first window.  dwell: s of windows (hold, index, servo).  travel: rad of windows (rate).
     window: length of one window, s (hold, index, servo) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
+    target_y: as target, of the second axis of a table that has two.
     """
 
     label: str
@@ -29,6 +30,7 @@ class Phase:
     dwell: float = 0.0
     travel: float = 0.0
     window: float = 0.0
+    target_y: float = 0.0
 
     def duration(self) -> float:
         """Time of the phase without the way to its target, s."""
@@ -77,6 +79,8 @@ class Plan:
             "face_of": [names.index(p.face) + 1 for p in self.phases],
             "faces": [[float(x) for row in self.faces[n] for x in row] for n in names],
         }
+        if any(p.target_y for p in self.phases):
+            columns["targets_y"] = [float(p.target_y) for p in self.phases]
         for key in ("settle", "dwell", "travel"):
             columns[key] = [float(getattr(p, key)) for p in self.phases]
         return {f"{slot}.phases": len(self.phases), **{f"{slot}.{k}": v for k, v in columns.items()}}
@@ -87,6 +91,7 @@ class Plan:
 
     def rows(self) -> list[dict[str, Any]]:
         """JSON-able rows, numbered from 1 as in the record."""
+        second = any(p.target_y for p in self.phases)
         return [
             {
                 "phase": k,
@@ -94,6 +99,7 @@ class Plan:
                 "mode": p.mode,
                 "face": p.face,
                 "target": p.target,
+                **({"target_y": p.target_y} if second else {}),
                 "settle": p.settle,
                 "dwell": p.dwell,
                 "travel": p.travel,

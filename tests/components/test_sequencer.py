@@ -180,3 +180,15 @@ def test_refuses_number_of_phases(phases):
     part = Sequencer(phases=phases)
     with pytest.raises(PartError, match="phases = "):
         part.initialize()
+
+
+def test_second_axis_has_targets_of_its_own():
+    phases = [{"mode": 1, "target": x, "dwell": 0.1, "window": 0.1} for x in (0.1, 0.2)]
+    part = Sequencer(**plan(phases, [EYE]), targets_y=[-0.3, 0.4] + [0.0] * 97)
+    part.initialize()
+    seen = {}
+    for k in range(80):
+        seen.setdefault(part.phase, (part.target, part.target_y))
+        part.do_step(k * H, H)
+    assert seen == {1.0: (0.1, -0.3), 2.0: (0.2, 0.4)}
+    assert part.done == 1.0 and (part.target, part.target_y) == (0.0, 0.0)
