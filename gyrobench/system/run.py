@@ -231,9 +231,11 @@ class Session:
                 "fmi": d.fmiVersion,
                 "sha256": self.hashes[slot],
             }
+        item = next((s for s in ("gyro", "accelerometer") if s in parts), None)  # what the test is about
         return {
             "system": system.name,
             "title": system.title,
+            "instrument": f"{parts[item]['name']} {parts[item]['version']}, simulated" if item else "",
             "spec": list(system.spec),
             "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "seed": seed,

@@ -68,7 +68,7 @@ class TumbleSingleAxis(System):
         "rate": Option("10 ERU", "rad/s", "size of the table rate"),
         "turns": Option(1, int, "turns in each mount and sense", 1, 20),
         "both_senses": Option(False, bool, "each mount is turned against the Earth and with it"),
-        "windows": Option(72, int, "averaging windows a turn", 5, 720),
+        "windows": Option(72, int, "averaging windows a turn", 6, 720),
         "dwell": Option(1200.0, "s", "length of each of the two dwells"),
         "settle": Option(10.0, "s", "wait before averaging, after each move", 0.0),
         "fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS"),

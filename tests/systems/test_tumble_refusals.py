@@ -42,7 +42,7 @@ RUNS: list[tuple[list[str], list[str]]] = [
     (["gyro.D_II2=1"], ["gyro has no parameter 'D_II2'", "nearest: D_II"]),
     (["lattitude=45deg"], ["lattitude: no such option", "latitude"]),
     (["dwell=0"], ["phase 1 'static 3': dwell = 0: must be > 0"]),
-    (["windows=4"], ["windows = 4: must be >= 5"]),
+    (["windows=5"], ["windows = 5: must be >= 6"]),
 ]  # fmt: skip
 
 
