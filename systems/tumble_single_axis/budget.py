@@ -10,7 +10,6 @@ D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, axis wo
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,7 @@ from gyrobench import frames
 from gyrobench.reduction import attitude
 from gyrobench.reduction.method import Effect, Findings
 
-if TYPE_CHECKING:
-    from .reduction import TumbleSetup
+from .setup import TumbleSetup
 
 Array = NDArray[np.float64]
 TILT = "ε_IO"  # the tilt of the input axis towards the output axis as an unknown

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.reduction import regression
 
-if TYPE_CHECKING:
-    from .reduction import TumbleSetup
+from .setup import TumbleSetup
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
