@@ -1,0 +1,66 @@
+"""A laboratory's record of a gyro in one attitude, or the list of runs that are its days."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gyrobench.system.days import read_runs
+from gyrobench.system.laboratory import read_record
+from gyrobench.system.measured import Column
+from gyrobench.system.record import Record
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
+
+TEMPLATE = """\
+# Fixed-position test of a gyro in torque rebalance: one row for each reading.
+# latitude = 45.75deg
+# k = 17.2deg/h/mA
+# attitude = E U -N
+# instrument = type and number of the gyro
+# operator = who took the record
+#
+# latitude, k (torquer scale factor), attitude: needed, here or by --set.  gravity, height: optional.
+# attitude: directions of the gyro axes I, O and S (S may be left out): E east, N north, U up, P pole of the sky,
+#   Q = E x P, or minus these; or a matrix [[..],[..],[..]] with the axes I, O, S as rows in east, north, up.
+# mean: torquer current averaged over the reading, positive where it precesses positively (k i = input rate - drift).
+# day: optional; several days are reduced one by one and then together.  std, flagged (suspect samples): optional.
+# Units in brackets may be others of the same kind (min, uA ...).
+#
+# Instead: one column `run` with the folders of runs, one a day: they are reduced together.
+t_start [s],t_end [s],mean [mA]
+"""
+COLUMNS = (
+    Column("t_start", "s", "start of the reading"),
+    Column("t_end", "s", "end of the reading"),
+    Column("mean", "A", "mean torquer current"),
+    Column("day", "1", "day, from 1", required=False, whole=True),
+    Column("std", "A", "standard deviation of the samples", required=False),
+    Column("flagged", "1", "suspect samples", required=False, whole=True),
+)
+
+
+def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
+
+    Raises DataError, and ValueProblem for an option that does not fit.
+    """
+    runs = read_runs(data, system.name)
+    if runs is not None:
+        return runs
+    needed = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}
+    record = read_record(system, data, values, needed=needed, columns=COLUMNS, time=None)
+    windows = dict(record.windows)
+    day = windows.pop("day", np.ones(len(windows["mean"]), dtype=np.int64))
+    days = np.unique(day)
+    several = days.size > 1
+    plan = [
+        {"phase": int(d), "label": "service attitude", "mode": "hold", "face": "service attitude",
+         **({"day": str(d)} if several else {})}
+        for d in days
+    ]  # fmt: skip
+    return Record({"phase": day, **windows}, {}, {**record.meta, "plan": plan})

@@ -1,0 +1,214 @@
+"""Reduction of the fixed-position test: one composite drift, its noise, its stability over repeats.
+
+    omega_d = omega_IA - k i,   omega_IA = W I . (0, cos phi, sin phi)
+
+mean over the readings under a noise model estimated from them.  One attitude: no coefficient can be told from another.
+Repeats on several days are reduced day by day and then together (gyrobench.reduction.repeats).
+[TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2; RED-GLS]
+
+Not modelled: drift slower than the record beyond what the trend test shows, change of the attitude under load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.reduction import recorded, repeats
+from gyrobench.reduction.checks import window_problems
+from gyrobench.reduction.method import Effect, Group, Limits, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+from . import refusals
+from .attitude import parse
+
+__all__ = ["ReductionError", "Setup", "from_record", "reduce"]
+
+Array = NDArray[np.float64]
+DPH, DEG = units.factor("deg/h"), units.factor("deg")
+LEAST = 8  # readings
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where and how the record was taken; SI throughout.
+
+    attitude: rows I, O, S in (E, N, U).  k: rad/s/A.  truth: coefficients of the simulated gyro, rad/s per g0^n.
+    u_*: standard uncertainties of type B; quantum: resolution of the current reading.  specification: name -> limits
+    in the printed unit.
+    """
+
+    latitude: float
+    gravity: float
+    k: float
+    attitude: Array = field(default_factory=lambda: np.eye(3))
+    earth_rate: float = frames.EARTH_RATE
+    truth: Mapping[str, float] | None = None
+    specification: Limits | None = None
+    u_attitude: float = 0.0
+    u_latitude: float = 0.0
+    u_scale_factor: float = 0.0
+    u_current: float = 0.0
+    quantum: float = 0.0
+    instrument: str = ""
+
+    @property
+    def xyz(self) -> Array:
+        """(X, Y, Z) = -f/g0 along I, O, S."""
+        out: Array = self.attitude @ -frames.U * self.gravity / frames.G0
+        return out
+
+    @property
+    def input_rate(self) -> float:
+        """Earth rate along the input axis, rad/s."""
+        return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
+
+
+def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+    """Composite drift of one day: t_start, t_end (s), mean (A) and, optional, flagged.
+
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    problems = refusals.site(setup.latitude, setup.gravity) + refusals.scale_factor(setup.k)
+    try:
+        frames.check_rotation(setup.attitude, "attitude")
+    except ValueError as error:
+        problems.append(str(error))
+    still = np.zeros(len(windows.get("mean", ())))
+    problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **windows})
+    if not problems and still.size < LEAST:
+        problems.append(f"{still.size} readings: at least {LEAST} are needed to estimate the noise")
+    if problems:
+        raise ReductionError(problems)
+    t0, t1, i = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "mean"))
+    y = setup.input_rate - setup.k * i
+    true = None if setup.truth is None else float(drift.drift(setup.xyz, setup.truth))
+    book = float(np.average(y, weights=t1 - t0))
+    middle = (t0 + t1) / 2.0
+    shown = Group("composite drift", np.arange(y.size), (middle - t0[0]) / 3600.0, "time", "h")
+    wanted = Quantity.of("ω_d", "composite drift along the input axis in this attitude", "deg/h", true, book)
+    found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH)
+    trend = found.f_test(
+        "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",
+        "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
+    )  # fmt: skip
+    result = linear_result(
+        found,
+        system="fixed_position",
+        title="Fixed-position test of a floated gyro",
+        method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
+        sources=["TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2",
+                 "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p"],
+        equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
+        conventions=_conventions(setup),
+        effects=_effects(setup, found, i),
+        specification=setup.specification,
+        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        instrument=setup.instrument,
+        simulated=setup.truth is not None,
+        closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
+        tables=[_table(setup, i, t0, t1, book)],
+    )  # fmt: skip
+    if trend is not None:
+        span = float(np.ptp(middle))
+        result.repeatability = {"trend over the record / (°/h)": float(trend[0][0]) / DPH,
+                                "u of it / (°/h)": float(trend[1][0]) / DPH, "record / s": span}  # fmt: skip
+    c = result.coefficients[0]
+    result.summary = [
+        f"Composite drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
+        "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
+        found.noise_sentence("readings"),
+    ]
+    return result
+
+
+def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:
+    small = 1e-5
+    by_latitude = s.earth_rate * float(
+        s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
+    )
+    turned = []
+    for axis, name in ((1, "output"), (2, "spin")):
+        R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
+        rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
+        text = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.change(rate), text))
+    offset = found.change(-s.k)
+    return [
+        *turned,
+        Effect("latitude", s.u_latitude, "rad", found.change(by_latitude)),
+        Effect("torquer scale factor", s.u_scale_factor, "1", found.change(-s.k * current), "relative"),
+        Effect("offset of the current reading", s.u_current, "A", offset),
+        Effect("resolution of the current reading", s.quantum / 12.0**0.5, "A", offset, "as if never dithered"),
+    ]
+
+
+def _conventions(s: Setup) -> list[str]:
+    axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
+    return [
+        "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
+        f"Attitude, in east, north, up: {axes}.",
+        f"k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        "One attitude gives one number: no separation of constant, g and g² terms.",
+    ]
+
+
+def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, Any]:
+    X, Y, Z = s.xyz.tolist()
+    return {
+        "title": "From current to drift",
+        "caption": "Means over the record",
+        "columns": ["quantity", "value", "unit"],
+        "rows": [
+            ["Earth rate along the input axis ω_IA", s.input_rate / DPH, "°/h"],
+            ["mean current i", float(np.average(i, weights=t1 - t0)) * 1e3, "mA"],
+            ["k i", s.k * float(np.average(i, weights=t1 - t0)) / DPH, "°/h"],
+            ["ω_d = ω_IA − k i", book / DPH, "°/h"],
+            ["X, Y, Z = −f/g0 along I, O, S", f"{X:.6f}, {Y:.6f}, {Z:.6f}", "1"],
+            ["time of the readings", float(np.sum(t1 - t0)), "s"],
+        ],
+    }
+
+
+def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Setup:
+    """The setup that a run.json describes."""
+    options, parameters = meta.get("options", {}), meta.get("parameters", {})
+    site = recorded.Site.of(meta)
+    try:
+        attitude = parse(str(options.get("attitude", "")), site.latitude)
+    except ValueError as error:
+        raise ReductionError(str(error)) from None
+    return Setup(
+        latitude=site.latitude,
+        gravity=site.gravity,
+        earth_rate=site.earth_rate,
+        attitude=attitude,
+        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
+        truth=recorded.truth_of(meta, drift.NAMES),
+        specification=specification,
+        quantum=float(parameters.get("rebalance.resolution", 0.0)),
+        instrument=str(meta.get("instrument", "")),
+        **recorded.sizes(meta, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
+    )
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
+    setup = setup_of(record.meta, specification)
+    day = {int(r["phase"]): str(r.get("day", "")) for r in record.meta["plan"]}
+    phases = np.asarray(record.windows["phase"]).astype(int).tolist()
+    names = np.array([day.get(p, "") for p in phases])
+    each = {}
+    for name in dict.fromkeys(names.tolist()) or [""]:
+        mine = {n: np.asarray(v)[names == name] for n, v in record.windows.items()}
+        try:
+            each[name] = reduce(mine, setup)
+        except ReductionError as error:
+            raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
+    result = next(iter(each.values())) if len(each) == 1 else repeats.together(each, specification=specification)
+    return recorded.finish(result, record)

@@ -1,0 +1,255 @@
+"""The fixed-position test: attitudes, recovery, interval, budget, refusals, laboratory files, days."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from gyrobench import drift, frames
+from gyrobench.bench import Bench
+from gyrobench.reduction import noise
+from gyrobench.reduction.result import Result
+from gyrobench.system.measured import DataError
+from gyrobench.system.run import Session
+from gyrobench.system.system import RefusedError, System, load_system
+from gyrobench.system.values import ValueProblem
+
+NAME = "fixed_position"
+DPH = math.pi / 648000.0
+W = frames.EARTH_RATE
+SHORT: dict[str, Any] = {"readings": 10, "dwell": 20.0, "settle": 3.0}
+
+
+def load() -> System:
+    return load_system(NAME)
+
+
+QUIET = {n: 0.0 for n in load().noises}  # type: ignore[attr-defined]
+PACKAGE = type(load()).__module__
+R: Any = importlib.import_module(".reduction", PACKAGE)
+parse: Any = importlib.import_module(".attitude", PACKAGE).parse
+
+
+@pytest.fixture(scope="module")
+def session() -> Iterator[Session]:
+    with Session(NAME) as prepared:
+        yield prepared
+
+
+def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
+    result: Result = load().with_values(values).reduce(session.run(values, seed=seed))
+    return result
+
+
+def turned(rng: np.random.Generator) -> np.ndarray:
+    """A random rotation."""
+    return frames.rotation(rng.normal(size=3), rng.uniform(0.0, math.pi))
+
+
+# ------------------------------------------------------------------------------------------ attitude
+def test_attitudes_by_name() -> None:
+    phi = math.radians(30.0)
+    assert np.allclose(parse("E U", phi), [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    assert np.allclose(parse("E, U, -N", phi), parse("E U", phi))
+    assert np.allclose(parse("-P E", phi)[0], [0, -math.cos(phi), -0.5])
+    assert np.allclose(parse("Q −E", phi)[0], [0, -0.5, math.cos(phi)])
+    assert np.allclose(parse("[[0.6,0.8,0],[-0.8,0.6,0],[0,0,1]]", phi)[1], [-0.8, 0.6, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("E", "1 directions"), ("E X", "'X' is none of"), ("E --U", "'--U' is none of"), ("N P", "30° apart"),
+        ("E U N", "determinant is -1"), ("[[1,0],[0,1]]", "a 3x3 matrix is expected"), ("[1,", "no 3x3 matrix"),
+        ("[[1,0,0],[0,1,0],[0,0,1.001]]", "not orthonormal"), ("E N N", "not orthonormal"), ("", "0 directions"),
+    ],
+)  # fmt: skip
+def test_impossible_attitudes(session: Session, text: str, said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        parse(text, math.radians(30.0))
+    with pytest.raises(RefusedError, match=re.escape(said)):
+        session.run({**SHORT, "attitude": text, "latitude": math.radians(30.0)})
+
+
+# ------------------------------------------------------------------------------------------ recovery
+@pytest.mark.parametrize("seed", range(6))
+def test_random_gyros_attitudes_and_latitudes(session: Session, seed: int) -> None:
+    """Noise off: the drift of all ten terms, worked out here, to 1e-6 deg/h."""
+    rng = np.random.default_rng(seed)
+    C, phi, g = turned(rng), rng.uniform(-1.5, 1.5), rng.uniform(9.71, 9.89)
+    D = {n: float(rng.uniform(-1.0, 1.0) * DPH) for n in drift.NAMES}
+    values = {**SHORT, **QUIET, **{f"gyro.{n}": v for n, v in D.items()}, "gyro.terms": 10, "latitude": phi}
+    values |= {"attitude": json.dumps(C.tolist()), "gravity": g, "gyro.k": 15.0 * DPH / 1e-3}
+    result = reduced(session, values)
+    X, Y, Z = -C[:, 2] * g / 9.80665
+    terms = {"D_F": 1, "D_I": X, "D_O": Y, "D_S": Z, "D_II": X * X, "D_OO": Y * Y, "D_SS": Z * Z, "D_IO": X * Y}
+    terms |= {"D_OS": Y * Z, "D_IS": X * Z}
+    expected = sum(D[n] * v for n, v in terms.items()) / DPH
+    (c,) = result.coefficients
+    assert c.name == "ω_d" and c.unit == "°/h"
+    assert c.estimate == pytest.approx(expected, abs=1e-6)
+    assert c.truth == pytest.approx(expected, abs=1e-12)
+    assert c.closed == pytest.approx(c.estimate, abs=1e-9)
+
+
+def test_closed_formula_by_hand() -> None:
+    """Input axis up at 45.75 deg: 15.041069 sin phi = 10.7739 deg/h; 0.6 mA of 17.2 deg/h/mA take 10.32 of it."""
+    C, phi = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]), math.radians(45.75)
+    t = np.arange(10.0)
+    setup = R.Setup(latitude=phi, gravity=9.8, k=17.2 * DPH / 1e-3, attitude=C)
+    result = R.reduce({"t_start": t, "t_end": t + 1.0, "mean": np.full(10, 6e-4)}, setup)
+    assert result.coefficients[0].estimate == pytest.approx(15.041069 * math.sin(phi) - 10.32, abs=1e-6)
+    assert result.tables[-1]["rows"][0][1] == pytest.approx(10.7740, abs=1e-4)
+
+
+def test_dynamic_against_quasi_static(session: Session) -> None:
+    """With noise the co-simulation stays within its own interval of what it gives without."""
+    values = {**SHORT, "dwell": 600.0, "readings": 20, "attitude": "P E", "latitude": 0.6}
+    quiet, noisy = (reduced(session, {**values, **q}, seed=5).coefficients[0] for q in (QUIET, {}))
+    assert quiet.estimate == pytest.approx(quiet.truth, abs=1e-6)
+    assert abs(noisy.estimate - quiet.estimate) < 4.0 * noisy.u and noisy.u > 1e-4
+
+
+@pytest.mark.parametrize("correlated", [0.0, 0.002, 0.004])
+def test_intervals_cover(correlated: float) -> None:
+    """The default plan, white 0.0178 deg/h/sqrt(Hz) and Gauss-Markov noise of 300 s: of 100 intervals of coverage 0.93
+    fewer than 83 hold the truth with probability 1e-4.
+    """
+    rng, n, window = np.random.default_rng(1), 30, 120.0
+    t0 = 10.0 + window * np.arange(n)
+    C = 0.0178**2 / window * np.eye(n) + correlated**2 * noise.process_covariance(t0, t0 + window, 300.0)
+    L, k = np.linalg.cholesky(C), 17.2 * DPH / 1e-3
+    setup = R.Setup(latitude=0.7, gravity=9.8, k=k, attitude=parse("E U", 0.7))
+    hits = 0
+    for _ in range(100):
+        mean = (L @ rng.normal(size=n)) * DPH / k
+        lo, hi = R.reduce({"t_start": t0, "t_end": t0 + window, "mean": mean}, setup).coefficients[0].interval
+        hits += lo <= 0.0 <= hi
+    assert hits >= int(stats.binom.ppf(1e-4, 100, 0.93)), hits
+
+
+# ------------------------------------------------------------------------------------------ uncertainty of type B
+def test_budget_by_hand(session: Session) -> None:
+    """Input axis up, output east, spin north.  Turned about O = E: I gains north, W cos phi; about S = N: I gains east,
+    nothing.  Latitude: W cos phi.  Scale factor: k i = W sin phi - drift.
+    """
+    eps, phi = 1e-4, math.radians(50.0)
+    values = {**SHORT, **QUIET, "latitude": phi, "attitude": "U E", "u_attitude": eps, "u_latitude": eps}
+    values |= {"u_scale_factor": eps, "u_current": 1e-6}
+    result = reduced(session, values)
+    lines = {b.source: b.contribution for b in result.budget}
+    north, up = W * math.cos(phi) / DPH, W * math.sin(phi) / DPH
+    assert lines["gyro turned about its output axis"] == pytest.approx(north * eps, rel=1e-4)
+    assert lines.get("gyro turned about its spin axis", 0.0) == pytest.approx(0.0, abs=1e-7)
+    assert lines["latitude"] == pytest.approx(north * eps, rel=1e-4)
+    assert lines["torquer scale factor"] == pytest.approx((up - result.coefficients[0].estimate) * eps, rel=1e-4)
+    assert lines["offset of the current reading"] == pytest.approx(17.2e-3, rel=1e-4)
+    # and the shift itself: the table tilted by eps about east tips U towards -N: omega_IA is W sin phi - eps W cos phi
+    tilted = reduced(session, {**values, "table.tilt": [eps, 0.0]})
+    shift = tilted.coefficients[0].estimate - result.coefficients[0].estimate
+    assert shift == pytest.approx(north * eps, rel=0.1)
+
+
+# ------------------------------------------------------------------------------------------ refusals
+def test_refusals(session: Session) -> None:
+    for values, said in (
+        ({"k": -1.0}, "scale factor k = -1"), ({"gravity": 9.0}, "gravity 9 m/s²"),
+        ({"gyro.mount": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "gyro.mount: determinant"),
+    ):  # fmt: skip
+        with pytest.raises(RefusedError, match=re.escape(said)):
+            session.run({**SHORT, **values})
+    for values in ({"settle": 0.2}, {"readings": 7}, {"latitude": "91deg"}):
+        with pytest.raises(ValueProblem):
+            load().with_values(values)
+    with pytest.raises(RefusedError, match="exchanges once a step"):
+        session.run(SHORT, step=0.01)
+    record = session.run({**SHORT, **QUIET, "attitude": "U E", "rebalance.i_max": 1e-4})
+    with pytest.raises(ValueError, match="flagged windows"):
+        load().with_values({"attitude": "U E"}).reduce(record)
+    t = np.arange(6.0)
+    setup = R.Setup(latitude=0.7, gravity=9.8, k=math.nan, attitude=2.0 * np.eye(3))
+    with pytest.raises(R.ReductionError) as error:
+        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, setup)
+    assert "scale factor" in str(error.value) and "attitude: rows are not orthonormal" in str(error.value)
+    with pytest.raises(R.ReductionError, match="6 readings"):
+        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, R.Setup(latitude=0.7, gravity=9.8, k=1.0))
+
+
+def test_trend_is_seen(session: Session) -> None:
+    """Ageing by D_F p_F t: -0.3 deg/h 1e-3/s over 190 s is a trend of 0.057 deg/h."""
+    values = {**SHORT, "dwell": 200.0, "readings": 20, "gyro.p_F": 1e-3, **QUIET, "gyro.white": 0.002 * DPH}
+    result = reduced(session, values)
+    assert result.repeatability["trend over the record / (°/h)"] == pytest.approx(-0.3e-3 * 190.0, rel=0.3)
+    assert next(t.p for t in result.tests if t.name == "trend") < 0.01
+
+
+# ------------------------------------------------------------------------------------------ files and days
+def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+    values = {**SHORT, "attitude": "U E"}
+    record = session.run(values, seed=2)
+    expected = load().with_values(values).reduce(record).coefficients[0]
+    w = record.windows
+    code, template, err = command("reduce", NAME, "--template")
+    assert code == 0, err
+    rows = [f"{a!r},{b!r},{m * 1e3!r}" for a, b, m in zip(w["t_start"], w["t_end"], w["mean"], strict=True)]
+    text = re.sub(r"np\.float64\(([^)]*)\)", r"\1", template.replace("E U -N", "U E N") + "\n".join(rows) + "\n")
+    (tmp_path / "lab.csv").write_text(text, encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", tmp_path / "lab.csv", "--out", tmp_path / "out")
+    assert code == 0, err
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    assert result["simulated"] is False and result["coefficients"][0]["truth"] is None
+    assert result["coefficients"][0]["estimate"] == pytest.approx(expected.estimate, abs=1e-8)
+    for missing in ("latitude = 45.75deg", "k = 17.2deg/h/mA", "attitude = U E N"):
+        (tmp_path / "bad.csv").write_text(text.replace(f"# {missing}\n", ""), encoding="utf-8")
+        with pytest.raises(DataError, match=f"'{missing.split()[0]}' is not given"):
+            load().measured(tmp_path / "bad.csv", {})
+
+
+def test_days(session: Session, tmp_path: Path) -> None:
+    """Eight turn-ons of rms 0.2 deg/h: mean, sigma (n - 1), t interval; the scatter is found significant."""
+    values, folders = {**SHORT, "gyro.turn_on": 0.2 * DPH}, []
+    each = []
+    for seed in range(8):
+        folders.append(f"day{seed}")
+        each.append(load().reduce(session.run(values, seed=seed, out=tmp_path / folders[-1])).coefficients[0].estimate)
+    (tmp_path / "days.csv").write_text("run\n" + "\n".join(folders), encoding="utf-8")
+    result = load().reduce(load().measured(tmp_path / "days.csv", {}))
+    (c,) = result.coefficients
+    assert c.estimate == pytest.approx(np.mean(each))
+    sigma = float(np.std(each, ddof=1))
+    assert result.repeatability["σ of ω_d / (°/h)"] == pytest.approx(sigma) and 0.08 < sigma < 0.4
+    assert c.interval[1] - c.estimate == pytest.approx(stats.t.ppf(0.975, 7) * sigma / math.sqrt(8))
+    assert result.tests[0].p is not None and result.tests[0].p < 1e-6
+    assert "ω_d vary from day to day" in result.summary[0] or "ω_d" in result.summary[0]
+
+
+def test_readme_lists_the_options() -> None:
+    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
+    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| .*$", text, re.M)}
+    system = load()
+    for name, option in system.options.items():
+        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
+        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
+        assert cells[2:] == [unit, option.doc], name
+        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
+    assert not rows
+    for heading in (
+        "Principle",
+        "Attitude",
+        "Plan",
+        "Reduction",
+        "Accuracy",
+        "Several days",
+        "Not modelled",
+        "Sources",
+    ):
+        assert f"\n## {heading}\n" in text
