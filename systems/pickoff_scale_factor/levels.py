@@ -1,0 +1,101 @@
+"""The readings themselves against the line: zero, departures, what the report draws.
+
+The scale factor and the drift come from the differences of the readings; zero and straightness from the line of least
+squares through the readings with that drift taken away.  The scatter of the readings about that line is the standard
+uncertainty of each: not less for the zero, as the float's random drift is in all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench import units
+from gyrobench.reduction import uncertainty
+from gyrobench.reduction.result import Coefficient, Series
+
+Array = NDArray[np.float64]
+ARCMIN = units.factor("arcmin")
+
+
+@dataclass(frozen=True)
+class Levels:
+    """angle (n,) of the table, rad; t (n,) of the readings, s; u (n,) and the departures from the line, V."""
+
+    angle: Array
+    t: Array
+    u: Array
+    zero: float
+    departure: Array
+    slope: float
+    dof: int
+
+    @classmethod
+    def of(cls, angle: Array, seen: Array, t: Array, u: Array, drift: float) -> Levels:
+        """seen: what the float sees of the angle.  drift: change of the voltage with time, V/s."""
+        steady = u - drift * (t - float(np.mean(t)))
+        slope, zero = (float(v) for v in np.polyfit(seen, steady, 1))
+        return cls(angle, t, u, zero, steady - zero - slope * seen, slope, u.size - 3 if drift else u.size - 2)
+
+    @property
+    def scatter(self) -> float:
+        """V"""
+        return math.sqrt(float(np.sum(self.departure**2)) / self.dof)
+
+    @property
+    def span(self) -> float:
+        """V"""
+        return self.slope * float(np.ptp(self.angle))
+
+    def coefficients(self, limits: dict[str, tuple[float | None, float | None]]) -> list[Coefficient]:
+        k = int(np.argmax(np.abs(self.departure)))
+        where = f"at {self.angle[k] / ARCMIN:.4g}′"
+        return [
+            self._one(
+                "u_0", "voltage at table angle 0 in the middle of the test", "mV", self.zero * 1e3, self.scatter * 1e3,
+                limits.get("u_0"),
+            ),
+            self._one(
+                "linearity", f"largest departure from the line, {where}, of the span", "%",
+                float(self.departure[k]) / self.span * 100.0, self.scatter / self.span * 100.0, limits.get("linearity"),
+            ),
+        ]  # fmt: skip
+
+    def _one(
+        self,
+        name: str,
+        meaning: str,
+        unit: str,
+        value: float,
+        u: float,
+        limit: tuple[float | None, float | None] | None,
+    ) -> Coefficient:
+        k = float(special.stdtrit(self.dof, 0.975))
+        return Coefficient(
+            name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=k, interval=(value - k * u, value + k * u),
+            u_a=u, dof=float(self.dof), limit=limit, verdict=uncertainty.verdict(value, k * u, limit),
+        )  # fmt: skip
+
+    def series(self, dense: Array, seen: Array) -> Series:
+        """Voltage over angle; dense, seen: of the drawn line."""
+        order = np.argsort(self.angle, kind="stable")
+        return Series(
+            label="pickoff voltage", x=(self.angle[order] / ARCMIN).tolist(), x_name="table angle", x_unit="′",
+            y=(self.u[order] * 1e3).tolist(), fit=((self.u - self.departure)[order] * 1e3).tolist(),
+            residual=(self.departure[order] * 1e3).tolist(), y_name="pickoff voltage", y_unit="mV",
+            t=self.t[order].tolist(), shown_fit_x=(dense / ARCMIN).tolist(),
+            shown_fit_y=((self.zero + self.slope * seen) * 1e3).tolist(),
+        )  # fmt: skip
+
+    def table(self) -> dict[str, Any]:
+        rows = [
+            [k + 1, float(a / ARCMIN), float(v * 1e3), float(d * 1e6)]
+            for k, (a, v, d) in enumerate(zip(self.angle, self.u, self.departure, strict=True))
+        ]
+        head = ["reading", "angle / ′", "u / mV", "departure from the line / µV"]
+        return {"title": "Readings", "caption": "In the order taken", "columns": head, "rows": rows}

@@ -1,0 +1,220 @@
+"""Reduction of the pickoff test: slope, zero and straightness of the pickoff voltage over the angle of the case.
+
+    u = u_0 + S c(alpha) + q (t - t_m) + noise        S = K_sg H/C        q = -S omega_d
+
+u_0 and S are the book's line; q, the drift of the free float during the test, is estimated where the angles are gone
+over twice in opposite order, and otherwise bounded.  The float sees the table rate by the cosine of its angle, b' =
+(H/C) cos(b) alpha', so that its angle is gd(H/C alpha), the Gudermannian function: c = gd(g alpha)/g, g = H/C, which
+falls short of alpha by a sixth of the cube (6e-6 of 20 arcmin).  The book's line, beside it, takes c = alpha.
+[TEST-PICKOFF; 000_791234d3afc34a0c.txt appendix 1 of chapter 3]
+
+Not modelled: drift that changes during the test is noise; an angle of the float at table angle 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift as drift_model
+from gyrobench import units
+from gyrobench.reduction import recorded, uncertainty
+from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Coefficient, Result
+
+from .levels import Levels
+from .refusals import drift_problems, record_problems
+
+__all__ = ["PickoffSetup", "ReductionError", "from_record", "reduce"]
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH, ARCSEC, ARCMIN = units.factor("deg/h"), units.factor("arcsec"), units.factor("arcmin")
+TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is estimated
+
+
+@dataclass(frozen=True)
+class PickoffSetup:
+    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_*: relative
+    standard uncertainties.
+    """
+
+    gain: float
+    drift: float
+    truth: Mapping[str, float] | None = None
+    specification: Limits | None = None
+    u_gain: float = 0.0
+    u_angle: float = 0.0
+    u_voltage: float = 0.0
+    instrument: str = ""
+    site: Mapping[str, Any] = field(default_factory=dict)
+
+
+def float_angle(angle: Array, gain: float) -> Array:
+    """What the angle of the case (rad) is to a free float of the gain H/C, over that gain: gd(gain angle)/gain."""
+    out: Array = 2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain
+    return out
+
+
+def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> Result:
+    """Scale factor, zero, straightness and drift; raises ReductionError with everything that is wrong."""
+    s = setup
+    problems = window_problems(windows) or record_problems(windows)
+    if not (math.isfinite(s.gain) and s.gain > 0.0):
+        problems.append(f"gain H/C = {s.gain:g}: a finite positive number is expected")
+    if problems:
+        raise ReductionError(problems)
+    angle, t0, t1, u = (np.asarray(windows[c], dtype=float) for c in ("angle_start", "t_start", "t_end", "mean"))
+    span, duration = float(np.ptp(angle)), float(t1[-1] - t0[0])
+    if problems := drift_problems(s.drift, duration, span):
+        raise ReductionError(problems)
+    t = (t0 + t1) / 2.0
+    both = abs(float(np.corrcoef(angle, t)[0, 1])) < TOLD_APART
+    seen, dt = float_angle(angle, s.gain), np.diff(t)
+    # differences from reading to reading: the float's random drift adds up, so that the levels are not independent
+    steps = (np.diff(seen) / dt)[:, None]
+    X = np.column_stack([steps, np.ones_like(dt)]) if both else steps
+    group = Group("from reading to reading", np.arange(dt.size), np.arange(dt.size) + 1.0, "step", "1")
+    linear = fit(
+        ["S", "q"] if both else ["S"], X, np.diff(u) / dt, t[:-1], t[1:], [group], "change of the voltage", "mV/s",
+        1e-3, noise="readings",
+    )  # fmt: skip
+    if linear.value[0] <= 0.0:
+        raise ReductionError("the voltage falls as the angle rises: turn the sign of one of them round")
+    truth = s.truth or {}
+    line = np.polyfit(angle, u, 1)
+    wanted = [
+        Quantity("S", "scale factor per angle of the case, K_sg H/C", "V/rad", 1.0, truth.get("S"), float(line[0])),
+        Quantity(
+            "K_sg", "scale factor per angle of the float", "V/rad", 1.0, truth.get("K_sg"), float(line[0]) / s.gain
+        ),
+    ]
+    if both:
+        meaning = "drift of the gyro during the test, precession sign"
+        wanted.append(Quantity("drift", meaning, "°/h", DPH, truth.get("drift")))
+
+    def derived(b: Array) -> list[float]:
+        return [b[0], b[0] / s.gain, *([-b[1] / b[0]] if both else [])]
+
+    found = linear.derive(wanted, derived)
+    found.f_test(
+        "square and cube of the angle",
+        np.column_stack([np.diff((angle / span) ** p) / dt for p in (2, 3)]),
+        "curvature of the pickoff", "the pickoff is not straight", "no curvature beyond the scatter",
+    )  # fmt: skip
+    bound = s.drift * duration
+    levels = Levels.of(angle, seen, t, u, float(linear.value[1]) if both else 0.0)
+    result = linear_result(
+        found, system="pickoff_scale_factor", title="Pickoff scale factor of a gyro",
+        method="Line through the pickoff voltage over the angle of the table, float free; slope from the differences "
+        "of the readings [TEST-PICKOFF]",
+        sources=["TEST-PICKOFF, PICKOFF; 000_791234d3afc34a0c.txt appendix 1 of chapter 3",
+                 "GYRO-DYN-1; 000_791234d3afc34a0c.txt eq. 2-50..2-56"],
+        equation="u = u_0 + S c(alpha)" + (" - S omega_d (t - t_m)" if both else "")
+        + ', quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
+        conventions=_conventions(s, both), effects=_effects(found, s, both), specification=s.specification,
+        site=s.site, instrument=s.instrument, simulated=s.truth is not None,
+        closed_caption="The closed formula is the book's line through the readings, without drift",
+        tables=[levels.table()], warnings=_warnings(both, bound, span), random="pickoff noise and random drift",
+    )  # fmt: skip
+    dense = np.linspace(angle.min(), angle.max(), 61)
+    result.series.insert(0, levels.series(dense, float_angle(dense, s.gain)))
+    for c in levels.coefficients(dict(s.specification or {})):
+        _append(result, c)
+    result.verdict = uncertainty.overall(c.verdict for c in result.coefficients)
+    result.summary = [
+        f"Pickoff scale factor S = {plus_minus(result.coefficients[0])} per angle of the case, "
+        f"K_sg = {plus_minus(result.coefficients[1])}.",
+        f"Largest departure from the line {abs(result.coefficients[-1].estimate):.2g} % of the span of "
+        f"{span / ARCMIN:.4g}′.",
+        f"The test took {duration:.3g} s: a drift of {s.drift / DPH:.3g} °/h is at most {bound / ARCSEC:.3g}″, "
+        f"{bound / span * 100:.2g} % of the span.",
+    ]
+    return result
+
+
+def _effects(found: Findings, s: PickoffSetup, both: bool) -> list[Effect]:
+    slope = float(found.value[0])
+    only = np.zeros(found.value.size)
+    only[1] = -found.value[1]  # K_sg = S/gain
+    wrong = np.zeros_like(found.X)
+    wrong[:, 0] = found.X[:, 0]
+    effects = [
+        Effect("gain H/C", s.u_gain, "1", only, "relative"),
+        Effect("angle scale of the table", s.u_angle, "1", found.change(dX=wrong), "relative"),
+        Effect("voltmeter", s.u_voltage, "1", found.change(found.y), "relative"),
+    ]
+    if not both:
+        note = "not told from the slope by angles gone over once; bound taken as two standard uncertainties"
+        effects.append(Effect("drift during the test", s.drift / 2.0, "rad/s", found.change(slope), note))
+    return effects
+
+
+def _append(result: Result, c: Coefficient) -> None:
+    """One more line in the table; correlation with the others is not given."""
+    result.coefficients.append(c)
+    n = len(result.correlation)
+    result.correlation = [[*row, 0.0] for row in result.correlation] + [[*([0.0] * n), 1.0]]
+
+
+def _conventions(s: PickoffSetup, both: bool) -> list[str]:
+    found = [
+        "Table angle right-handed about the input axis; the float follows it with the gain H/C "
+        f"= {s.gain:.9g}, so that S = K_sg H/C.",
+        "The table axis is at right angles to the pole and sees no Earth rate.",
+        "The zero holds whatever angle the free float had taken before the test.",
+    ]
+    if both:
+        found.append("Drift in precession sign; a drifting float turns against it, u = −S ω_d t.")
+    return found
+
+
+def _warnings(both: bool, bound: float, span: float) -> list[str]:
+    if both:
+        return []
+    return [
+        f"The angles were gone over once: drift cannot be told from slope; by the bound on it, S may be wrong by up to "
+        f"{bound / span * 100:.2g} %. Going back over the same angles tells it."
+    ]
+
+
+def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> PickoffSetup:
+    """The setup a run.json describes: options and the parameters of the gyro."""
+    options = meta.get("options", {})
+    site = recorded.Site.of(meta)
+    known = recorded.truth_of(meta, ("H", "C", "K_sg"))
+    gain = float(options.get("gain") or 0.0)
+    truth: dict[str, float] | None = None
+    if known is not None and set(known) == {"H", "C", "K_sg"}:
+        own = known["H"] / known["C"]
+        gain = gain or own
+        truth = {"S": known["K_sg"] * own, "K_sg": known["K_sg"]}
+        static = recorded.truth_of(meta, drift_model.NAMES)
+        if static is not None:
+            # output axis on the pole, spin axis on east x pole: X = 0, Y = -g sin, Z = -g cos of the latitude
+            xyz = np.array([0.0, -site.g * math.sin(site.latitude), -site.g * math.cos(site.latitude)])
+            row = drift_model.regressors(xyz, tuple(static))
+            truth["drift"] = float(sum(r * v for r, v in zip(row, static.values(), strict=True)))
+    if not gain:
+        raise ReductionError("gain H/C unknown: the gyro has no parameters H and C; give the option gain")
+    measured = bool(meta.get("measured", False))
+    return PickoffSetup(
+        gain=gain,
+        drift=float(options["drift"]),
+        truth=truth,
+        specification=specification,
+        instrument=str(meta.get("instrument", "")),
+        site={} if measured else site.shown(),
+        **recorded.sizes(meta, ("u_gain", "u_angle", "u_voltage")),
+    )
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
