@@ -1,8 +1,9 @@
 """The readings themselves against the line: zero, departures, what the report draws.
 
 The scale factor and the drift come from the differences of the readings; zero and straightness from the line of least
-squares through the readings with that drift taken away.  The scatter of the readings about that line is the standard
-uncertainty of each: not less for the zero, as the float's random drift is in all of them.
+squares through the readings with that drift taken away.  The scatter of the readings about a cubic through them (a
+bent pickoff does not scatter) is the standard uncertainty of each: not less for the zero, as the float's random drift
+is in all of them.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ class Levels:
     zero: float
     departure: Array
     slope: float
+    scatter: float  # of the readings about a cubic, V
     dof: int
 
     @classmethod
@@ -40,12 +42,10 @@ class Levels:
         """seen: what the float sees of the angle.  drift: change of the voltage with time, V/s."""
         steady = u - drift * (t - float(np.mean(t)))
         slope, zero = (float(v) for v in np.polyfit(seen, steady, 1))
-        return cls(angle, t, u, zero, steady - zero - slope * seen, slope, u.size - 3 if drift else u.size - 2)
-
-    @property
-    def scatter(self) -> float:
-        """V"""
-        return math.sqrt(float(np.sum(self.departure**2)) / self.dof)
+        cubic = steady - np.polyval(np.polyfit(seen, steady, 3), seen)
+        dof = u.size - 5 if drift else u.size - 4
+        scatter = math.sqrt(float(np.sum(cubic**2)) / dof)
+        return cls(angle, t, u, zero, steady - zero - slope * seen, slope, scatter, dof)
 
     @property
     def span(self) -> float:
