@@ -1,0 +1,100 @@
+"""Positions of the two-axis tumble, the attitudes they give, and when they are enough.  [TUM2AX-GEOM, TUM2AX-RATIO]
+
+The outer table axis lies along the pole p and the gyro's output axis along it at zero; the inner axis is the input
+axis, the spin axis points west.  Position theta: outer angle m theta, inner angle n theta, both right-handed.  With c =
+cos phi, s = sin phi, gamma = g/g0 the drift's arguments (X, Y, Z) = -f/g0 are                      [eq. 3-47..3-49]
+
+    gamma (-c cos m th,  -c sin m th sin n th - s cos n th,  -c sin m th cos n th + s sin n th)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames
+from gyrobench.reduction import regression
+
+Array = NDArray[np.float64]
+NAMES = drift.terms(9)
+#: Gyro axes I, O, S (rows) in plate axes: I = inner axis, O = outer axis at zero.
+FACE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+LEAST = 25  # positions for the harmonic route
+LIMIT = 1e3  # of the condition
+
+
+def base(latitude: float) -> Array:
+    """Table axes at angles 0 in ENU, rows: outer axis p, inner axis (0, -sin phi, cos phi), east."""
+    p = frames.pole(latitude)
+    inner = np.array([0.0, -p[2], p[1]])
+    return np.array([p, inner, np.cross(p, inner)])
+
+
+def attitude(latitude: float, outer: Array, inner: Array, squareness: float = 0.0) -> Array:
+    """Gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]"""
+    cx, sx, cy, sy = np.cos(outer), np.sin(outer), np.cos(inner), np.sin(inner)
+    one, zero = np.ones_like(cx), np.zeros_like(cx)
+    x = np.array([[one, zero, zero], [zero, cx, sx], [zero, -sx, cx]]).transpose(2, 0, 1)
+    y = np.array([[cy, zero, -sy], [zero, one, zero], [sy, zero, cy]]).transpose(2, 0, 1)
+    out: Array = FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude)
+    return out
+
+
+def frequencies(m: int, n: int) -> list[int]:
+    """The twelve signed frequencies of the drift over theta.  [eq. 3-50, 3-51]"""
+    return [m - 2 * n, m - n, n, 2 * (m - n), m, 2 * n, 2 * m - n, m + n, 2 * m, m + 2 * n, 2 * m + n, 2 * (m + n)]
+
+
+def design(latitude: float, m: int, n: int, positions: int) -> Array:
+    """Nine regressors at equally spaced positions, gamma = 1."""
+    theta = np.arange(positions) * 2.0 * math.pi / positions
+    return drift.regressors(-attitude(latitude, m * theta, n * theta) @ frames.U, NAMES)
+
+
+def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[str]:
+    """Why the harmonic route cannot be had, as sentences."""
+    found = []
+    f = frequencies(m, n)
+    size = [abs(v) for v in f]
+    if 0 in f or len(set(size)) < 12:
+        twice = sorted({v for v in size if size.count(v) > 1 or v == 0})
+        found.append(
+            f"harmonic route: the ratio {m}:{n} has not twelve different frequencies (on each other or 0: "
+            f"{', '.join(map(str, twice))}); the smallest ratios that have are 5:1 and 1:5"
+        )
+    elif positions < LEAST or len({min(v % positions, -v % positions) for v in f}) < 12 or positions <= 2 * max(size):
+        least = max(LEAST, 2 * max(size) + 1)
+        found.append(f"harmonic route: {positions} positions; {m}:{n} needs at least {least}, equally spaced")
+    if abs(math.sin(2.0 * latitude)) < 0.05:
+        found.append(
+            f"harmonic route: its formulas divide by sin φ and sin 2φ, too small at {math.degrees(latitude):.4g}°"
+        )
+    return found
+
+
+def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
+    """Why these positions cannot give nine coefficients, as sentences."""
+    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
+        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+    found = []
+    if min(m, n) < 1:
+        return [f"ratio {m}:{n}: both numbers must be at least 1"]
+    if math.gcd(m, n) != 1:
+        g = math.gcd(m, n)
+        found.append(f"ratio {m}:{n}: the numbers have the common divisor {g}; {m // g}:{n // g} is the same path")
+    if positions < len(NAMES):
+        found.append(f"{positions} positions for {len(NAMES)} coefficients: at least {len(NAMES)} different ones")
+    polar = abs(math.degrees(latitude)) > 85.0
+    if found and not polar:
+        return found
+    where = f"latitude {math.degrees(latitude):.4g}°, ratio {m}:{n}, {positions} positions"
+    seen = regression.examine(design(latitude, m, n, max(positions, 9)), NAMES)
+    if seen.rank < len(NAMES):
+        found.append(f"{where}: rank {seen.rank} of {len(NAMES)}, not seen: {'; '.join(seen.lost)}")
+    elif seen.condition > LIMIT or polar:
+        found.append(f"{where}: condition {seen.condition:.3g}, hardly seen is {seen.weakest}")
+    if polar:
+        found.append("only latitudes up to 85° north or south are possible")
+    return found

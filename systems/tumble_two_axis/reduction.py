@@ -1,0 +1,362 @@
+"""Reduction of the two-axis tumble: nine drift coefficients of a floated gyro from currents averaged at rest.
+
+    y = omega_IA - k i = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
+
+Least squares on X, Y, Z themselves, from the angles that were read: any positions will do that have rank 9.  The book's
+harmonic route stands beside it where ratio and positions allow it.  The noise (white, Gauss-Markov or both) is
+estimated from the same record.  [TEST-TUMBLE2-SDF, TUM2AX-LS; 000_791234d3afc34a0c.txt eq. 3-47..3-53]
+
+Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.reduction import recorded, regression
+from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+from . import closed, geometry
+from .measured import ANGLES
+
+__all__ = ["ReductionError", "TwoAxisSetup", "from_record", "reduce"]
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH = units.factor("deg/h")
+COLUMNS = ("phase", "t_start", "t_end", *ANGLES, "mean")
+STILL = 1e-4  # rad that a table may move while the current is averaged (20 arcsec: encoders jitter)
+SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
+FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
+SIZES = ("u_axis", "u_square", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
+
+
+@dataclass(frozen=True)
+class TwoAxisSetup:
+    """Where and how the record was taken; SI.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
+
+    k: torquer scale factor, rad/s/A.  truth: simulated coefficients, rad/s per g0^n.  fold: D_OO may be there and is
+    folded into others.  u_*: standard uncertainties of type B.  quantum: resolution of the current reading.  polarity:
+    "project" k i = omega_IA - omega_d, or "book" k i = omega_d - omega_IA.
+    """
+
+    latitude: float
+    gravity: float
+    k: float
+    m: int = 5
+    n: int = 1
+    earth_rate: float = frames.EARTH_RATE
+    harmonic: bool = False
+    fold: bool = False
+    truth: Mapping[str, float] | None = None
+    specification: Limits | None = None
+    u_axis: float = 0.0
+    u_square: float = 0.0
+    u_mount: float = 0.0
+    u_scale_factor: float = 0.0
+    u_nonlinearity: float = 0.0
+    u_current: float = 0.0
+    quantum: float = 0.0
+    polarity: str = "project"
+    instrument: str = ""
+
+
+def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
+    """What to expect of positions that are allowed but weak."""
+    if geometry.refusals(latitude, m, n, positions):
+        return []
+    seen = regression.examine(geometry.design(latitude, m, n, positions), geometry.NAMES)
+    return [f"Condition {seen.condition:.3g}: hardly seen is {seen.weakest}."] if seen.condition > 100.0 else []
+
+
+def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> Result:
+    """Coefficients with uncertainties from the windows of a record (SI).
+
+    Columns phase (number of the position), t_start, t_end, outer_start, outer_end, inner_start, inner_end, mean.
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    s = setup
+    problems = _setup_problems(s) + window_problems(windows, COLUMNS)
+    if not problems:
+        problems = _position_problems(windows)
+    if problems:
+        raise ReductionError(problems)
+    w = {c: np.asarray(windows[c], dtype=float) for c in COLUMNS}
+    outer, inner = ((w[f"{a}_start"] + w[f"{a}_end"]) / 2.0 for a in ("outer", "inner"))
+    current = w["mean"] if s.polarity == "project" else -w["mean"]
+    C = geometry.attitude(s.latitude, outer, inner)
+    y = C[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate) - s.k * current
+    X = _design(s, C)
+    theta, book, harmonics, ties, why = _harmonic_route(s, w["phase"], w["t_end"] - w["t_start"], outer, inner, y)
+    if s.harmonic and why:
+        raise ReductionError(why)
+    found = fit(
+        [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
+        "drift rate", "°/h", DPH,
+    )  # fmt: skip
+    _model_test(found, theta)
+    _cycle_test(found, theta)
+    warnings = []
+    if s.fold:
+        warnings.append(
+            "D_OO is folded: at constant |g| only D_F + γ² D_OO, D_II − D_OO and D_SS − D_OO can be had (γ = g/g0 = "
+            f"{s.gravity / frames.G0:.6f}); separating them needs |f| ≠ 1 g, a centrifuge."
+        )
+    result = linear_result(
+        found,
+        system="tumble_two_axis",
+        title="Two-axis tumble test of a floated gyro",
+        method=f"Torque-rebalance tumble on two axes in the ratio {s.m}:{s.n}, averaged at rest; least squares over "
+        "all windows under an estimated noise model [TEST-TUMBLE2-SDF]",
+        sources=[
+            "TEST-TUMBLE2-SDF, TUM2AX-REDUCE, TUM2AX-LS; 000_791234d3afc34a0c.txt eq. 3-47..3-53, corrected by E30-E34",
+            "GYRO-STATIC-9; 000_791234d3afc34a0c.txt eq. 2-36, 2-47",
+            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+        ],
+        equation='omega_"IA" - k i = omega_d = D_F + D_I X + D_O Y + D_S Z + D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + '
+        'D_"OS" Y Z + D_"IS" X Z',
+        conventions=_conventions(s),
+        effects=_effects(s, found, outer, inner, C, current),
+        specification=s.specification,
+        site=recorded.Site(s.latitude, s.gravity, s.earth_rate).shown(),
+        instrument=s.instrument,
+        simulated=s.truth is not None,
+        no_closed="; ".join(why),
+        closed_caption="From the means of the positions; the harmonic route fits 25 amplitudes where nine would do",
+        tables=ties,
+        harmonics=harmonics,
+        warnings=warnings,
+    )
+    linear = max((c for c in result.coefficients if c.unit == "°/h/g"), key=lambda c: abs(c.estimate))
+    first = result.coefficients[0]
+    result.summary = [
+        f"Constant drift {first.name} = {plus_minus(first)}.",
+        f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
+        found.noise_sentence(),
+    ]
+    return result
+
+
+def _setup_problems(s: TwoAxisSetup) -> list[str]:
+    found = []
+    if not math.isfinite(s.latitude) or abs(s.latitude) > math.pi / 2:
+        found.append(f"latitude {math.degrees(s.latitude):.6g}° lies outside −90..90°")
+    elif abs(math.degrees(s.latitude)) > 85.0:
+        found += geometry.refusals(s.latitude, 5, 1, 36)
+    if not 9.7 <= s.gravity <= 9.9:
+        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
+    if not (math.isfinite(s.k) and s.k > 0.0):
+        found.append(f"scale factor k = {s.k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'")
+    if s.polarity not in ("project", "book"):
+        found.append(
+            f"polarity '{s.polarity}' unknown; there are 'project' (k i = ω_IA − ω_d) and 'book' (k i = ω_d − ω_IA)"
+        )
+    if s.truth and s.truth.get("D_OO", 0.0) != 0.0 and not s.fold:
+        found.append(
+            f"D_OO = {s.truth['D_OO'] / DPH:g} °/h/g² is simulated, but at constant |g| it cannot be told from D_F, "
+            "D_II and D_SS; set fold to accept the combinations D_F + γ² D_OO, D_II − D_OO, D_SS − D_OO"
+        )
+    return found
+
+
+def _position_problems(w: Mapping[str, Array]) -> list[str]:
+    """Tables that move while sampling, too few positions, a position at two places."""
+    found = []
+    for axis in ("outer", "inner"):
+        moved = np.abs(np.asarray(w[f"{axis}_end"]) - np.asarray(w[f"{axis}_start"]))
+        bad = np.flatnonzero(moved > STILL)
+        if bad.size:
+            found.append(
+                f"row {int(bad[0]) + 1}{f' and {bad.size - 1} more' if bad.size > 1 else ''}: the {axis} axis moves by "
+                f"{math.degrees(moved[bad[0]]):.3g}° while the current is averaged; its rate enters the reading: "
+                "average at rest only"
+            )
+    turn = 2.0 * math.pi
+    places = {
+        (round(float(a) % turn, 3) % round(turn, 3), round(float(b) % turn, 3) % round(turn, 3))
+        for a, b in zip(w["outer_start"], w["inner_start"], strict=True)
+    }
+    if not found and len(places) < len(geometry.NAMES):
+        found.append(
+            f"{len(places)} different positions for {len(geometry.NAMES)} coefficients: at least {len(geometry.NAMES)}"
+        )
+    return found
+
+
+def _design(s: TwoAxisSetup, C: Array) -> Array:
+    """Regressors (k, 9) in attitudes (k, 3, 3)."""
+    return drift.regressors(-C @ frames.U * (s.gravity / frames.G0), geometry.NAMES)
+
+
+def _quantity(s: TwoAxisSetup, name: str, book: Mapping[str, float]) -> Quantity:
+    truth = None
+    if s.truth is not None:
+        oo = s.truth.get("D_OO", 0.0)
+        extra = {"D_F": oo * (s.gravity / frames.G0) ** 2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
+        truth = s.truth.get(name, 0.0) + extra
+    q = Quantity.drift(name, truth, book.get(name))
+    if s.fold and name in FOLDED:
+        q = replace(q, shown=FOLDED[name], meaning=f"{q.meaning}, with D_OO folded in")
+    return q
+
+
+def _group(s: TwoAxisSetup, theta: Array) -> Group:
+    dense = np.radians(np.arange(0.0, 360.5, 0.5))
+    curve = _design(s, geometry.attitude(s.latitude, s.m * dense, s.n * dense))
+    x = np.degrees(np.mod(theta + 1e-9, 2.0 * math.pi))
+    return Group(f"positions {s.m}:{s.n}", np.arange(theta.size), x, "θ", "°", (np.degrees(dense), curve))
+
+
+# --------------------------------------------------------------------------------------------- harmonic route
+def _harmonic_route(
+    s: TwoAxisSetup, phase: Array, length: Array, outer: Array, inner: Array, y: Array
+) -> tuple[Array, dict[str, float], list[dict[str, Any]], list[dict[str, Any]], list[str]]:
+    """theta of each window, coefficients by the book's formulas, amplitudes, table of checks, and why not."""
+    theta = outer / s.m
+    turn = 2.0 * math.pi
+    numbers = np.unique(phase)
+    rows = [phase == p for p in numbers]
+    at = np.array([float(np.mean(theta[r])) for r in rows])
+    mean = np.array([float(np.average(y[r], weights=length[r])) for r in rows])
+    places = np.unique(np.round(np.mod(at + 1e-5, turn), 4))
+    why = geometry.harmonic_problems(s.latitude, s.m, s.n, places.size)
+    off = np.angle(np.exp(1j * (inner - s.n * theta)))
+    if np.max(np.abs(off)) > 1e-3:
+        why.append(
+            f"the inner angle is not {s.n}/{s.m} of the outer: off by up to {math.degrees(np.max(np.abs(off))):.3g}°"
+        )
+    gaps = np.diff(np.append(places, places[0] + turn))
+    each = [int(np.sum(np.abs(np.angle(np.exp(1j * (at - p + 1e-5)))) < 1e-3)) for p in places]
+    if np.ptp(gaps) > 1e-3 or len(set(each)) > 1:
+        why.append("the positions are not equally spaced over whole cycles")
+    if why:
+        return theta, {}, [], [], why
+    A, B = closed.amplitudes(at, mean, s.m, s.n)
+    label = f"positions {s.m}:{s.n}"
+    harmonics = [{"series": label, "n": 0, "a": float(A[0]) / DPH, "b": None, "u": None, "unit": "°/h"}] + [
+        {"series": label, "n": f, "a": float(A[j]) / DPH, "b": float(B[j]) / DPH, "u": None, "unit": "°/h"}
+        for j, f in enumerate(geometry.frequencies(s.m, s.n), 1)
+    ]
+    value = {"A": A / DPH, "B": B / DPH}
+    checks = [[f"{a}{i} − ({'−' if sign < 0 else ''}{b}{j})", value[a][i], value[a][i] - sign * value[b][j]]
+              for a, i, sign, b, j in closed.TIES]  # fmt: skip
+    checks += [[f"B{j}", value["B"][j], value["B"][j]] for j in (5, 9)]
+    caption = "Differences that the model makes zero; compare them with the residual scatter"
+    table = {
+        "title": "Consistency of the harmonics", "caption": caption,
+        "columns": ["check", "amplitude / (°/h)", "difference / (°/h)"], "rows": checks,
+    }  # fmt: skip
+    return theta, closed.separate(A, B, s.latitude, s.gravity), harmonics, [table], []
+
+
+# --------------------------------------------------------------------------------------------- tests and budget
+def _model_test(found: Findings, theta: Array) -> None:
+    """F test of what is periodic in theta and outside the nine terms."""
+    places = np.unique(np.round(np.mod(theta + 1e-5, 2.0 * math.pi), 4)).size
+    top = min((places - 1) // 2, 12)
+    block = np.concatenate([f(j * theta)[:, None] for j in range(1, top + 1) for f in (np.cos, np.sin)], axis=1)
+    block = block - found.X @ np.linalg.lstsq(found.X, block, rcond=None)[0]
+    q, size, _ = np.linalg.svd(block, full_matrices=False)
+    found.f_test(
+        "harmonics of the positions", q[:, size > 1e-6 * max(size[0], 1.0)], "model errors periodic in the position",
+        "something goes with the positions that the model does not hold", "no more than noise",
+    )  # fmt: skip
+
+
+def _cycle_test(found: Findings, theta: Array) -> None:
+    """F test: do further cycles differ from the first?"""
+    cycle = np.floor((theta - theta.min()) / (2.0 * math.pi) + 1e-5).astype(int)
+    blocks = [np.where((cycle == k)[:, None], found.X, 0.0) for k in range(1, int(cycle.max()) + 1)]
+    if blocks and np.linalg.matrix_rank(np.concatenate([found.X, *blocks], axis=1)) == 9 * (1 + len(blocks)):
+        found.f_test(
+            "cycle to cycle", np.concatenate(blocks, axis=1), "change of the drift between successive cycles",
+            "the cycles differ by more than the noise", "the cycles agree within the noise",
+        )  # fmt: skip
+
+
+def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Array, current: Array) -> list[Effect]:
+    earth = frames.earth_rate_local(s.latitude, s.earth_rate)
+
+    def changed(other: Array) -> Array:
+        return found.change((other - C)[:, 0] @ earth, _design(s, other) - found.X) / SMALL
+
+    def tilted(direction: Array) -> Array:
+        return changed(C @ frames.rotation(direction, SMALL).T)
+
+    def mounted(direction: Array) -> Array:
+        return changed(frames.rotation(direction, SMALL) @ C)
+
+    axes = geometry.base(s.latitude)
+    square = changed(geometry.attitude(s.latitude, outer, inner, SMALL))
+    full, one = float(np.max(np.abs(current))) or 1.0, np.ones_like(current)
+    return [
+        Effect("outer axis off the pole, about east", s.u_axis, "rad", tilted(axes[2])),
+        Effect("outer axis off the pole, about p × east", s.u_axis, "rad", tilted(-axes[1])),
+        Effect("table axes out of the right angle", s.u_square, "rad", square),
+        *(
+            Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
+            for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)
+        ),
+        Effect(
+            "torquer scale factor", s.u_scale_factor, "1", found.change(-s.k * current),
+            "relative, the same for all currents",
+        ),
+        Effect(
+            "torquer nonlinearity", s.u_nonlinearity, "1", found.change(-s.k * current * np.abs(current) / full),
+            f"relative departure from proportionality at {full * 1e3:.3g} mA",
+        ),
+        Effect("offset of the current reading", s.u_current, "A", found.change(-s.k * one)),
+        Effect(
+            "resolution of the current reading", s.quantum / 12.0**0.5, "A", found.change(-s.k * one),
+            "as if never dithered",
+        ),
+    ]  # fmt: skip
+
+
+def _conventions(s: TwoAxisSetup) -> list[str]:
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    return [
+        "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
+        "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
+        "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        "Gyro axes I, O, S right-handed; local frame east, north, up; table angles right-handed, outer axis along the "
+        f"pole: outer angle {s.m} θ, inner angle {s.n} θ.",
+        *([] if s.fold else ["D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."]),
+    ]
+
+
+def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoAxisSetup:
+    """The setup a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
+    options, parameters = meta.get("options", {}), meta.get("parameters", {})
+    site = recorded.Site.of(meta)
+    return TwoAxisSetup(
+        latitude=site.latitude,
+        gravity=site.gravity,
+        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
+        m=int(options.get("m", 5)),
+        n=int(options.get("n", 1)),
+        earth_rate=site.earth_rate,
+        harmonic=bool(options.get("harmonic", False)),
+        fold=bool(options.get("fold", False)),
+        truth=recorded.truth_of(meta, drift.NAMES),
+        specification=specification,
+        quantum=float(parameters.get("rebalance.resolution", 0.0)),
+        polarity=str(meta.get("polarity", "project")),
+        instrument=str(meta.get("instrument", "")),
+        **recorded.sizes(meta, SIZES),
+    )
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
