@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.attitudes import parse
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 from . import measured, refusals
-from .attitude import parse
 
 Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0

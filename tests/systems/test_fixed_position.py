@@ -15,6 +15,7 @@ import pytest
 from scipy import stats
 
 from gyrobench import drift, frames
+from gyrobench.attitudes import parse
 from gyrobench.bench import Bench
 from gyrobench.reduction import noise
 from gyrobench.reduction.result import Result
@@ -36,7 +37,6 @@ def load() -> System:
 QUIET = {n: 0.0 for n in load().noises}  # type: ignore[attr-defined]
 PACKAGE = type(load()).__module__
 R: Any = importlib.import_module(".reduction", PACKAGE)
-parse: Any = importlib.import_module(".attitude", PACKAGE).parse
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The attitude of a fixed gyro from words: ``E U -N``, or a matrix of direction cosines."""
+"""The attitude of an instrument from words: ``E U -N``, or a matrix of direction cosines."""
 
 from __future__ import annotations
 

@@ -1,0 +1,266 @@
+"""Reduction of the open-loop test: drift from the inertial angle at which the pickoff is at its null.
+
+An open-loop float integrates: b' = (H/C) (w_I - w_S b - omega_d), u = K_sg b.  With G = K_sg H/C the case angle of the
+null at reading j and the mean drift between two readings are
+
+    n_j = theta_j - u_j/G          omega_d = (n_(j+1) - n_j)/(t_(j+1) - t_j) + W_I - W_S b
+
+W_I, W_S: Earth rate along input and spin axis; b = (H/C) (theta - (n_j + n_(j+1))/2) with the mean case angle theta
+between the readings (the case is stepped on right after a reading).  G comes from the same readings, by least squares
+of the differences of u between steps over and under the null; a hand that nulls well needs none (u = 0).  An error of
+G cancels where first and last reading lie on the same side of the null.  The mean over the intervals stands under a
+noise model estimated from them.  [TEST-OPEN, DYN-CROSS; 000_791234d3afc34a0c.txt ch. 3 par. 1, eq. 2-50..2-56]
+
+Not modelled: a drift that changes with the case angle, omega_d'.  The result is that at the mean attitude; between the
+steps it looks like a gain, G (1 - omega_d' T/2) for steps every T, and shifts the result by (omega_d' T/2) times the
+rate at which the null runs away from the hand (1e-4 of it for 0.7 deg/h/g and a minute).  Restraint of the float.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.attitudes import parse
+from gyrobench.reduction import recorded
+from gyrobench.reduction.checks import window_problems
+from gyrobench.reduction.method import Effect, Group, Limits, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+from . import refusals
+
+__all__ = ["ReductionError", "Setup", "from_record", "reduce"]
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+ARCSEC = units.factor("arcsec")
+LEAST = 9  # readings
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where and how the record was taken; SI throughout.
+
+    attitude: rows I, O, S in (E, N, U) at table angle 0; the table turns about I.  float_gain: H/C.  wait: time between
+    a step of the case and the reading after it, s; None: the step takes no time.  reach: case angle at which the
+    pickoff saturates, rad (None: unknown).  truth: coefficients of the simulated gyro, rad/s per g0^n.  u_*: standard
+    uncertainties of type B.  specification: name -> limits in the printed unit.
+    """
+
+    latitude: float
+    gravity: float
+    attitude: Array = field(default_factory=lambda: np.eye(3))
+    earth_rate: float = frames.EARTH_RATE
+    float_gain: float = 1.0
+    wait: float | None = None
+    reach: float | None = None
+    truth: Mapping[str, float] | None = None
+    specification: Limits | None = None
+    u_attitude: float = 0.0
+    u_latitude: float = 0.0
+    u_angle: float = 0.0
+    u_float_gain: float = 0.0
+    instrument: str = ""
+
+    def earth(self, axis: int = 0) -> float:
+        """Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
+        return float(self.attitude[axis] @ frames.earth_rate_local(self.latitude, self.earth_rate))
+
+    def true_drift(self, angle: float) -> float:
+        """Drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
+        c, s = math.cos(angle), math.sin(angle)
+        I, O, S = self.attitude  # noqa: E741
+        turned = np.array([I, c * O + s * S, c * S - s * O])
+        return float(drift.drift(turned @ -frames.U * self.gravity / frames.G0, self.truth or {}))
+
+
+def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
+    """Mean case angle (rad) between the middles of successive readings: half a reading before the step, the step at
+    even mean rate, the rest after it.
+    """
+    pause = t0[1:] - t1[:-1]
+    move = np.zeros_like(pause) if wait is None else np.clip(pause - wait, 0.0, pause)
+    before = (t1[:-1] - t0[:-1]) / 2.0 + move / 2.0
+    share = before / ((t0[1:] + t1[1:] - t0[:-1] - t1[:-1]) / 2.0)
+    out: Array = share * theta[:-1] + (1.0 - share) * theta[1:]
+    return out
+
+
+def null_angles(theta: Array, between: Array, t: Array, u: Array, setup: Setup) -> tuple[Array, float | None, Array]:
+    """Case angle (rad, against the Earth) of the null at each reading; the gain G (V/rad; None where all u are 0); the
+    mean rate w_S b (rad/s) of each interval, ``between``: its mean case angle.
+    """
+    dt, earth = np.diff(t), setup.earth()
+    spin = np.cos(between) * setup.earth(2) - np.sin(between) * setup.earth(1)
+
+    def coupled(null: Array) -> Array:
+        out: Array = spin * setup.float_gain * (between - (null[1:] + null[:-1]) / 2.0)
+        return out
+
+    if float(np.max(np.abs(u))) == 0.0:
+        return theta, None, coupled(theta)
+    G, null, cross = 0.0, theta, np.zeros_like(dt)
+    for _ in range(6):  # w_S b wants the null, the null wants G: converges by a factor of w_S dt, some 1e-3
+        X = np.column_stack([np.diff(theta) + (earth - cross) * dt, dt])  # differences, as drift is a random walk here
+        size = np.linalg.norm(X, axis=0)
+        if size[0] == 0.0 or np.linalg.cond(X / np.maximum(size, 1e-300)) > 1e3:
+            raise ReductionError(
+                "the gain of the pickoff cannot be found: the case never stood over and under the null; step it to "
+                "both sides, or give only readings taken at the null, without the column u"
+            )
+        G = float(np.linalg.lstsq(X / size, np.diff(u), rcond=None)[0][0] / size[0])
+        if not G > 0.0:
+            raise ReductionError(f"gain of the pickoff {G:.4g} V/rad: must be positive; turn the sign of u round")
+        null = theta - u / G
+        cross = coupled(null)
+    return null, G, cross
+
+
+def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+    """Drift from readings: t_start, t_end (s), angle_start, angle_end (rad), mean (V; pickoff), flagged (optional).
+
+    Raises ReductionError with everything that is wrong with setup or record.
+    """
+    problems = refusals.site(setup.latitude, setup.gravity)
+    try:
+        frames.check_rotation(setup.attitude, "attitude")
+    except ValueError as error:
+        problems.append(str(error))
+    problems += window_problems({"phase": np.zeros(len(windows.get("mean", ()))), **windows})
+    if not problems and len(windows["mean"]) < LEAST:
+        problems.append(f"{len(windows['mean'])} readings: at least {LEAST} are needed to estimate the noise")
+    if problems:
+        raise ReductionError(problems)
+    t0, t1, a0, a1, u = (
+        np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "angle_start", "angle_end", "mean")
+    )
+    t, theta, earth = (t0 + t1) / 2.0, (a0 + a1) / 2.0, setup.earth()
+    between = case_angles(theta, t0, t1, setup.wait)
+    null, G, cross = null_angles(theta, between, t, u, setup)
+    dt, span = np.diff(t), float(t[-1] - t[0])
+    y = np.diff(null) / dt + earth - cross
+    book = float((null[-1] - null[0]) / span) + earth - float(cross @ dt) / span
+    true = None
+    if setup.truth is not None:
+        true = float(np.array([setup.true_drift(a) for a in between]) @ dt / span)
+    wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, book)
+    shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
+    found = fit([wanted], np.ones((y.size, 1)), y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH)
+    used = float(np.max(np.abs(theta - null)))
+    coupled = float(cross @ dt) / span / max(setup.float_gain, 1e-9)
+    result = linear_result(
+        found,
+        system="open_loop_drift",
+        title="Open-loop drift test of a floated gyro",
+        method="Case turned about the input axis to the null of the pickoff, no loop closed; mean over the intervals "
+        "between readings under an estimated noise model [TEST-OPEN]",
+        sources=[
+            "TEST-OPEN; 000_791234d3afc34a0c.txt ch. 3 par. 1",
+            "DYN-CROSS; 000_791234d3afc34a0c.txt eq. 2-50..2-56",
+            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88",
+        ],
+        equation='omega_d = (Delta theta) / (Delta t) + omega_"E,I" - omega_"E,S" b',
+        conventions=[
+            "Drift ω_d in precession sign; θ: table angle about the input axis, right-handed.",
+            "θ is the case angle of the null: the reading of the table less u/G.",
+            "Valid only while the pickoff is inside its range; flagged (saturated) readings are refused.",
+        ],
+        effects=_effects(setup, found, t, coupled),
+        specification=setup.specification,
+        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        instrument=setup.instrument,
+        simulated=setup.truth is not None,
+        closed_caption="Least squares under the noise model; closed: angle between first and last null over the time",
+        tables=[_table(setup, G, used, null, t, book)],
+        warnings=_warnings(setup, theta, used),
+    )  # fmt: skip
+    c = result.coefficients[0]
+    reach = "" if setup.reach is None else f" of {setup.reach / ARCSEC:.4g}″ to saturation"
+    result.summary = [
+        f"Drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
+        f"Range of the pickoff used: {used / ARCSEC:.4g}″ of case angle{reach}.",
+        found.noise_sentence("intervals"),
+    ]
+    return result
+
+
+def _warnings(s: Setup, theta: Array, used: float) -> list[str]:
+    out = []
+    turned = math.degrees(float(np.ptp(theta)))
+    if turned > 2.0:
+        out.append(
+            f"The case turned by {turned:.3g}° against gravity as it followed the sky: its drift changed on the way, "
+            "and the result is some mean of it; take a shorter test, or an input axis east or west."
+        )
+    if s.reach is not None and used > 0.8 * s.reach:
+        out.append(f"{used / s.reach:.0%} of the range of the pickoff used: let the hand follow, option follow.")
+    return out
+
+
+def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
+    small, local = 1e-5, frames.earth_rate_local
+    by_latitude = (s.attitude[0] @ (local(s.latitude + small, s.earth_rate) - local(s.latitude, s.earth_rate))) / small
+    turned = []
+    for axis, name in ((1, "output"), (2, "spin")):
+        R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
+        rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.change(rate)))
+    whole = found.change(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
+    return [
+        *turned,
+        Effect("latitude", s.u_latitude, "rad", found.change(float(by_latitude))),
+        Effect("angle between first and last reading", s.u_angle, "rad", whole),
+        Effect("float gain H/C", s.u_float_gain, "1", found.change(-coupled), "Earth rate along the spin axis times b"),
+    ]
+
+
+def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: float) -> dict[str, Any]:
+    rows: list[list[Any]] = [
+        ["Earth rate along the input axis", s.earth() / DPH, "°/h"],
+        ["angle of the null, last less first reading", float(null[-1] - null[0]) / ARCSEC, "″"],
+        ["time between them", float(t[-1] - t[0]), "s"],
+        ["drift of the two", book / DPH, "°/h"],
+        ["gain of the pickoff G", G, "V/rad"],
+        ["case angle off the null, largest (range used)", used / ARCSEC, "″"],
+        ["case angle at saturation", None if s.reach is None else s.reach / ARCSEC, "″"],
+    ]
+    head = ["quantity", "value", "unit"]
+    return {"title": "From angle to drift", "caption": "What the drift is made of", "columns": head, "rows": rows}
+
+
+def _float_gain(meta: Mapping[str, Any]) -> float:
+    """The option, else H/C of the gyro, else 1."""
+    given, parameters = float(meta.get("options", {}).get("float_gain", 0.0)), meta.get("parameters", {})
+    if given > 0.0 or not {"gyro.H", "gyro.C"} <= set(parameters):
+        return given or 1.0
+    return float(parameters["gyro.H"]) / float(parameters["gyro.C"])
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """:func:`reduce` of a record with its run.json as provenance."""
+    meta = record.meta
+    site = recorded.Site.of(meta)
+    try:
+        attitude = parse(str(meta.get("options", {}).get("attitude", "")), site.latitude)
+    except ValueError as error:
+        raise ReductionError(str(error)) from None
+    setup = Setup(
+        latitude=site.latitude,
+        gravity=site.gravity,
+        earth_rate=site.earth_rate,
+        attitude=attitude,
+        float_gain=_float_gain(meta),
+        wait=next((float(r["settle"]) for r in meta.get("plan", []) if "settle" in r), None),
+        reach=refusals.case_range(meta.get("parameters", {})),
+        truth=recorded.truth_of(meta, drift.NAMES),
+        specification=specification,
+        instrument=str(meta.get("instrument", "")),
+        **recorded.sizes(meta, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
+    )
+    return recorded.finish(reduce(record.windows, setup), record)
