@@ -92,18 +92,17 @@ def _channel(
             f"{square} is folded: at constant |g| only {into[0]} + γ² {square}, {into[1]} − {square} and {into[2]} − "
             f"{square} can be had (γ = g/g0 = {s.gravity / frames.G0:.6f}); separating them needs a centrifuge."
         )
-    part = (
-        "A: simple model, two mounts" if s.model == "simple" else "B: nine terms a channel, two mounts and two dwells"
-    )
+    simple = s.model == "simple"
+    part = ("two mounts, simple model", "A") if simple else ("two mounts and two dwells, nine terms", "B")
     return linear_result(
         found,
         system="tumble_two_channel",
         title="Single-axis tumble test of a two-degree-of-freedom gyro",
-        method="Torque-rebalance tumble of both channels about the polar axis; least squares of each channel over all "
-        f"windows under an estimated noise model [TEST-TUMBLE1-2DOF-{part}]",
+        method=f"Torque-rebalance tumble of both channels about the polar axis, {part[0]}; least squares of each "
+        f"channel over all windows under an estimated noise model [TEST-TUMBLE1-2DOF-{part[1]}]",
         sources=[
             "TEST-TUMBLE1-2DOF-A, TUM2A; 000_791234d3afc34a0c.txt eq. 3-22..3-25, signs corrected by E24"
-            if s.model == "simple"
+            if simple
             else "TEST-TUMBLE1-2DOF-B, TUM2B-REDUCE; 000_791234d3afc34a0c.txt eq. 3-26..3-37, corrected by E25-E29",
             "GYRO-STATIC-2DOF; 000_791234d3afc34a0c.txt eq. 2-29..2-46",
             "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
