@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.attitudes import parse
+from gyrobench.reduction.axes import parse
 
 STEP_MAX = 5e-3  # s
 

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.attitudes import parse
 from gyrobench.reduction import recorded
+from gyrobench.reduction.axes import parse
 from gyrobench.reduction.checks import window_problems
 from gyrobench.reduction.method import Effect, Group, Limits, Quantity, ReductionError, fit, linear_result, plus_minus
 from gyrobench.reduction.result import Result

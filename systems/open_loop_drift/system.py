@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.attitudes import parse
+from gyrobench.reduction.axes import parse
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.record import Record

@@ -15,9 +15,9 @@ import pytest
 from scipy import stats
 
 from gyrobench import drift, frames
-from gyrobench.attitudes import parse
 from gyrobench.bench import Bench
 from gyrobench.reduction import noise
+from gyrobench.reduction.axes import parse
 from gyrobench.reduction.result import Result
 from gyrobench.system.measured import DataError
 from gyrobench.system.run import Session
