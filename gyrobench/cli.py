@@ -41,6 +41,7 @@ Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0
 Spec = Annotated[str | None, typer.Option("--spec", metavar="NAME|FILE", help="Acceptance specification to judge by.")]
 Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in --out.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue this run where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 
 
@@ -225,6 +226,7 @@ def run(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
     ] = None,
     force: Force = False,
+    resume: Resume = False,
     as_json: Json = False,
 ) -> None:
     """Runs a system: record, reduction, report.
@@ -251,6 +253,7 @@ def run(
         spec=spec,
         check_step=check_step,
         isolate=tuple(isolate or ()),
+        resume=resume,
     )
     judge(work.run(job, as_json), strict)
 

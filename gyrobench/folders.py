@@ -9,19 +9,29 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.system import checkpoint
 from gyrobench.system.record import Record
 from gyrobench.system.system import System
 
-RECORD = ("run.json", "record.parquet", "record.csv", "channels.parquet", "channels.csv")
+RECORD = ("run.json", "record.parquet", "record.csv", "channels.parquet", "channels.csv", checkpoint.FILE)
 REPORT = ("result.json", "report.html", "report.pdf")
 
 
 def run_folder(
-    session: Any, system: System, seed: int, step: float, maps: Mapping[str, Path], out: Path | None, force: bool
-) -> Path:
-    """Where the run is saved: --out, else a folder named by what is run.
+    session: Any,
+    system: System,
+    seed: int,
+    step: float,
+    maps: Mapping[str, Path],
+    out: Path | None,
+    force: bool,
+    resume: bool = False,
+) -> tuple[Path, checkpoint.Keeper]:
+    """Where the run is saved: --out, else a folder named by what is run; and the keeper of its checkpoint.
 
-    Raises UsageError when --out holds another run, unless ``force``, or files that are none of a run.
+    With ``resume`` the keeper goes on from the checkpoint in that folder or in the one :func:`beside` it; whether that
+    is one of this run the keeper checks.  Raises UsageError when there is none to resume, and when --out holds another
+    run, unless ``force``, or files that are none of a run.
     """
     from gyrobench.system.parameters import resolve
 
@@ -38,7 +48,17 @@ def run_folder(
     texts = {slot: file.read_text(encoding="utf-8") for slot, file in maps.items()}
     text = json.dumps([identity, texts, session.engine], sort_keys=True)
     folder = out or Bench.find().out / system.name / hashlib.sha256(text.encode()).hexdigest()[:8]
-    return claim(folder, identity, force)
+    kept = [f for f in (folder, beside(folder)) if (f / checkpoint.FILE).is_file()]
+    if not resume:
+        claim(folder, identity, force)
+    elif not kept:
+        state = "the run is complete" if whole_record(folder) else "no checkpoint of a run with these parts and values"
+        raise UsageError(
+            "--resume: " + (checkpoint.obstacle(session.slaves) or f"nothing to continue in {folder}: {state}")
+        )
+    elif folder not in kept:
+        claim(folder, identity, force)
+    return folder, checkpoint.Keeper(unfinished(folder), resume, kept[0] if kept else None)
 
 
 def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
@@ -51,7 +71,12 @@ def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
             old = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         except ValueError:
             old = {}
-    elif folder.is_dir() and any(folder.iterdir()):
+    elif (folder / checkpoint.FILE).is_file():  # of a process that was killed
+        try:
+            old = checkpoint.about(folder)
+        except checkpoint.ResumeError:
+            old = {}
+    elif folder.is_dir() and any(not p.name.startswith(checkpoint.FILE) for p in folder.iterdir()):
         raise UsageError(f"--out {folder}: holds other files; name a new folder, for example {folder / 'run1'}")
     if old is not None:
         changed = [k for k, v in identity.items() if not _covers(old.get(k), v)]
@@ -75,9 +100,25 @@ def _covers(old: Any, new: Any) -> bool:
 
 def keep(record: Record, folder: Path) -> Path:
     """Saves what a run left when it stopped, beside a whole record of the same run rather than over it."""
-    if (folder / "run.json").exists() and Record.load(folder).complete:
-        folder = folder.with_name(folder.name + "-incomplete")
-    return record.save(folder)
+    return record.save(unfinished(folder))
+
+
+def whole_record(folder: Path) -> bool:
+    """Whether a complete record is there."""
+    try:
+        return bool(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("complete", True))
+    except (OSError, ValueError):
+        return False
+
+
+def beside(folder: Path) -> Path:
+    """Where a run that stopped is kept when the folder holds a whole record."""
+    return folder.with_name(folder.name + "-incomplete")
+
+
+def unfinished(folder: Path) -> Path:
+    """Where a run that has not ended is kept: its folder, unless that holds a whole record."""
+    return beside(folder) if whole_record(folder) else folder
 
 
 def labels(runs: Iterable[Path]) -> list[str]:

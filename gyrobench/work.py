@@ -51,6 +51,7 @@ class Job:
     spec: str | None = None
     check_step: bool = False
     isolate: tuple[str, ...] = ()
+    resume: bool = False
 
 
 def note(text: str) -> None:
@@ -154,11 +155,12 @@ def run(job: Job, as_json: bool = False) -> str:
     check_fmus(job.parts)
     bench = Bench.find().folder
     with Session(system, job.parts, job.maps, engine=job.engine, isolate=job.isolate, bench=bench) as session:
-        folder = run_folder(session, system, job.seed, step or system.step, job.maps, job.out, job.force)
-        tell(session.notes)
+        h = step or system.step
+        folder, keeper = run_folder(session, system, job.seed, h, job.maps, job.out, job.force, job.resume)
+        tell([*session.notes, *keeper.notes()])
         try:
             with Meter(system.name) as meter:
-                record = session.run({}, job.seed, step, None, meter)
+                record = session.run({}, job.seed, step, None, meter, keeper)
         except RunError as error:
             if error.record is None:
                 raise
@@ -168,6 +170,7 @@ def run(job: Job, as_json: bool = False) -> str:
                 raise Interrupted(f"{more} (gyrobench report says what it lacks)") from None
             raise RunError(more, error.record) from None
         record.save(folder)
+        keeper.done()
         stopped = ""
         try:
             if not reduces(system):
@@ -175,7 +178,7 @@ def run(job: Job, as_json: bool = False) -> str:
             result = reduced(system, record, limits)
             if job.check_step:
                 try:
-                    result.step_check = step_check(session, system, result, job.seed, step or system.step)
+                    result.step_check = step_check(session, system, result, job.seed, h)
                 except RunInterrupted as error:
                     stopped = f"step check {error}; the report is without it"
             verdict = publish(result, folder, record, as_json, spec)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+from gyrobench.system.checkpoint import Keeper
 from gyrobench.system.engine import Progress
 from gyrobench.system.system import System
 
@@ -20,7 +21,11 @@ GRACE = 3600.0  # s, and this much longer
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is.  total: s, expected end of the simulated time; rate: steps per second of wall time."""
+    """How far a run is.
+
+    total: s, expected end of the simulated time; rate: steps per second of wall time; steps, elapsed (s of wall time):
+    since the run was started or resumed, which was at the simulated time ``since``, s.
+    """
 
     time: float
     total: float
@@ -28,6 +33,7 @@ class Status:
     windows: int
     rate: float
     elapsed: float
+    since: float = 0.0
 
     @property
     def fraction(self) -> float:
@@ -37,8 +43,8 @@ class Status:
     @property
     def eta(self) -> float:
         """Estimated wall time left, s."""
-        done = self.fraction
-        return self.elapsed * (1.0 - done) / done if done > 0.0 else float("inf")
+        done = self.time - self.since
+        return self.elapsed * max(0.0, self.total - self.time) / done if done > 0.0 else float("inf")
 
 
 class Interrupt(Exception):
@@ -76,6 +82,7 @@ def drive(
     system: System,
     every: int,
     progress: Callable[[Status], None] | None,
+    keeper: Keeper | None = None,
 ) -> None:
     """Runs to the end.  Raises PartFailure from the engine, Interrupt when stopped or when the plan never ends."""
     h = system.step
@@ -83,20 +90,26 @@ def drive(
     total = system.stop if system.stop is not None else planned
     limit = total if system.stop is not None else PATIENCE * planned + GRACE
     k_limit = max(1, round(limit / h))
-    chunk = 256
+    asked = keeper.last_step(h) if keeper is not None else None
+    k_stop = k_limit if asked is None else min(k_limit, max(asked, state.k))
+    chunk, k_first = 256, state.k
     began = time.perf_counter()
     with _CtrlC() as ctrl_c:
-        while not state.finished and state.k < k_limit:
+        while not state.finished and state.k < k_stop:
             before, first = time.perf_counter(), state.k
-            engine.advance(state, min(k_limit, state.k + chunk), 0.0, h, every)
+            engine.advance(state, min(k_stop, state.k + chunk), 0.0, h, every)
             now = time.perf_counter()
             rate = (state.k - first) / max(now - before, 1e-9)
             chunk = max(16, min(8 * chunk, int(rate * CHUNK)))
             if progress is not None:
                 windows = sum(len(r) if r.ndim == 2 else 1 for r in state.window_rows)
-                progress(Status(state.k * h, total, state.k, windows, rate, now - began))
+                progress(Status(state.k * h, total, state.k - k_first, windows, rate, now - began, k_first * h))
             if ctrl_c.hit:
                 raise Interrupt(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
+            if keeper is not None:
+                keeper.look(state)
+    if not state.finished and state.k < k_limit:
+        raise Interrupt(f"stopped at t = {state.k * h:.9g} s, as asked for", by_user=True)
     if not state.finished and system.stop is None:
         raise Interrupt(
             f"the plan has not ended at t = {state.k * h:.9g} s, {PATIENCE:g} times its duration of {planned:.6g} s: "

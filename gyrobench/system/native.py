@@ -149,6 +149,7 @@ class NativeEngine:
         r = self.run
         r.t0, r.h, r.k, r.every, r.last = t0, h, progress.k, every, progress.last
         r.timed = progress.timed
+        self.seconds[:] = [progress.timed_seconds[p.slot] for p in self.program.parts]
         while True:
             code = self.library.gyrobench_run(ctypes.byref(r), c_int64(k_end))
             self.empty(progress)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench.system.checkpoint import Keeper
 from gyrobench.system.engine import ReferenceEngine, initialize, start
 from gyrobench.system.loop import Interrupt, Status, drive
 from gyrobench.system.parameters import defaults, resolve
@@ -145,8 +146,9 @@ class Session:
         step: float | None = None,
         out: Path | None = None,
         progress: Callable[[Status], None] | None = None,
+        keeper: Keeper | None = None,
     ) -> Record:
-        """One run from t = 0 to its end.  See :func:`run`."""
+        """One run from t = 0, or from where ``keeper`` resumes it, to its end.  See :func:`run`."""
         system = self.system.with_values(values or {})
         if step is not None:
             system.step = float(step)
@@ -158,6 +160,10 @@ class Session:
             raise RefusedError(system.name, problems)
         meta = self._meta(system, seed, parameters, notes)
         every = max(1, round(system.channel_period / system.step))
+        if keeper is not None:
+            job = {k: meta[k] for k in ("system", "seed", "step", "options", "parameters")}
+            parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
+            keeper.check({**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.slaves)
         self.program.out[:] = 0.0
         state = None
         engine: Any = None
@@ -168,15 +174,19 @@ class Session:
                 self.slaves[slot].set_start(starts[slot])
             initialize(self.program, self.slaves, 0.0)
             state = start(self.program, self.slaves, 0.0)
+            if keeper is not None:
+                state = keeper.restore(state)
             if self.engine == "native":
                 from gyrobench.system.native import NativeEngine
 
                 engine = NativeEngine(self.program, self.slaves)  # type: ignore[arg-type]
             else:
                 engine = ReferenceEngine(self.program, self.slaves)
-            drive(engine, state, system, every, progress)
+            drive(engine, state, system, every, progress, keeper)
         except (PartFailure, Interrupt) as error:
             problem = error
+            if keeper is not None and state is not None and isinstance(error, Interrupt) and error.by_user:
+                keeper.stopped(state)
         finally:
             if engine is not None:
                 engine.close()
@@ -185,10 +195,16 @@ class Session:
         if state is None:
             said = isinstance(problem, PartFailure) and problem.messages and "(Error)" in problem.status
             raise (PartRefusal if said else RunError)(str(problem))
-        return self._finish(state, system, meta, out, problem)
+        return self._finish(state, system, meta, out, problem, keeper)
 
     def _finish(
-        self, state: Any, system: System, meta: dict[str, Any], out: Path | None, problem: Exception | None
+        self,
+        state: Any,
+        system: System,
+        meta: dict[str, Any],
+        out: Path | None,
+        problem: Exception | None,
+        keeper: Keeper | None,
     ) -> Record:
         windows = system.windows
         names = list(windows.columns) if windows else []
@@ -197,6 +213,8 @@ class Session:
         meta["complete"] = problem is None
         meta["steps"] = state.k
         meta["stopped_at"] = state.k * system.step
+        if keeper is not None and keeper.resumed_at:
+            meta["resumed_at"] = keeper.resumed_at
         if problem is not None:
             meta["problem"] = str(problem)
         record = Record(
@@ -207,9 +225,11 @@ class Session:
         if out is not None:
             record.save(out)
         if isinstance(problem, Interrupt) and problem.by_user:
-            raise RunInterrupted(str(problem), record)
+            raise RunInterrupted(f"{problem}; {keeper.says}" if keeper is not None else str(problem), record)
         if problem is not None:
             raise RunError(str(problem), record)
+        if keeper is not None and out is not None:
+            keeper.done()
         return record
 
     def _units(self) -> dict[str, str]:
@@ -268,19 +288,27 @@ def run(
     target: str = "native",
     bench: Path | None = None,
     timeout: float = 10.0,
+    resume: bool = False,
+    stop_at: float | None = None,
 ) -> Record:
     """One run; saved in ``out`` (a folder) when given.
 
     values: options and "slot.parameter", numbers in SI or texts with units.  step: s, instead of the system's.
     seed: of all noise; each slot gets a seed of its own from it unless "slot.seed" is set.
     progress: called about five times a second with a :class:`Status`.
-    Raises the errors of :class:`Session`, RefusedError and ValueProblem before anything runs, and RunError (with
-    what was recorded, saved too) when an FMU fails, the plan does not end, or the user interrupts (RunInterrupted).
+    resume: go on with the interrupted run in ``out``, see :mod:`gyrobench.system.checkpoint`.
+    stop_at: s of simulated time at which the run is interrupted as if by the user.
+    Raises the errors of :class:`Session`, RefusedError, ResumeError and ValueProblem before anything runs, and RunError
+    (with what was recorded, saved too) when an FMU fails, the plan does not end, or the user interrupts
+    (RunInterrupted).
     """
+    if out is None and (resume or stop_at is not None):
+        raise ValueProblem("resume and stop_at: name the folder of the run in out")
+    keeper = Keeper(out, resume, stop_at=stop_at) if out is not None else None
     with Session(
         system, parts, maps, engine=engine, isolate=isolate, target=target, bench=bench, timeout=timeout
     ) as session:
-        return session.run(values, seed, step, out, progress)
+        return session.run(values, seed, step, out, progress, keeper)
 
 
 @functools.cache
