@@ -59,7 +59,7 @@ def read_record(
     if problems:
         raise DataError(data, problems)
     if columns is WINDOW_COLUMNS or {"std", "n", "flagged"} <= {c.name for c in columns}:
-        count = len(windows["phase"])
+        count = len(next(iter(windows.values())))
         windows.setdefault("std", np.full(count, np.nan))
         windows.setdefault("n", np.ones(count, dtype=np.int64))
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
