@@ -149,7 +149,6 @@ REFUSED = [
     (["run", NAME, "--engine", "fast"], "'native', 'reference'"),
     (["run", NAME, "--out", "full"], "--out full: holds other files; name a new folder, for example full/run1"),
     (["run", NAME, "--out", "bad.fmu"], "--out bad.fmu: is a file"),
-    (["run", "torquer_scale_factor"], "it reduces measured data"),
     (["run", NAME, "--sed", "3"], "No such option: --sed"),
     (["rum", NAME], "Did you mean 'run'?"),
     (["show", NAME, "--picture", "w.png"], "write w.svg"),

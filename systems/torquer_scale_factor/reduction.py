@@ -9,7 +9,8 @@ r_minus are the magnitudes of its rate:
 
 Noise: the angle marks have a constant error, so over an angle range Theta the rate has one proportional to i/Theta
 and K_n one proportional to 1/Theta.  Least squares weighs K_n with Theta^2 (alike when no ranges are given), first
-with one constant, then with K_1 + K_3 i^2, the cubic torquer.  Not modelled: heating by the current, drift that
+with one constant, then with K_1 + K_3 i^2, the cubic torquer.  A run knows more: the scatter of its angle readings
+gives each K_n its own standard deviation (marks.py), and that weighs.  Not modelled: heating by the current, drift that
 changes between the two senses.
 """
 
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
-from gyrobench.reduction import regression, uncertainty
+from gyrobench.reduction import recorded, regression, uncertainty
 from gyrobench.reduction.checks import ReductionError
 from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
+
+from . import marks
 
 Array = NDArray[np.float64]
 Limits = Mapping[str, tuple[float | None, float | None]]
@@ -37,14 +40,16 @@ UNIT = "°/h/mA"
 
 @dataclass(frozen=True)
 class TorquerSetup:
-    """u_current: relative standard uncertainty of the ammeter.  latitude only for the report.  limits: surface
-    units.
+    """u_current: relative standard uncertainty of the ammeter.  limits: surface units.  truth: printed name -> value in
+    the printed unit.
     """
 
     u_current: float = 0.0
     specification: Limits | None = None
     instrument: str = ""
     simulated: bool = False
+    truth: Mapping[str, float] | None = None
+    site: Mapping[str, Any] = field(default_factory=dict)
 
 
 def problems(rows: Mapping[str, Array]) -> list[str]:
@@ -102,7 +107,8 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
     i, plus, minus = (np.asarray(rows[n], dtype=float) for n in ("current", "rate_plus", "rate_minus"))
     theta = np.asarray(rows["range_plus"], dtype=float) if "range_plus" in rows else np.ones_like(i)
     K_n, half = (plus + minus) / 2.0 / i, (plus - minus) / 2.0
-    n, w = i.size, (theta / theta.max()) ** 2
+    sigma = np.asarray(rows["sigma"], dtype=float) if "sigma" in rows else 1.0 / theta
+    n, w = i.size, (sigma.min() / sigma) ** 2
     one = np.ones((n, 1))
     line = regression.least_squares(one, K_n, ("K",), w)
     full = i.max()
@@ -122,7 +128,7 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
     make = _Maker(s)
     coefficients = [
         make("K", "scale factor, mean of the K_n of all currents", UNIT, mean / KU, u_mean / KU, dof_mean, True),
-        make("K_LS", "scale factor, least squares weighted by the angle range", UNIT, float(line.beta[0]) / KU,
+        make("K_LS", "scale factor, weighted least squares", UNIT, float(line.beta[0]) / KU,
              float(line.u[0]) / KU, n - 1, True),
         make("K_1", "scale factor at zero current of the cubic torquer", UNIT, float(cubic.beta[0]) / KU,
              float(cubic.u[0]) / KU, n - 2, True),
@@ -158,7 +164,9 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
             "Positive current makes positive precession: K = ω/i (the book's A3-5 prints a minus that its own table "
             "does not have).",
             "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
-            "Noise of K_n is proportional to 1/angle range (constant error of the angle marks).",
+            "Noise of each K_n from the scatter of the angle readings, up to a factor."
+            if "sigma" in rows
+            else "Noise of K_n is proportional to 1/angle range (constant error of the angle marks).",
         ],
         coefficients=coefficients,
         series=[
@@ -174,8 +182,8 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
         condition=regression.examine(curve * np.sqrt(w)[:, None], ("K_1", "K_3")).condition,
         rank=2,
         dof=float(n - 2),
-        noise={"model": "white, K_n with a standard deviation proportional to 1/angle range",
-               "standard deviation of K_n at the widest range / (°/h/mA)": line.s / KU},
+        noise={"model": "white, K_n weighted by their " + ("readings' scatter" if "sigma" in rows else "range"),
+               "standard deviation of the best K_n / (°/h/mA)": line.s / KU},
         tests=[
             Test("cubic term", f, p, "curvature of the torquer",
                  "the scale factor depends on the current" if seen else "no curvature beyond the scatter")
@@ -194,6 +202,7 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
         verdict=uncertainty.overall(c.verdict for c in coefficients),
         instrument=s.instrument,
         simulated=s.simulated,
+        site=dict(s.site),
     )  # fmt: skip
 
 
@@ -220,11 +229,13 @@ class _Maker:
         u, U = uncertainty.combine(u_a, half_a, b)
         limit = (self.setup.specification or {}).get(name)
         t = value / u_a if u_a > 0.0 else None
+        truth = (self.setup.truth or {}).get(name)
         return Coefficient(
             name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=U / u if u > 0.0 else uncertainty.NORMAL,
             interval=(value - U, value + U), t=t,
             p=float(2.0 * special.stdtr(dof, -abs(t))) if t is not None else None, u_a=u_a, dof=float(dof),
-            limit=limit, verdict=uncertainty.verdict(value, U, limit),
+            truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None, limit=limit,
+            verdict=uncertainty.verdict(value, U, limit),
         )  # fmt: skip
 
 
@@ -254,14 +265,36 @@ def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: f
     }  # fmt: skip
 
 
+def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float] | None:
+    """What a simulated torquer k i (1 + k2 i + k3 i2) makes of the reported values; k2 is even and goes into the half
+    difference.  The drift has no one value: it changes with the range.
+    """
+    if "gyro.k" not in parameters:
+        return None
+    k, k3, error = (float(parameters.get(n, 0.0)) for n in ("gyro.k", "gyro.k3", "source.error"))
+    k, full = k / (1.0 + error), float(currents.max()) / (1.0 + error)
+    cubic = k3 * full**2
+    truth = {
+        "K_1": k / KU,
+        "K_3/K_1": cubic * 100.0,
+        "K": k / KU * (1.0 + cubic * float(np.mean((currents / currents.max()) ** 2))),
+    }
+    return truth | ({"K_LS": k / KU} if k3 == 0.0 else {})
+
+
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """:func:`reduce` of a record of measured data (columns as windows) with its circumstances as provenance."""
-    options = record.meta.get("options", {})
+    """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
+    options, measured = record.meta.get("options", {}), bool(record.meta.get("measured", False))
+    rows = record.windows if measured else marks.rows(record.windows, record.meta.get("plan", []))
+    truth = None
+    if not measured and len(rows["current"]):
+        truth = truth_of(record.meta.get("parameters", {}), np.asarray(rows["current"]))
     setup = TorquerSetup(
         u_current=float(options.get("u_current", 0.0)),
         specification=specification,
         instrument=str(record.meta.get("instrument", "")),
+        simulated=truth is not None,
+        truth=truth,
+        site={} if measured else recorded.Site.of(record.meta).shown(),
     )
-    result = reduce(record.windows, setup)
-    result.provenance = dict(record.meta)
-    return result
+    return recorded.finish(reduce(rows, setup), record)

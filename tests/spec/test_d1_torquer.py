@@ -144,4 +144,4 @@ def test_files(tmp_path: Path) -> None:
     r = s.reduce(s.measured(good, {"u_current": "0.01%"}))
     assert named(r)["K"].estimate == pytest.approx(17.170625, abs=1e-9) and len(r.budget) == 2
     assert r.provenance["title"].startswith("Torquer of a floated gyro")
-    assert s.check() and "current [mA]" in s.template()
+    assert "current [mA]" in s.template()

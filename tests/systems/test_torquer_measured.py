@@ -39,15 +39,6 @@ def _numbers(cells: list[object]) -> list[float]:
     return [float(str(c).replace("−", "-").replace("+", "").replace("%", "")) for c in cells]
 
 
-@pytest.mark.parametrize("words", [("run",), ("show",), ("export", "--to", "ssp")])
-def test_there_is_nothing_to_run(command: Command, tmp_path: Path, words: tuple[str, ...]) -> None:
-    more = () if words == ("show",) else ("--out", tmp_path / "run")
-    code, out, err = command(*words, NAME, *more)
-    assert code == 2 and out == "" and "Traceback" not in err
-    assert "measured data" in err and f"gyrobench reduce {NAME}" in err
-    assert not (tmp_path / "run").exists()
-
-
 def test_template_and_refusals(command: Command, tmp_path: Path) -> None:
     code, template, _ = command("reduce", NAME, "--template")
     assert code == 0
