@@ -244,9 +244,9 @@ def _tables(fits: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     rows: list[list[Any]] = []
     for name in ("k0", "k1", "k2", "k3"):
         if name in fits["a"]:
-            _, unit, size = MEANING[name]
-            a, b = fits["a"][name] / size, fits["b"][name] / size
-            rows.append([name, a, b, a - b, unit])
+            unit, offset = (MEANING[name][1], 0.0) if name != "k1" else ("µg/g", 1.0)
+            a, b = (fits["a"][name] - offset) / UG, (fits["b"][name] - offset) / UG
+            rows.append(["k1 − 1" if offset else name, a, b, a - b, unit])
     caption = "Closed formulas of each mount alone: the difference should be scatter"
     head = ["coefficient", "mount a", "mount b", "difference", "unit"]
     return [{"title": "The two mounts apart", "caption": caption, "columns": head, "rows": rows}]
