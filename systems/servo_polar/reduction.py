@@ -1,0 +1,201 @@
+"""Reduction of the polar servo test: drift coefficients, composite drift and its stability from table angles.
+
+    theta' + omega_E,x = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
+
+Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
+estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-POLAR, TEST-COMPOSITE]
+
+Not modelled: change of the coefficients with time (turns compared show it); see gyrobench.reduction.servo.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, units
+from gyrobench.reduction import composite, harmonic, recorded, servo
+from gyrobench.reduction.method import Findings, Group, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+from gyrobench.reduction.turns import Turns
+from gyrobench.system.servo import ATTITUDES, POLAR, attitude
+
+from . import closed, refusals
+from .model import Model
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH = units.factor("deg/h")
+SIZES = ("u_axis", "u_mount", "u_angle1", "u_angle2", "u_unbalance", "u_time")
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """Coefficients and composite drift of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    meta, windows = record.meta, record.windows
+    options = dict(meta.get("options", {}))
+    site = recorded.Site.of(meta)
+    route, which = str(options.get("route", "dwells")), int(options.get("terms", 9))
+    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    if route != "dwells" or len({n for n in labels.values() if n in POLAR}) == 1:
+        labels = {p: n for p, n in labels.items() if n in POLAR or n not in ATTITUDES}
+    wrong = refusals.latitude_problems(site.latitude)
+    wrong += [f"phase {p}: attitude '{n}' unknown; there are {', '.join(ATTITUDES)}" for p, n in labels.items()
+              if n not in ATTITUDES]  # fmt: skip
+    wrong = wrong or servo.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
+    if wrong:
+        raise ReductionError(wrong)
+    every = np.asarray(windows["phase"]).astype(int)
+    mine = np.isin(every, list(labels))
+    phase = every[mine]
+    start, end, t0, t1 = (
+        np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
+    )
+    wrong = refusals.record_problems(start, end, phase, labels)
+    limit = float(options.get("tracking", servo.TRACKING))
+    wrong += servo.tracking_problems(windows, np.isin(every, list(labels)), meta.get("parameters", {}), limit)
+    mounts = [n for n in labels.values() if n in POLAR]
+    dwells = {n for n in labels.values() if n not in POLAR}
+    if route == "dwells" and len(set(mounts)) > 1 and dwells != {"x east, y up", "x east, y down"}:
+        wrong.append(
+            "R and K_zx both asked for: two dwells 'x east, y up' and 'x east, y down' are needed (route dwells), or "
+            "the assumption K_zx = K_xz (route equal); route combination gives R + K_zx γ² sin²φ"
+        )
+    if not mounts:
+        wrong.append(f"no polar mount in the record; phases are {', '.join(labels.values())}")
+    if wrong:
+        raise ReductionError(wrong)
+    axes = np.array([attitude(labels[p], site.latitude) for p in phase.tolist()])
+    held = servo.Held(start, end, t0, t1, axes)
+    model = Model.of(route, mounts, which)
+    y, X = servo.drift_rate(held, site), model.columns(held, site)
+    groups = {n: np.isin(phase, [p for p, m in labels.items() if m == n]) for n in labels.values()}
+    book, fits, why = closed.reduce(start, end, t1 - t0, groups, site.latitude, site.g, site.earth_rate, route)
+    truth = recorded.truth_of(meta, drift.NAMES)
+    fitted, reported = model.quantities(site, truth, book)
+    shown = [_group(labels, p, phase, held, site, model) for p in labels]
+    found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
+    turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
+    turns.test()
+    found = model.report(found, reported)
+    statistics = _composite(found, labels, phase, held, site)
+    sizes = recorded.sizes(meta, SIZES)
+    effects = servo.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
+    together = {n: model.words(n, book=True) for n in model.fitted}
+    warnings = refusals.unseen(route, mounts, which)
+    missing = [n for n in drift.NAMES if n not in model.names and (truth or {}).get(n, 0.0) != 0.0]
+    if missing and which != 4:
+        warnings.append(f"{', '.join(missing)} is simulated but not in the {which}-term model: the others are biased.")
+    result = linear_result(
+        found,
+        system="servo_polar",
+        title="Polar servo test of a floated gyro",
+        method="The gyro holds a table with its axis along the pole in two mounts; least squares over all windows "
+        "under an estimated noise model with shared angle readings [TEST-SERVO-POLAR]",
+        sources=[
+            "TEST-SERVO-POLAR, SERVO-C3-REDUCE; 000_791234d3afc34a0c.txt eq. 3-84..3-90, Tables 3-2, 3-3, corrected by "
+            "E39, E40, E42-E44, E52, E53",
+            "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
+            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+        ],
+        equation=servo.equation(model.names),
+        conventions=(*servo.CONVENTIONS, "Harmonics: a cosine, b sine of θ; the book has them the other way."),
+        effects=effects,
+        specification=specification,
+        site=site.shown(),
+        instrument=str(meta.get("instrument", "")),
+        simulated=truth is not None,
+        no_closed=why,
+        closed_caption="From the same windows; the formulas: harmonics of each mount, means of the dwells",
+        tables=[
+            servo.book_table(found, together), *turns.table(), *_turn_differences(found, turns, labels, phase),
+            *composite.tables(statistics, DPH, "°/h"),
+        ],
+        harmonics=turns.harmonics(fits),
+        repeatability=turns.repeatability(),
+        warnings=warnings,
+    )  # fmt: skip
+    result.summary = _summary(result, statistics, found)
+    return recorded.finish(result, record)
+
+
+def _group(
+    labels: Mapping[int, str], p: int, phase: NDArray[np.int_], held: servo.Held, site: recorded.Site, model: Model
+) -> Group:
+    """Drift against table angle in the turns, against time in a dwell."""
+    mine = phase == p
+    if labels[p] not in POLAR:
+        middle = (held.t_start + held.t_end) / 2.0
+        return Group(labels[p], mine, middle[mine] - held.t_start[mine][0], "time in the dwell", "s")
+    angle = np.degrees(np.mod(((held.angle_start + held.angle_end) / 2.0)[mine], 2.0 * math.pi))
+    dense = np.radians(np.arange(0.0, 361.0, 3.0))
+    axes = np.broadcast_to(attitude(labels[p], site.latitude), (dense.size, 3, 3))
+    zero = np.zeros_like(dense)
+    curve = model.columns(servo.Held(dense, dense, zero, zero + 1.0, axes), site)
+    return Group(labels[p], mine, angle, "table angle", "°", (np.degrees(dense), curve))
+
+
+def _composite(
+    found: Findings, labels: Mapping[int, str], phase: NDArray[np.int_], held: servo.Held, site: recorded.Site
+) -> dict[str, composite.Composite | str]:
+    """Statistics of each phase: what the fit says to go with the angle is removed, in turns all but its constant."""
+    fitted = found.y - found.est.residual
+    out: dict[str, composite.Composite | str] = {}
+    for p, label in labels.items():
+        mine = phase == p
+        constant = float(fitted[mine].mean())
+        if label in POLAR:
+            constant = float(harmonic.fit(held.angle_start[mine], held.angle_end[mine], fitted[mine]).beta[0])
+        d = found.est.residual[mine] + constant
+        earth = float((held.axes[mine][0] @ (site.earth_rate * _pole(site)))[0])
+        name = label if list(labels.values()).count(label) == 1 else f"{label} (phase {p})"
+        t = held.t_start[mine], held.t_end[mine]
+        wrong = composite.problems(d, *t, earth)
+        out[name] = "; ".join(wrong) if wrong else composite.composite(d, *t, earth)
+    return out
+
+
+def _pole(site: recorded.Site) -> Array:
+    return np.array([0.0, math.cos(site.latitude), math.sin(site.latitude)])
+
+
+def _turn_differences(
+    found: Findings, turns: Turns, labels: Mapping[int, str], phase: NDArray[np.int_]
+) -> list[dict[str, Any]]:
+    """Later turns less the first, point by point at the same angle; the fit, common to all turns, drops out."""
+    rows: list[list[Any]] = []
+    middle = (turns.start + turns.end) / 2.0
+    for p, label in labels.items():
+        mine = phase == p
+        if label not in POLAR or not turns.turn[mine].any():
+            continue
+        first = mine & (turns.turn == 0)
+        x, r = np.mod(middle[first], 2.0 * math.pi), found.est.residual[first] / DPH
+        order = np.argsort(x)
+        for k in range(1, int(turns.turn[mine].max()) + 1):
+            there = mine & (turns.turn == k)
+            if np.count_nonzero(there) < 0.8 * x.size:
+                continue
+            at = np.mod(middle[there], 2.0 * math.pi)
+            d = found.est.residual[there] / DPH - np.interp(at, x[order], r[order], period=2.0 * math.pi)
+            rows.append([label, k + 1, d.size, float(d.mean()), float(d.std(ddof=1))])
+    if not rows:
+        return []
+    head = ["series", "turn", "windows", "mean difference / (°/h)", "scatter / (°/h)"]
+    return [{"title": "Turns less the first turn", "caption": "At the same table angle", "columns": head, "rows": rows}]
+
+
+def _summary(result: Result, statistics: Mapping[str, composite.Composite | str], found: Findings) -> list[str]:
+    first = result.coefficients[0]
+    out = [f"Constant drift {first.name} = {plus_minus(first)}."]
+    whole = {n: c for n, c in statistics.items() if not isinstance(c, str) and n.startswith("polar")}
+    if whole:
+        name, worst = max(whole.items(), key=lambda item: item[1].sigma)
+        time = f"below 1/e after {worst.time:g} s" if worst.time is not None else "not below 1/e within a quarter"
+        out.append(
+            f"Random drift σ = {worst.sigma / DPH:.3g} °/h over windows of {worst.dT:g} s ({name}), correlation {time}."
+        )
+    return [*out, found.noise_sentence()]

@@ -1,0 +1,116 @@
+"""What makes a polar servo test impossible, and what it cannot see.  [SERVO-C3-SING, SERVO-C3-RANK; spec d1, 5.4, 8]"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, units
+from gyrobench.reduction import regression, servo
+from gyrobench.reduction.recorded import Site
+from gyrobench.system.servo import POLAR, attitude
+
+from .model import ROUTES, Model
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+
+
+def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo.Held, Array]:
+    """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
+    angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
+    axes = np.concatenate(
+        [np.repeat(attitude(p, latitude)[None], a.size, axis=0) for p, a in zip(phases, angles, strict=True)]
+    )
+    phase = np.repeat(np.arange(len(phases)), [a.size for a in angles])
+    a, t = np.concatenate(angles), np.arange(phase.size, dtype=float)
+    return servo.Held(a, a, t, t + 1.0, axes), phase
+
+
+def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
+    """What phases at a latitude can tell apart: rank, condition, lost combinations."""
+    windows, _ = held(latitude, phases)
+    return regression.examine(servo.design(windows, Site(latitude, g * 9.80665), names), names)
+
+
+def latitude_problems(latitude: float) -> list[str]:
+    """Below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
+    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
+        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+    if 10.0 <= abs(math.degrees(latitude)) <= 80.0:
+        return []
+    names = drift.terms(8)
+    phases = ("x east, y up", "x east, y down", *POLAR)
+    found = examine(latitude, phases, names)
+    where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
+    if found.rank < 8:
+        return [f"{where}rank {found.rank} of 8, the record does not see {'; '.join(found.lost)}"]
+    X = servo.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
+    return [f"{where}condition {np.linalg.cond(X):.3g}, hardly seen is {found.weakest}"]
+
+
+def option_problems(options: Mapping[str, Any]) -> list[str]:
+    """What is wrong with the options, as sentences."""
+    found = latitude_problems(options["latitude"])
+    mounts = options["mounts"].replace(",", " ").split()
+    if not mounts or any(m not in ("S", "N") for m in mounts):
+        found.append(f"mounts = '{options['mounts']}': the mounts S and N in their order, as 'S N' or 'S N S'")
+    if options["route"] not in ROUTES:
+        found.append(f"route = '{options['route']}': one of {', '.join(ROUTES)}")
+    if options["terms"] not in (4, 8, 9):
+        found.append(f"terms = {options['terms']}: there are 4 (low grades), 8 and 9 terms")
+    if 4.0 * options["window"] > options["time"]:
+        found.append(f"window = {options['window']:g} s in a time of {options['time']:g} s: too few windows")
+    if options["route"] == "dwells" and not options["dwell"] > 0.0:
+        found.append("dwell = 0: the route 'dwells' needs two dwells with the input axis east")
+    return found
+
+
+def model_problems(parameters: Mapping[str, Any], which: int) -> list[str]:
+    """What the simulated gyro has and the model has not."""
+    square = parameters.get("gyro.D_OO", 0.0) / DPH
+    if square:
+        return [
+            f"gyro.D_OO = {square:g} °/h/g²: at constant |g| it cannot be told from D_F, D_II and D_SS, and the book's "
+            "model has no such term; set it to 0"
+        ]
+    return []
+
+
+def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
+    """What the plan cannot see, said before the run."""
+    found = []
+    if which == 4:
+        found.append("Four terms: the other coefficients stay in the residuals and bias D_F (low grades only).")
+    model = Model.of(route, mounts, which)
+    together = [model.words(n) for n in model.fitted if model.mixed[n]]
+    if len(set(mounts)) == 1:
+        found.append(
+            f"One mount ({mounts[0]}) tells only combinations: {'; '.join(together)}. Both mounts separate them."
+        )
+    elif together:
+        found.append("R and K_zx appear only as R + γ² sin²φ K_zx: two dwells with the input axis east separate them.")
+    elif model.equal:
+        found.append("R and K_zx are told apart by assuming K_zx = K_xz; an error of that goes into both.")
+    return found
+
+
+def record_problems(
+    angle_start: Array, angle_end: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
+) -> list[str]:
+    """Less than a turn, or too few windows, in a polar mount."""
+    found = []
+    for p, label in labels.items():
+        mine = phase == p
+        if label not in POLAR or not mine.any():
+            continue
+        turned = math.degrees(abs(float(angle_end[mine][-1] - angle_start[mine][0])))
+        if turned < 356.0:
+            found.append(f"phase {p} ({label}) turned {turned:.4g}°: a whole turn is needed, some 24 h")
+        if np.count_nonzero(mine) < 8:
+            found.append(f"phase {p} ({label}) has {np.count_nonzero(mine)} windows: at least 8 are needed")
+    return found

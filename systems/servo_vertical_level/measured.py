@@ -1,0 +1,38 @@
+"""A laboratory's record of vertical and level servo tests: which columns it has, and how it becomes a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gyrobench.system import servo
+from gyrobench.system.record import Record
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
+
+TEMPLATE = """\
+# Vertical and level servo test: the gyro holds the table; one row for each window between two readings of its angle.
+# latitude = 45.75deg
+# gravity = 9.8067m/s2
+# instrument = type and number of the gyro
+# operator = who took the record
+# phase 1 = x down
+# phase 2 = x up
+# phase 3 = x east, z down
+#
+# latitude: needed, here or by --set.  gravity, height: optional (WGS84 normal gravity).
+# phase N: attitude of the rows with this number; x input, y output, z spin axis, x along the table axis:
+#   x down, x up                        input axis vertical, any table angle
+#   x east, y up ... x south, z down    input axis level towards east, north, west or south, at angle 0 the named axis
+#                                       up or down; only while the angle is within 1 degree
+# angle: of the table, right-handed about x, at the start and the end of the window.
+# mean, std: pickoff voltage, n samples, flagged (suspect samples): optional.  Units may be others of the same kind.
+phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]
+"""
+
+
+def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """The CSV as a record in SI.  Raises DataError, and ValueProblem for an option that does not fit."""
+    return servo.read(system, data, values, (*servo.VERTICAL, *servo.LEVEL))

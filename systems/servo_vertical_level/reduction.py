@@ -1,0 +1,180 @@
+"""Reduction of the vertical and level servo tests: drift coefficients and composite drift from table angles.
+
+    theta' + omega_E,x = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + noise,   as many as the attitudes tell apart
+
+Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
+estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-VERT, TEST-SERVO-LEVEL]
+
+Not modelled: D_IO, D_OS, D_IS, which a level attitude sees by the sine of its angle (at most 1 degree); see
+gyrobench.reduction.servo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames, units
+from gyrobench.reduction import composite, recorded, servo
+from gyrobench.reduction.method import Group, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+from gyrobench.system.servo import ATTITUDES, attitude
+
+from . import closed, refusals
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH = units.factor("deg/h")
+SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """Coefficients and composite drift of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    meta, windows = record.meta, record.windows
+    options = dict(meta.get("options", {}))
+    site = recorded.Site.of(meta)
+    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(ATTITUDES)}" for p, n in labels.items()
+             if n not in ATTITUDES or n.startswith("polar")]  # fmt: skip
+    wrong = wrong or servo.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
+    if wrong:
+        raise ReductionError(wrong)
+    every = np.asarray(windows["phase"]).astype(int)
+    mine = np.isin(every, list(labels))
+    phase = every[mine]
+    start, end, t0, t1 = (
+        np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
+    )
+    limit = float(options.get("tracking", servo.TRACKING))
+    wrong = refusals.record_problems(start, end, phase, labels)
+    wrong += servo.tracking_problems(windows, mine, meta.get("parameters", {}), limit)
+    if wrong:
+        raise ReductionError(wrong)
+    held = servo.Held(start, end, t0, t1, np.array([attitude(labels[p], site.latitude) for p in phase.tolist()]))
+    seen = refusals.seen(list(labels.values()))
+
+    def columns(h: servo.Held) -> Array:
+        return servo.design(h, site, seen.names)
+
+    y, X = servo.drift_rate(held, site), columns(held)
+    means = _class_means(y, t1 - t0, phase, labels)
+    book = closed.formulas(means, site.g)
+    truth = recorded.truth_of(meta, drift.NAMES)
+    quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
+    found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings")
+    statistics: dict[str, composite.Composite | str] = {}
+    for p, label in labels.items():
+        rows = phase == p
+        earth = float((held.axes[rows][0] @ (site.earth_rate * frames.pole(site.latitude)))[0])
+        name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
+        bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
+        statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
+    sizes = {"u_angle1": 0.0, "u_angle2": 0.0, **recorded.sizes(meta, SIZES)}
+    effects = [e for e in servo.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source]
+    warnings = refusals.unseen(list(labels.values()))
+    both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
+    worst = float(np.max(np.abs(np.concatenate([start, end])[np.tile(_level(labels, phase), 2)]), initial=0.0))
+    if both and worst > 0.0:
+        size = max(abs((truth or {})[n]) for n in both) * worst / DPH
+        warnings.append(f"Of {', '.join(both)} angles up to {np.degrees(worst):.2g}° let {size:.1g} °/h in.")
+    result = linear_result(
+        found,
+        system="servo_vertical_level",
+        title="Vertical and level servo test of a floated gyro",
+        method="The gyro holds a table with its axis vertical or level; least squares over all windows under an "
+        "estimated noise model with shared angle readings [TEST-SERVO-VERT, TEST-SERVO-LEVEL]",
+        sources=[
+            "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; 000_791234d3afc34a0c.txt eq. 3-60..3-83, corrected "
+            "by E36-E38, E41",
+            "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
+            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+        ],
+        equation=servo.equation(seen.names),
+        conventions=servo.CONVENTIONS,
+        effects=effects,
+        specification=specification,
+        site=site.shown(),
+        instrument=str(meta.get("instrument", "")),
+        simulated=truth is not None,
+        no_closed="" if book else "the book has formulas for class 1, for the three-term route and for complete pairs",
+        closed_caption="From the same windows; the formulas take every attitude as at angle 0",
+        tables=[
+            _attitudes_table(means, found.est.residual, y, phase, labels), servo.book_table(found, _book_words(seen)),
+            *composite.tables(statistics, DPH, "°/h"),
+        ],
+        warnings=warnings,
+    )  # fmt: skip
+    result.summary = [
+        *(f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {plus_minus(c)}." for c in result.coefficients[:2]),
+        found.noise_sentence(),
+    ]
+    return recorded.finish(result, record)
+
+
+def _class(name: str) -> str:
+    """x down, x up, y down ...: which axis is vertical."""
+    return name.rpartition(", ")[2]
+
+
+def _class_means(y: Array, length: Array, phase: NDArray[np.int_], labels: Mapping[int, str]) -> dict[str, float]:
+    """Mean drift of the attitudes with the same vertical axis, rad/s, each phase alike (end to end: (5.0))."""
+    each: dict[str, list[float]] = {}
+    for p, label in labels.items():
+        rows = phase == p
+        each.setdefault(_class(label), []).append(float(np.sum((y * length)[rows]) / np.sum(length[rows])))
+    return {n: float(np.mean(v)) for n, v in each.items()}
+
+
+def _level(labels: Mapping[int, str], phase: NDArray[np.int_]) -> NDArray[np.bool_]:
+    return np.isin(phase, [p for p, n in labels.items() if not n.startswith(("x down", "x up"))])
+
+
+def _quantity(
+    name: str, seen: refusals.Seen, book: Mapping[str, float], truth: Mapping[str, float] | None, g: float
+) -> Quantity:
+    true = None if truth is None else seen.truth(name, truth, g)
+    q = Quantity.drift(name, true, book.get(name))
+    shown = seen.shown(name)
+    return replace(q, meaning=f"{q.meaning}, with compliance in it", shown=shown) if shown else q
+
+
+def _book_words(seen: refusals.Seen) -> dict[str, str]:
+    """Combinations in the book's names: R + γ² K_zx."""
+    out = {}
+    for name in seen.names:
+        symbol, sign = servo.BOOK[name]
+        words = [symbol]
+        for other, s, k in seen.mixed[name]:
+            its, way = servo.BOOK[other]
+            words.append(f"{'+' if s * way * sign > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{its}")
+        out[name] = " ".join(words)
+    return out
+
+
+def _groups(labels: Mapping[int, str], phase: NDArray[np.int_], held: servo.Held) -> list[Group]:
+    """Drift against time, cycles of the same attitude together."""
+    middle, out = (held.t_start + held.t_end) / 2.0, []
+    for label in dict.fromkeys(labels.values()):
+        rows = np.isin(phase, [p for p, n in labels.items() if n == label])
+        first = np.array([held.t_start[phase == p][0] for p in phase[rows].tolist()])
+        out.append(Group(label, rows, middle[rows] - first, "time in the dwell", "s"))
+    return out
+
+
+def _attitudes_table(
+    means: Mapping[str, float], residual: Array, y: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
+) -> dict[str, Any]:
+    rows: list[list[Any]] = []
+    for p, label in labels.items():
+        mine = phase == p
+        rows.append([label, p, int(mine.sum()), float(y[mine].mean()) / DPH, float(residual[mine].mean()) / DPH])
+    return {
+        "title": "Drift in each attitude",
+        "caption": "Mean of the windows of a phase; residual: less the fitted model",
+        "columns": ["attitude", "phase", "windows", "drift / (°/h)", "residual / (°/h)"],
+        "rows": rows,
+    }

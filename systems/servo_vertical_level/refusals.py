@@ -1,0 +1,116 @@
+"""What attitudes can and cannot tell, and how long a level one lasts.  [SERVO-C1, SERVO-C2; spec d1, 5.1, 5.2]"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift
+from gyrobench.system.servo import ATTITUDES, LEVEL, U
+
+Array = NDArray[np.float64]
+LIMIT = math.radians(1.0)  # of the angle in a level attitude
+#: in the order in which they are kept while the attitudes tell more
+TERMS = ("D_F", "D_I", "D_S", "D_O", "D_II", "D_SS")
+CROSS = ("D_IO", "D_OS", "D_IS")
+
+
+def gravity_along(name: str) -> Array:
+    """SF/g along x, y, z at angle 0: +1 along an axis that points down."""
+    x, y = ATTITUDES[name]
+    axis = 0 if abs(x) == U else 1 if abs(y) == U else 2
+    out = np.zeros(3)
+    out[axis] = 1.0 if name.endswith("down") else -1.0
+    return out
+
+
+@dataclass(frozen=True)
+class Seen:
+    """names: coefficients that are estimated.  mixed: of each the others it holds, with sign and power of gamma.
+    lost: those that are not seen at all.
+    """
+
+    names: tuple[str, ...]
+    mixed: Mapping[str, tuple[tuple[str, int, int], ...]]
+    lost: tuple[str, ...]
+
+    def shown(self, name: str) -> str:
+        """D_F + γ² D_II; "" where a coefficient stands for itself."""
+        words = [f"{'+' if s > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{n}" for n, s, k in self.mixed[name]]
+        return " ".join([name, *words]) if words else ""
+
+    def truth(self, name: str, true: Mapping[str, float], g: float) -> float:
+        """What an ideal record gives for ``name``, rad/s per g0^n."""
+        return true.get(name, 0.0) + sum(s * g**k * true.get(n, 0.0) for n, s, k in self.mixed[name])
+
+
+def seen(attitudes: Sequence[str]) -> Seen:
+    """What the attitudes tell apart.  A coefficient that adds no rank is held by those before it, exactly."""
+    rows = drift.regressors(np.array([gravity_along(n) for n in attitudes]), TERMS)
+    kept: list[int] = []
+    mixed: dict[str, list[tuple[str, int, int]]] = {}
+    lost = list(CROSS)
+    for j, name in enumerate(TERMS):
+        column = rows[:, j]
+        if not np.any(column):
+            lost.append(name)
+            continue
+        share, *_ = np.linalg.lstsq(rows[:, kept], column, rcond=None) if kept else (np.zeros(0),)
+        if np.allclose(rows[:, kept] @ share, column, atol=1e-9):
+            for k, s in zip(kept, share.round().astype(int).tolist(), strict=True):
+                if s:
+                    mixed[TERMS[k]].append((name, s, drift.order(name) - drift.order(TERMS[k])))
+        else:
+            kept.append(j)
+            mixed[name] = []
+    return Seen(tuple(TERMS[k] for k in kept), {n: tuple(v) for n, v in mixed.items()}, tuple(lost))
+
+
+def unseen(attitudes: Sequence[str]) -> list[str]:
+    """What cannot be seen, said before the run."""
+    known = [n for n in attitudes if n in ATTITUDES]
+    if not known:
+        return []
+    found = seen(known)
+    together = [words for n in found.names if (words := found.shown(n))]
+    out = [f"These attitudes tell only combinations: {'; '.join(together)} (γ = g/g0)."] if together else []
+    return [*out, f"Not seen at all, and taken as zero at angles other than 0: {', '.join(found.lost)}."]
+
+
+def option_problems(attitudes: Sequence[str], earth: Mapping[str, float], time: float) -> list[str]:
+    """What is wrong with attitudes and times.  earth: rate along the input axis of the level attitudes, rad/s."""
+    unknown = [n for n in attitudes if n not in ATTITUDES or n.startswith("polar")]
+    if unknown or not attitudes:
+        known = [n for n in ATTITUDES if not n.startswith("polar")]
+        return [f"attitude {', '.join(unknown) or 'none'}: there are {'; '.join(known)}"]
+    found = []
+    for name, rate in earth.items():
+        if abs(rate) * time / 2.0 > LIMIT:
+            most = 2.0 * LIMIT / abs(rate)
+            found.append(
+                f"{name}: the Earth turns the table by {math.degrees(abs(rate) * time):.3g}° in settle and dwell of "
+                f"{time:g} s; 1° either side of level allows {most:.0f} s"
+            )
+    return found
+
+
+def record_problems(
+    angle_start: Array, angle_end: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
+) -> list[str]:
+    """Level attitudes beyond 1 degree."""
+    found = []
+    for p, label in labels.items():
+        mine = phase == p
+        if label not in LEVEL or not mine.any():
+            continue
+        worst = float(np.max(np.abs(np.concatenate([angle_start[mine], angle_end[mine]]))))
+        if worst > LIMIT * 1.001:
+            found.append(
+                f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
+                "small-angle test: shorten the dwell, or start on the other side of level"
+            )
+    return found

@@ -1,0 +1,196 @@
+"""Vertical and level servo tests, dynamic co-simulation: recovery, combinations, limits, coverage, measured data."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from servoing import DPH, QUIET, errors, expected_rate, gyro, held, latitude
+
+from gyrobench import frames
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.system.run import Session
+from gyrobench.system.system import RefusedError, load_system
+
+NAME = "servo_vertical_level"
+SHORT: dict[str, Any] = {"dwell": 60.0, "settle": 2.0, "cycles": 1}
+ARCSEC = math.pi / 648000.0
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Session]:
+    with Session(NAME) as prepared:
+        yield prepared
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_gyros_at_random_latitudes(bench: Session, seed: int) -> None:
+    """Every window reads the equation with J/H alpha_O (5e-7 deg/h) in it.  The coefficients are off by that and by
+    what D_IO, D_OS, D_IS leave by the sine of the angle, at most 0.2 degrees here.
+    """
+    rng = np.random.default_rng(seed)
+    values = {**SHORT, **QUIET, **gyro(rng), "latitude": latitude(rng)}
+    record = bench.run(values)
+    windows, _ = held(record)
+    assert np.max(np.abs(windows.rate - expected_rate(record))) < 2e-9 * DPH
+    result = load_system(NAME).reduce(record)
+    worst = float(np.max(np.abs(windows.angle_end[windows.axes[:, 0, 2] ** 2 < 0.5])))
+    cross = sum(abs(values[f"gyro.{n}"]) for n in ("D_IO", "D_OS", "D_IS")) / DPH
+    for name, error in errors(result, values).items():
+        assert abs(error) < 2.0 * cross * worst + 2e-6, name
+    exact = load_system(NAME).reduce(bench.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0}))
+    for name, error in errors(exact, values).items():
+        assert abs(error) < 2e-6, name  # two rates, each 5e-7 off, over two
+    assert [c.name for c in exact.coefficients] == ["D_F", "D_I", "D_S", "D_O", "D_II", "D_SS"]
+
+
+def test_vertical_alone_to_a_millionth(bench: Session) -> None:
+    """Class 1 sees no angle: D_F + g2 D_II and D_I, off by J/H alpha_O alone, as worked out in servoing."""
+    rng = np.random.default_rng(9)
+    values = {**SHORT, **QUIET, **gyro(rng), "latitude": latitude(rng), "attitudes": "vertical"}
+    record = bench.run(values)
+    result = load_system(NAME).reduce(record)
+    windows, _ = held(record)
+    phi = values["latitude"]
+    along = -windows.axes[:, 2] @ frames.earth_rate_local(phi) * 1e-3  # -(J/H) omega_E,z at angles of arcminutes
+    left = -(windows.rate * along) / DPH
+    half = (left[0] + left[-1]) / 2.0, (left[0] - left[-1]) / 2.0
+    g = frames.normal_gravity(phi) / frames.G0
+    assert result.coefficients[0].name == "D_F + γ² D_II"
+    for c, off in zip(result.coefficients, (half[0], half[1] / g), strict=True):
+        assert c.estimate - c.truth == pytest.approx(off, abs=5e-9) and abs(off) < 1e-6
+        assert c.closed == pytest.approx(c.estimate, abs=1e-8)
+
+
+def test_three_term_route_says_what_it_holds(bench: Session) -> None:
+    """D_F + g2 D_II, D_I, D_S - g D_II + g D_SS: in the book's names R + g2 K_zx, U_z, U_x + g (K_zx + K_xz)."""
+    result = load_system(NAME).reduce(bench.run({**SHORT, **QUIET, "attitudes": "three", "gyro.D_O": 0.0}))
+    g = frames.normal_gravity(math.radians(45.75)) / frames.G0
+    truth = {"D_F + γ² D_II": -0.3 - 0.05 * g * g, "D_I": -0.9, "D_S − γ D_II + γ D_SS": -0.7 + (0.05 + 0.04) * g}
+    assert [c.name for c in result.coefficients] == list(truth)
+    for c in result.coefficients:
+        assert c.truth == pytest.approx(truth[c.name], rel=1e-9)
+        assert c.estimate == pytest.approx(c.truth, abs=1e-5) and c.closed == pytest.approx(c.truth, abs=1e-5)
+    book = next(t for t in result.tables if t["title"] == "In the book's names")["rows"]
+    assert [row[0] for row in book] == ["R + γ² K_zx", "U_z", "U_x + γ K_zx + γ K_xz"]
+    assert book[0][1] == pytest.approx(0.3 + 0.05 * g * g, abs=1e-5)
+    assert any("tell only combinations" in w for w in result.warnings)
+
+
+def test_all_eighteen_attitudes(bench: Session) -> None:
+    """Every azimuth gives the same coefficients; the Earth turns the table both ways through level."""
+    record = bench.run({**SHORT, **QUIET, "attitudes": "all", "dwell": 100.0, "windows": 5})
+    windows, _ = held(record)
+    assert (
+        np.max(np.abs(windows.rate - expected_rate(record))) < 1e-8 * DPH
+    )  # uneven turn, 1e-3 of the rate in a window
+    north = [r["phase"] for r in record.meta["plan"] if r["label"] == "x north, y up"]
+    mine = np.isin(record.windows["phase"], north)
+    first, last = record.windows["angle_start"][mine][0], record.windows["angle_end"][mine][-1]
+    assert first > 0.0 > last and abs(first + last) < 0.1 * abs(first)
+    result = load_system(NAME).reduce(record)
+    for c in result.coefficients:
+        assert c.estimate == pytest.approx(c.truth, abs=1e-4), c.name
+    table = next(t for t in result.tables if t["title"] == "Drift in each attitude")
+    assert len(table["rows"]) == 18
+
+
+def test_noise_and_composite(bench: Session) -> None:
+    """Truth within four u; ten windows a dwell give composite statistics of every phase."""
+    values = {"dwell": 300.0, "windows": 10, "table.quantum": 0.18 * ARCSEC, "gyro.markov_tau": 30.0}
+    result = load_system(NAME).reduce(bench.run(values, seed=5))
+    for c in result.coefficients:
+        assert c.z is not None and abs(c.z) < 4.0 and c.u > 1e-4, c.name
+    table = next(t for t in result.tables if t["title"] == "Composite drift")
+    assert len(table["rows"]) == 12 and all(row[1] == 10 and row[2] == 30.0 for row in table["rows"])
+
+
+def test_intervals_cover(bench: Session) -> None:
+    """Binomial bound on a few runs; tests/benchmarks/coverage_servo.py counts on more.  Windows of 20 s, ten a dwell, a
+    drift correlated over 10 s and a quantum of 0.05 arcsec.
+    """
+    runs, hits = 12, np.zeros(6, dtype=int)
+    values = {"dwell": 200.0, "cycles": 1, "settle": 2.0, "gyro.markov_tau": 10.0, "table.quantum": 0.05 * ARCSEC}
+    for seed in range(runs):
+        result = load_system(NAME).reduce(bench.run(values, seed=200 + seed))
+        hits += [c.interval[0] <= c.truth <= c.interval[1] for c in result.coefficients]
+    assert hits.min() >= binom.ppf(1e-4, runs, 0.93), hits
+    assert hits.sum() / 6.0 >= binom.ppf(1e-3, runs, 0.93), hits
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"attitudes": "x north, y up", "dwell": 700.0}, "x north, y up: the Earth turns the table by 2.* allows 68"),
+        ({"attitudes": "x down; x sideways"}, "attitude x sideways: there are x down; x up"),
+        ({"attitudes": "polar S"}, "attitude polar S"),
+        ({"attitudes": ";"}, "attitude none"),
+        ({"attitudes": "all", "cycles": 2}, "72 phases, two for each attitude: the stand knows 49"),
+        ({"table.index_rate": 0.1}, "index more slowly"),
+        ({"gyro.mount[1,1]": 0.5}, "gyro.mount: rows are not orthonormal"),
+    ],
+)
+def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], text: str) -> None:
+    with pytest.raises(RefusedError, match=text):
+        bench.run(values)
+
+
+def test_beyond_a_degree_is_refused(bench: Session) -> None:
+    record = bench.run({**SHORT, **QUIET})
+    phase = next(r["phase"] for r in record.meta["plan"] if r["label"] == "x east, z up")
+    mine = record.windows["phase"] == phase
+    windows = {k: v.copy() for k, v in record.windows.items()}
+    for c in ("angle_start", "angle_end"):
+        windows[c][mine] += math.radians(1.2)
+    with pytest.raises(ReductionError, match=r"\(x east, z up\) reaches 1.2.* 1° is the limit"):
+        load_system(NAME).reduce(type(record)(windows, {}, record.meta))
+
+
+def test_told_of_another_gyro(bench: Session) -> None:
+    """Parameters of the gyro that the user sets are told to the table's loop."""
+    record = bench.run({**SHORT, **QUIET, "attitudes": "vertical", "gyro.H": 0.25, "gyro.K_sg": 8.0})
+    assert record.meta["parameters"]["table.H_g"] == 0.25 and record.meta["parameters"]["table.K_g"] == 8.0
+    assert np.max(np.abs(held(record)[0].rate - expected_rate(record))) < 2e-9 * DPH
+
+
+def test_laboratory_file(tmp_path: Any, bench: Session) -> None:
+    """The template, filled with a three-term record in degrees and minutes, gives the same coefficients."""
+    record = bench.run({**SHORT, "attitudes": "three"}, seed=2)
+    system = load_system(NAME)
+    lines = system.template().splitlines()
+    header = lines.pop().replace("angle_end [deg]", "angle_end [arcmin]")
+    windows, rows = held(record)
+    number = (record.windows["phase"][rows] // 2).tolist()
+    body = [
+        f"{p},{a!r},{b!r},{math.degrees(c)!r},{math.degrees(d) * 60.0!r}"
+        for p, a, b, c, d in zip(
+            number, windows.t_start.tolist(), windows.t_end.tolist(), windows.angle_start.tolist(),
+            windows.angle_end.tolist(), strict=True,
+        )
+    ]  # fmt: skip
+    file = tmp_path / "three.csv"
+    text = "\n".join([*lines, header, *body, ""])
+    file.write_text(text.replace("9.8067m/s2", f"{frames.normal_gravity(math.radians(45.75))!r}m/s2"), encoding="utf-8")
+    again = system.reduce(system.measured(file, {}))
+    for a, b in zip(again.coefficients, load_system(NAME).reduce(record).coefficients, strict=True):
+        assert a.estimate == pytest.approx(b.estimate, rel=1e-9) and a.name == b.name and a.truth is None
+    file.write_text(text.replace("# latitude = 45.75deg\n", ""), encoding="utf-8")
+    with pytest.raises(Exception, match="'latitude' is not given"):
+        load_system(NAME).measured(file, {})
+
+
+def test_readme() -> None:
+    """What the README says of options is what there is."""
+    system = load_system(NAME)
+    assert system.folder is not None
+    text = (system.folder / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
+    assert named == set(system.options)
+    for name, option in system.options.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+        assert option.doc in row, name
