@@ -15,7 +15,7 @@ from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rat
 
 from gyrobench import frames
 from gyrobench.reduction.checks import ReductionError
-from gyrobench.system.run import Session
+from gyrobench.system.run import RunError, Session, run
 from gyrobench.system.system import RefusedError, load_system
 from gyrobench.system.values import ValueProblem
 
@@ -330,3 +330,13 @@ def test_readme_and_show(day: Any) -> None:
         "gyro.u -> table.u": 1e-3, "cage.i -> gyro.i": 1e-3, "table.angle_read -> sequencer.angle": 1e-3,
         "table.in_position -> sequencer.in_position": 1e-3,
     }  # fmt: skip
+
+
+def test_stopped_and_continued(tmp_path: Any) -> None:
+    """Stopped while the gyro holds the table, noise and quantum on, and continued: the record is bit-equal."""
+    values = {**DAY500, "route": "combination", "mounts": "N", "table.quantum": 0.02 * ARCSEC}
+    whole = run(NAME, values=values, seed=3)
+    with pytest.raises(RunError, match="--resume"):
+        run(NAME, values=values, seed=3, out=tmp_path / "day", stop_at=90.0)
+    again = run(NAME, values=values, seed=3, out=tmp_path / "day", resume=True)
+    assert again.same_data(whole) and again.meta["resumed_at"] == pytest.approx([90.0], abs=2e-3)
