@@ -179,9 +179,7 @@ def from_physical(H: float, m: float, physical: Mapping[str, float]) -> dict[str
         if not math.isfinite(value):
             raise ValueError(f"{name} = {value} is no finite number")
         if name in ("K_SS", "K_II") and value < 0.0:
-            raise ValueError(
-                f"{name} = {value:g} m/N: a structure does not move against the force, expected >= 0"
-            )
+            raise ValueError(f"{name} = {value:g} m/N: a structure does not move against the force, expected >= 0")
     pair = {"K_SS", "K_II"} & physical.keys()
     if pair and "K_SS-K_II" in physical:
         raise ValueError(f"K_SS-K_II and {' and '.join(sorted(pair))} define D_IS twice; give one of the two")
@@ -263,16 +261,12 @@ def to_physical(H: float, m: float, coefficients: Mapping[str, float]) -> dict[s
     return {key: s * coefficients[n] for key, (n, s) in rule.items() if n in coefficients}
 
 
-def merge(
-    coefficients: Mapping[str, float], H: float, m: float, physical: Mapping[str, float]
-) -> dict[str, float]:
+def merge(coefficients: Mapping[str, float], H: float, m: float, physical: Mapping[str, float]) -> dict[str, float]:
     """Coefficients given partly as D's and partly in physical form; one given in both forms is refused."""
     derived = from_physical(H, m, physical) if physical else {}
     twice = sorted(derived.keys() & coefficients.keys())
     if twice:
-        raise ValueError(
-            f"{', '.join(twice)}: given as coefficient and by physical quantities; give one of the two"
-        )
+        raise ValueError(f"{', '.join(twice)}: given as coefficient and by physical quantities; give one of the two")
     return {n: {**coefficients, **derived}[n] for n in NAMES if n in coefficients or n in derived}
 
 

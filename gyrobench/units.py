@@ -73,9 +73,7 @@ _define(_dim(A=1), A=1.0, mA=1e-3, uA=1e-6, nA=1e-9)
 _define(_dim(K=1), K=1.0, mK=1e-3)
 _define(_dim(mol=1), mol=1.0)
 _define(_dim(cd=1), cd=1.0)
-_define(
-    _dim(rad=1), rad=1.0, mrad=1e-3, urad=1e-6, deg=DEG, arcmin=DEG / 60, arcsec=DEG / 3600, rev=2 * math.pi
-)
+_define(_dim(rad=1), rad=1.0, mrad=1e-3, urad=1e-6, deg=DEG, arcmin=DEG / 60, arcsec=DEG / 3600, rev=2 * math.pi)
 _define(_dim(rad=1, s=-1), ERU=EARTH_RATE, mERU=EARTH_RATE * 1e-3, rpm=2 * math.pi / 60)
 _define(_dim(s=-1), Hz=1.0, kHz=1e3, mHz=1e-3)
 _define(_dim(m=1, s=-2), g=G0, mg=G0 * 1e-3, ug=G0 * 1e-6, Gal=1e-2, mGal=1e-5)
@@ -125,9 +123,7 @@ def unit(name: str) -> Unit:
         return Unit(name, factor, offset, exponents)
     tokens = _TOKEN.findall(text)
     if "".join(tokens) != text or not text:
-        raise UnitError(
-            f"unit '{name}': not a unit; write it like rad/s, kg.m2, deg/h/g2, rad/s/sqrt(Hz), 1 or %"
-        )
+        raise UnitError(f"unit '{name}': not a unit; write it like rad/s, kg.m2, deg/h/g2, rad/s/sqrt(Hz), 1 or %")
     factor, powers, rest = _product(tokens, name)
     if rest:
         raise UnitError(f"unit '{name}': '{rest[0]}' is out of place")
@@ -224,15 +220,11 @@ def parse_quantity(text: str, to: str, per_g0: bool = False) -> float:
     """
     match = _NUMBER.match(text)
     if not match or not math.isfinite(float(match[1])):
-        raise UnitError(
-            f"'{text}': a finite number with an optional unit is expected, such as 45.75deg, 0.3deg/h, 2mA"
-        )
+        raise UnitError(f"'{text}': a finite number with an optional unit is expected, such as 45.75deg, 0.3deg/h, 2mA")
     value, name = float(match[1]), match[2]
     if not name:
         target = unit(to)
-        return (
-            value if target.factor == 1.0 and not target.offset else (value - target.offset) / target.factor
-        )
+        return value if target.factor == 1.0 and not target.offset else (value - target.offset) / target.factor
     try:
         if per_g0 and not same_dimension(name, to):
             for power in (1, 2, 3):

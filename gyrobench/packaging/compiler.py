@@ -12,7 +12,9 @@ import sys
 import sysconfig
 from pathlib import Path
 
-FLAGS = ("-O3", "-fno-tree-vectorize", "-fno-tree-slp-vectorize", "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+#: No vector code: these programs store numbers one by one and would wait for them when loading them in pairs.
+SCALAR = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
+FLAGS = ("-O3", *SCALAR, "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 #: FMI 2 platform folder -> (library suffix, zig target)
 PLATFORMS = {
     "linux64": (".so", "x86_64-linux-gnu.2.17"),
