@@ -178,7 +178,7 @@ def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> di
     return {
         "title": "In the book's names",
         "caption": "Torque sign, ω_M = −ω_d; last column: sign of the book's against ours",
-        "columns": ["book", "estimate", "u", "unit", "ours", "sign"],
+        "columns": ["book", "estimate", "u of type A", "unit", "ours", "sign"],
         "rows": rows,
     }
 

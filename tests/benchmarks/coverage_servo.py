@@ -3,7 +3,10 @@
     python tests/benchmarks/coverage_servo.py --runs 1000 [polar|vertical_level]
 
 Days and dwells are shortened: the polar test turns at 500 Earth rates (a day in 172 s), the correlation time of the
-drift is shortened with it, so that there are as many of them in a window as in the full test or fewer.
+drift is shortened with it, so that there are as many of them in a window as in the full test or more.
+
+Measured: polar, 1000 runs, 0.959 .. 0.987 over the nine coefficients (D_I, D_II, D_F and D_IO above 0.97: too
+wide, as the share of reading errors is left open); vertical_level, 300 runs, 0.957 .. 0.983 over the six.
 """
 
 from __future__ import annotations
