@@ -17,7 +17,7 @@ from typing import Any
 from gyrobench.reduction.result import Result
 
 SCHEMA = "gyrobench-result-1"
-MODES = {0: "hold", 1: "index", 2: "rate"}
+MODES = {0: "hold", 1: "index", 2: "rate", 3: "servo"}
 
 
 def plain(value: Any) -> Any:
