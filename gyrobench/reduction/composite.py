@@ -92,6 +92,13 @@ def tables(found: Mapping[str, Composite | str], scale: float, unit: str) -> lis
         lags = _shown(max(c.correlation.size for c in whole.values()))
         body = [[q, *(float(c.correlation[q]) if q < c.correlation.size else "" for c in whole.values())] for q in lags]
         head = ["lag / ΔT", *whole]
+        if len(whole) > 4:  # a page holds few columns: the series go down, the first lags across
+            across = lags[:8]
+            body = [
+                [n, *(float(c.correlation[q]) if q < c.correlation.size else "" for q in across)]
+                for n, c in whole.items()
+            ]
+            head = ["series, at lag / ΔT =", *(str(q) for q in across)]
         caption = "Autocovariance over that at lag 0, to a quarter of the windows"
         out.append({"title": "Correlation of the random part", "caption": caption, "columns": head, "rows": body})
     return out
