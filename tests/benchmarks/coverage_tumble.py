@@ -16,7 +16,7 @@ a thirtieth of u.  The reduction is told nothing about the noise.
 Measured, 1000 runs each, three turns: white 0.941 .. 0.962, markov 1 0.935 .. 0.946, markov 5 0.936 .. 0.956 over the
 nine coefficients.  Less data leaves more open about the noise: with a single turn in one sense and dwells of ten
 windows, white 0.954 .. 0.971, markov 1 0.938 .. 0.986, markov 5 0.917 .. 0.968 (D_IS and D_IO lowest,
-D_F and D_O highest).
+D_F and D_O highest; these with an earlier prior of the correlation time).
 """
 
 from __future__ import annotations
