@@ -1,0 +1,57 @@
+"""What a socket consists of: its connectors, with causality, unit, shape and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Shape = tuple[int, ...]
+
+
+def element_names(name: str, shape: Shape) -> list[str]:
+    """FMI 2 names of the elements of an array, row by row: ``face[1,1]``, ``face[1,2]`` ..."""
+    if not shape:
+        return [name]
+    indices = [""]
+    for n in shape:
+        indices = [f"{head},{i}" if head else str(i) for head in indices for i in range(1, n + 1)]
+    return [f"{name}[{i}]" for i in indices]
+
+
+@dataclass(frozen=True)
+class Connector:
+    """One variable (or array of variables) of a socket."""
+
+    name: str
+    causality: str  # "input" | "output", seen from the part in the slot
+    unit: str  # "" = any: neither checked nor converted
+    meaning: str
+    shape: Shape = ()
+    optional: bool = False
+    whole: bool = False  # integer valued: an Integer or Boolean variable fits as well as a Real one
+
+    @property
+    def elements(self) -> list[str]:
+        return element_names(self.name, self.shape)
+
+
+@dataclass(frozen=True)
+class Socket:
+    """A named set of connectors."""
+
+    name: str
+    meaning: str
+    connectors: tuple[Connector, ...]
+
+    def connector(self, name: str) -> Connector | None:
+        """The connector called ``name`` (without index), or None."""
+        return next((c for c in self.connectors if c.name == name), None)
+
+
+def inp(name: str, unit: str, meaning: str, *shape: int, optional: bool = False, whole: bool = False) -> Connector:
+    """An input of the part in the slot."""
+    return Connector(name, "input", unit, meaning, shape, optional, whole)
+
+
+def out(name: str, unit: str, meaning: str, *shape: int, optional: bool = False, whole: bool = False) -> Connector:
+    """An output of the part in the slot."""
+    return Connector(name, "output", unit, meaning, shape, optional, whole)
