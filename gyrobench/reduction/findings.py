@@ -12,7 +12,7 @@ the one into the other with uncertainties to first order.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -37,6 +37,8 @@ class Quantity:
 
     truth and closed (the book's formula on the same data): SI, None where there is none.  shown: the printed name
     where it differs, as for the combination that a coefficient stands for; limits are looked up under both.
+    combination: coefficient of the drift model -> its factor in it (per g0^n); empty: it is the one of its name.  Where
+    |f| is the same in all attitudes D_OO (Dx_yy, Dy_xx) is folded into the others and left out.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Quantity:
     truth: float | None = None
     closed: float | None = None
     shown: str = ""
+    combination: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -193,15 +196,13 @@ class Findings:
             step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
             high, low = np.asarray(function(beta + step)), np.asarray(function(beta - step))
             J[:, j] = (high - low) / (2.0 * step[j])
-        covariance = J @ r.covariance @ J.T
-        u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        parts = (J * r.u) ** 2  # which unknown makes how much of u: its interval decides on the factor
-        share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-        k2 = (r.half_width / np.maximum(r.u, 1e-300)) ** 2
-        dof = np.min(np.where(share > 0.01, r.dof, np.inf), axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            p = np.where(u > 0.0, 2.0 * special.stdtr(np.minimum(dof, 1e9), -np.abs(value / u)), 0.0)
-        reported = Estimates(value, covariance, u, u * np.sqrt(share @ k2), p, dof, J @ r.gain)
+        sd, half = r.mixture.spread(J)
+        u = np.minimum(sd, half / correlated.NORMAL)
+        size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
+        covariance = (J @ r.covariance @ J.T) * np.outer(size, size)
+        dof = correlated.dof_of(half / np.maximum(u, 1e-300))
+        p = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
+        reported = Estimates(value, covariance, u, half, p, dof, J @ r.gain)
         return replace(self, quantities=tuple(quantities), reported=reported, tests=list(self.tests))
 
     # ------------------------------------------------------------------------------------------ plots

@@ -59,6 +59,7 @@ def merge(
         psd=loud.psd,
         harmonics=[{**h, "series": f"{n}: {h.get('series', '')}"} for n, r in results.items() for h in r.harmonics],
         budget=[b for r in parts for b in r.budget],
+        type_b=_side_by_side(parts),
         repeatability={f"{n}: {key}": value for n, r in results.items() for key, value in r.repeatability.items()},
         tables=[
             *({**t, "title": f"{t.get('title', '')}, {n}".lstrip(", ")} for n, r in results.items() for t in r.tables),
@@ -81,6 +82,18 @@ def _shared(labels: list[str], lists: list[list[str]]) -> list[str]:
     for text in _once(lists):
         who = [n for n, texts in zip(labels, lists, strict=True) if text in texts]
         out.append(text if len(who) == len(labels) else f"{', '.join(who)}: {text}")
+    return out
+
+
+def _side_by_side(parts: list[Result]) -> list[dict[str, Any]]:
+    """Type B of each channel, with zeros for the others: taken as independent from channel to channel."""
+    size, out, at = sum(len(r.coefficients) for r in parts), [], 0
+    for r in parts:
+        n = len(r.coefficients)
+        for b in r.type_b:
+            changes = [[0.0] * at + list(c) + [0.0] * (size - at - n) for c in b["changes"]]
+            out.append({"source": b["source"], "changes": changes})
+        at += n
     return out
 
 

@@ -33,7 +33,7 @@ CONDITION = 100.0  # above this a warning names the weakest direction
 @dataclass(frozen=True)
 class Effect:
     """One source of type B: its standard uncertainty and the change (q,) of each estimate (SI) for one unit of it,
-    as :meth:`Findings.change` gives it.
+    as :meth:`Findings.change` gives it; (m, q) for m errors of this size that have nothing to do with one another.
     """
 
     source: str
@@ -41,6 +41,12 @@ class Effect:
     unit: str
     change: Array
     note: str = ""
+
+    @property
+    def sensitivity(self) -> Array:
+        """(q,) SI per unit of the source, without sign; independent errors add as squares."""
+        out: Array = np.sqrt(np.sum(np.square(np.atleast_2d(self.change)), axis=0))
+        return out
 
 
 def linear_result(
@@ -87,6 +93,7 @@ def linear_result(
         psd=found.psd(),
         harmonics=list(harmonics),
         budget=_budget(found, effects, random),
+        type_b=_type_b(found, effects),
         repeatability=dict(repeatability or {}),
         tables=[*_closed_table(found, closed_caption), *tables],
         warnings=[*said, *warnings],
@@ -110,7 +117,7 @@ def plus_minus(c: Coefficient) -> str:
 
 def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Limits) -> Coefficient:
     q, r = found.quantities[j], found.reported
-    contributions = [float(e.change[j]) * e.size for e in effects]
+    contributions = [float(e.sensitivity[j]) * e.size for e in effects]
     u, U = uncertainty.combine(float(r.u[j]), float(r.half_width[j]), contributions)
     limit = limits.get(q.title, limits.get(q.name))
     estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
@@ -133,6 +140,7 @@ def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Lim
         z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
         limit=limit,
         verdict=uncertainty.verdict(estimate, U_s, limit),
+        combination=dict(q.combination or {q.name: 1.0}),
     )
     return replace(c, z=None) if found.ideal else c  # u is rounding: nothing to compare with
 
@@ -144,13 +152,25 @@ def _budget(found: Findings, effects: Sequence[Effect], random: str) -> list[Bud
         u_a = float(found.u[j]) / q.scale
         lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
         for e in effects:
-            change = abs(float(e.change[j])) / q.scale
+            change = float(e.sensitivity[j]) / q.scale
             if e.size > 0.0 and change * e.size > 1e-9 * u_a:
                 per = q.unit if e.unit == "1" else f"{q.unit}/{e.unit}"
                 lines.append(
                     BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, q.unit, q.title, e.note)
                 )
     return lines
+
+
+def _type_b(found: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+    """The standard uncertainties of the sources with their signs, which the budget does not show: what one source does
+    to two estimates belongs together.
+    """
+    scale = np.array([q.scale for q in found.quantities])
+    return [
+        {"source": e.source, "changes": (np.atleast_2d(e.change) * e.size / scale).tolist()}
+        for e in effects
+        if e.size > 0.0
+    ]
 
 
 def _closed_table(found: Findings, caption: str) -> list[dict[str, Any]]:

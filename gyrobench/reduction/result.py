@@ -30,6 +30,7 @@ class Coefficient:
     z: float | None = None  # (estimate - truth) / u
     limit: tuple[float | None, float | None] | None = None
     verdict: str = "no specification given"  # pass | fail | inconclusive | no specification given
+    combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
 
 
 @dataclass
@@ -101,6 +102,7 @@ class Result:
     psd: dict[str, Any] = field(default_factory=dict)  # f, S; unit
     harmonics: list[dict[str, Any]] = field(default_factory=list)  # {"series", "n", "a", "b", "u"}
     budget: list[BudgetLine] = field(default_factory=list)
+    type_b: list[dict[str, Any]] = field(default_factory=list)  # {"source", "changes": independent parts x estimates}
     repeatability: dict[str, Any] = field(default_factory=dict)
     step_check: dict[str, Any] = field(default_factory=dict)  # {"step", "rows": [{name, change, u, ratio}], "worst"}
     tables: list[dict[str, Any]] = field(default_factory=list)  # method's own: {"title","caption","columns","rows"}
@@ -112,6 +114,7 @@ class Result:
     instrument: str = ""
     simulated: bool = True
     provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
+    suite: dict[str, Any] = field(default_factory=dict)  # of several tests: see gyrobench.reduction.suite
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)

@@ -118,7 +118,7 @@ def effects(
     """Type B: axis of the table, mount of the gyro on it, angle errors of order 1 and 2, time base.
 
     sizes: u_axis, u_mount, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The axis is set up
-    anew in each phase: the changes of the phases add as squares; so do the unknown phases of the angle errors.
+    anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
     columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
@@ -129,18 +129,14 @@ def effects(
         dX[rows] = (columns(other) - X)[rows]
         return found.change(dy, dX) / SMALL
 
-    def square(parts: Sequence[Array]) -> Array:
-        out: Array = np.sqrt(np.sum(np.square(parts), axis=0))
-        return out
-
     def axis(k: int) -> Array:
         tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
-        return square([moved(tilted, phase == p) for p in np.unique(phase)])
+        return np.array([moved(tilted, phase == p) for p in np.unique(phase)])
 
     def order(n: int) -> Array:
         length = held.t_end - held.t_start
         ends = n * held.angle_start, n * held.angle_end
-        return square([found.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
+        return np.array([found.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
 
     def unbalance() -> Array:
         down = held.axes @ np.array([0.0, 0.0, -site.g])
@@ -149,7 +145,7 @@ def effects(
             c, s = np.cos(a), np.sin(a)
             ends.append((c * down[:, 1] + s * down[:, 2], c * down[:, 2] - s * down[:, 1]))
         length = held.t_end - held.t_start
-        return square([found.change((late - early) / length) for early, late in zip(*ends, strict=True)])
+        return np.array([found.change((late - early) / length) for early, late in zip(*ends, strict=True)])
 
     def mount(k: int) -> Array:
         return moved(replace(held, body=frames.rotation(np.eye(3)[k], SMALL)))

@@ -61,7 +61,7 @@ def effects(
     quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
     return [
         Effect(
-            "attitude of each position", setup.u_attitude, "rad", np.sqrt(np.sum(alone**2, axis=0)),
+            "attitude of each position", setup.u_attitude, "rad", alone,
             "about each axis, the positions independent of one another",
         ),
         *(

@@ -145,11 +145,31 @@ def quantities(channel: str, setup: Setup, closed: Mapping[str, float]) -> list[
     for name in (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]:
         if name.startswith("D"):
             unit = units.display("deg/h/g2" if "−" in name else "deg/h/g")
-            found.append(Quantity(name, MEANING[name], unit, units.factor("deg/h"), true.get(name)))
+            found.append(
+                Quantity(
+                    name, MEANING[name], unit, units.factor("deg/h"), true.get(name), combination=made_of(name, setup)
+                )
+            )
         else:
             unit = "deg/h/mA" if name.startswith("k") else "deg/h"
-            found.append(Quantity.of(name, MEANING[name], unit, true.get(name), closed.get(name)))
+            q = Quantity.of(name, MEANING[name], unit, true.get(name), closed.get(name))
+            found.append(replace(q, combination=made_of(name, setup)))
     return found
+
+
+def made_of(name: str, setup: Setup) -> dict[str, float]:
+    """The coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
+    g = setup.gamma
+    return {
+        "R_x": {"Dy_0": 1.0},
+        "R_y": {"Dx_0": -1.0},
+        "u_zx": {"Dy_y": -g},
+        "u_zy": {"Dx_x": -g},
+        "u_y": {"Dy_z": g, "Dy_zz": -g * g},
+        "u_x": {"Dx_z": g, "Dx_zz": -g * g},
+        "Dy_yy − Dy_xx": {"Dy_yy": 1.0},
+        "Dx_xx − Dx_yy": {"Dx_xx": 1.0},
+    }.get(name, {name: 1.0})
 
 
 def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -> Findings:

@@ -12,7 +12,7 @@ Not modelled: drift slower than the record beyond what the trend test shows, cha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,9 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
     middle = (t0 + t1) / 2.0
     shown = Group("composite drift", np.arange(y.size), (middle - t0[0]) / 3600.0, "time", "h")
     wanted = Quantity.of("ω_d", "composite drift along the input axis in this attitude", "deg/h", true, book)
+    names = drift.terms(9)
+    share = drift.regressors(setup.xyz, names)
+    wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH)
     trend = found.f_test(
         "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -72,12 +72,16 @@ class Setup:
         """Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
         return float(self.attitude[axis] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
-    def true_drift(self, angle: float) -> float:
-        """Drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
+    def xyz(self, angle: float) -> Array:
+        """X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
         c, s = math.cos(angle), math.sin(angle)
         I, O, S = self.attitude  # noqa: E741
-        turned = np.array([I, c * O + s * S, c * S - s * O])
-        return float(drift.drift(turned @ -frames.U * self.gravity / frames.G0, self.truth or {}))
+        out: Array = np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0
+        return out
+
+    def true_drift(self, angle: float) -> float:
+        """Drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
+        return float(drift.drift(self.xyz(angle), self.truth or {}))
 
 
 def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
@@ -150,6 +154,9 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
     if setup.truth is not None:
         true = float(np.array([setup.true_drift(a) for a in between]) @ dt / span)
     wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, book)
+    names = drift.terms(9)
+    share = dt @ drift.regressors(np.array([setup.xyz(a) for a in between]), names) / span
+    wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
     found = fit([wanted], np.ones((y.size, 1)), y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH)
     used = float(np.max(np.abs(theta - null)))

@@ -72,14 +72,13 @@ class Model:
         share = site.g * math.sin(site.latitude)
 
         def one(name: str) -> Quantity:
-            true = None
-            if truth is not None:
-                held = sum(s * share**k * truth.get(n, 0.0) for n, s, k in self.mixed[name])
-                true = truth.get(name, 0.0) + held
+            made_of = {name: 1.0} | {n: s * share**k for n, s, k in self.mixed[name]}
+            true = None if truth is None else sum(x * truth.get(n, 0.0) for n, x in made_of.items())
             q = Quantity.drift(name, true, book.get(name))
             if not self.mixed[name]:
                 return q
-            return replace(q, meaning=f"{q.meaning}, with what one cannot tell from it", shown=self.words(name))
+            meaning = f"{q.meaning}, with what one cannot tell from it"
+            return replace(q, meaning=meaning, shown=self.words(name), combination=made_of)
 
         fitted = [one(n) for n in self.fitted]
         return fitted, [one(n) for n in self.names] if self.equal else fitted

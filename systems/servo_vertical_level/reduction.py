@@ -137,7 +137,7 @@ def _quantity(
     name: str, seen: refusals.Seen, book: Mapping[str, float], truth: Mapping[str, float] | None, g: float
 ) -> Quantity:
     true = None if truth is None else seen.truth(name, truth, g)
-    q = Quantity.drift(name, true, book.get(name))
+    q = replace(Quantity.drift(name, true, book.get(name)), combination=seen.combination(name, g))
     shown = seen.shown(name)
     return replace(q, meaning=f"{q.meaning}, with compliance in it", shown=shown) if shown else q
 

@@ -43,9 +43,13 @@ class Seen:
         words = [f"{'+' if s > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{n}" for n, s, k in self.mixed[name]]
         return " ".join([name, *words]) if words else ""
 
+    def combination(self, name: str, g: float) -> dict[str, float]:
+        """What an ideal record gives for ``name``: coefficients with their factors, per g0^n."""
+        return {name: 1.0} | {n: s * g**k for n, s, k in self.mixed[name]}
+
     def truth(self, name: str, true: Mapping[str, float], g: float) -> float:
         """What an ideal record gives for ``name``, rad/s per g0^n."""
-        return true.get(name, 0.0) + sum(s * g**k * true.get(n, 0.0) for n, s, k in self.mixed[name])
+        return sum(x * true.get(n, 0.0) for n, x in self.combination(name, g).items())
 
 
 def seen(attitudes: Sequence[str]) -> Seen:
