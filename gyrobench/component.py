@@ -76,7 +76,7 @@ class Component:
     version: ClassVar[str] = "1.0.0"
     integrator: ClassVar[str] = "exponential"  # or "rk4"
     rk4_substeps: ClassVar[int] = 20  # of one internal step
-    nonlinear: ClassVar[bool] = False  # True: A is taken anew at each internal step
+    nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
     declarations: ClassVar[dict[str, Declaration]] = {}
     layout: ClassVar[list[Scalar]] = []
     states: ClassVar[list[Scalar]] = []
@@ -351,7 +351,8 @@ class Component:
         if self.integrator == "rk4":
             self._advance_rk4(h)
             return
-        if self.nonlinear or h != self._phi_h:
+        anew = getattr(self, self.nonlinear) != 0.0 if isinstance(self.nonlinear, str) else self.nonlinear
+        if anew or h != self._phi_h:
             self._phi = phi1([[a * h for a in row] for row in self.jacobian()])
             self._phi_h = h
         f = self._flow()

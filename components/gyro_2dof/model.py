@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import clip, exp, fabs, pi, sqrt
+from gyrobench.math import clip, cos, exp, fabs, pi, sin, sqrt
 
 DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -35,18 +35,32 @@ class Gyro2dof(Component):
 
     Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses at once).  p, q = inertial rates of the rotor axis:
 
-        J_x p' = -H q - C_x (p - omega_x) + M_x,     M_x = +H (omega_dy + k_x i_x (1 + ...))
-        J_y q' = +H p - C_y (q - omega_y) + M_y,     M_y = -H (omega_dx + k_y i_y (1 + ...))
-        psi_x' = p - omega_x + omega_z psi_y,        psi_y' = q - omega_y - omega_z psi_x
+        J_x p' = -H q - C_x (p - omega_x) + T_x + M_x,     T_x = +H (omega_dy + k_x i_x (1 + ...))
+        J_y q' = +H p - C_y (q - omega_y) + T_y + M_y,     T_y = -H (omega_dx + k_y i_y (1 + ...))
+        psi_x' = p - omega_x + omega_z psi_y,              psi_y' = q - omega_y - omega_z psi_x
 
     undamped frequency H / sqrt(J_x J_y).  p and q are inertial: an angular acceleration of the case is no input.
+    M_x, M_y are torques from outside on outer and inner gimbal (without nutation they precess: M_x / H, -M_y / H).
 
-    Not modelled: reaction of the torques on the mount, gimbal angles beyond the small, gimbal stops, torquer axis
-    error, the share of omega_z in the angular momentum, ageing and temperature, vibration, hysteresis, warm-up.
-    Source: 000_791234d3afc34a0c.txt ch. 2 and 3 (wiring rule of 3.6); the dynamics are the spec's own minimal model.
+    Gimbals at full size, full = 1: a platform on the outer gimbal (power gyro, J_x with the load) [STAB-POWER-2DOF].
+    alpha = psi_x and beta = psi_y are then the angles of the gimbals, p the inertial rate of the outer one about x,
+    q that of the inner one about y, w = omega turned by alpha about x (the rate of the outer gimbal's y and z axes):
+
+        J_x p' = -H q cos(beta) - C_x alpha' + T_x + M_x                  alpha' = p - omega_x
+        J_y q' = +H (p cos(beta) - w_z sin(beta)) - C_y beta' + T_y + M_y  beta' = q - w_y
+
+    M_react = torque of the gyro on its mount, case axes: dampers and torquers about x and y, and the constraint
+    H q sin(beta) about the z axis of the outer gimbal.  The run ends where |beta| reaches `stop`.
+
+    Not modelled: small angles with full = 0; with full = 1 change of J_x with beta, inertia about z, coupling of the
+    base's acceleration through the inertias; torquer axis error, the share of omega_z in the angular momentum, ageing
+    and temperature, vibration, hysteresis, warm-up.
+    Source: 000_791234d3afc34a0c.txt ch. 2 and 3 (wiring rule of 3.6); the dynamics are the spec's own minimal model;
+    the power gyro 004_a44a05c7e88249d1.txt 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
+    nonlinear = "full"
 
     K_sg_x = Parameter(10.0, "V/rad", "gain of the x pickoff", above=0.0)
     K_sg_y = Parameter(10.0, "V/rad", "gain of the y pickoff", above=0.0)
@@ -59,11 +73,14 @@ class Gyro2dof(Component):
     k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
     mount = Parameter(IDENTITY, "1", "rows: gyro axes x, y, z in case axes")
 
-    H = Parameter(0.2, "N.m.s", "spin angular momentum (used with nutation only)", above=0.0)
+    H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
     J_x = Parameter(0.0, "kg.m2", "inertia of rotor and both gimbals about x; 0: no nutation", min=0.0)
     J_y = Parameter(0.0, "kg.m2", "inertia of rotor and inner gimbal about y; 0: no nutation", min=0.0)
     C_x = Parameter(0.0, "N.m.s/rad", "damping about x, rotor against case (with nutation)", min=0.0)
     C_y = Parameter(0.0, "N.m.s/rad", "damping about y, rotor against case (with nutation)", min=0.0)
+
+    full = Parameter(False, bool, "gimbal angles: 0 small, 1 at full size (with nutation)")
+    stop = Parameter(0.0, "rad", "stop of the inner gimbal: the run ends there (0: none)", min=0.0)
 
     terms_x = Parameter(9, int, "terms of the x channel: 8, 9 or 10")
     Dx_0 = Parameter(-0.3 * DEG_H, "rad/s", "x channel, constant drift (-0.3 deg/h)")
@@ -103,12 +120,17 @@ class Gyro2dof(Component):
     f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
     i_x = Input(0.0, "A", "current of the torquer about x (nulls u_y)")
     i_y = Input(0.0, "A", "current of the torquer about y (nulls u_x)")
+    M_x = Input(0.0, "N.m", "torque from outside on the outer gimbal about x")
+    M_y = Input(0.0, "N.m", "torque from outside on the inner gimbal about y")
 
     u_x = Output("V", "x pickoff: case against rotor about x")
     u_y = Output("V", "y pickoff: case against rotor about y")
     drift_x = Output("rad/s", "drift rate omega_dx, precession sign")
     drift_y = Output("rad/s", "drift rate omega_dy, precession sign")
     saturated = Output("1", "1 while a pickoff is saturated")
+    alpha = Output("rad", "angle of the outer gimbal, psi_x")
+    beta = Output("rad", "angle of the inner gimbal, psi_y")
+    M_react = Output("N.m", "torque of the gyro on its mount, case axes", shape=(3,))
 
     psi_x = State(0.0, "rad", "angle of the rotor axis against the case about x")
     psi_y = State(0.0, "rad", "angle of the rotor axis against the case about y")
@@ -121,6 +143,7 @@ class Gyro2dof(Component):
     fresh = Discrete(0.0, "1", "size of the innovation")
     h_last = Discrete(0.0, "s", "internal step they were made for")
     per_g = Discrete(0.0, "s2/m", "-1 / g0")
+    per_h = Discrete(0.0, "1/(N.m.s)", "1 / H")
 
     def start(self) -> None:
         n = self.terms_x
@@ -145,6 +168,11 @@ class Gyro2dof(Component):
             self.J_x == 0.0 and (self.C_x > 0.0 or self.C_y > 0.0),
             "C_x and C_y must be 0 without nutation (J_x = J_y = 0)",
         )
+        self.refuse(
+            self.full and self.J_x == 0.0,
+            "full = 1 (gimbals at full size) needs nutation: J_x and J_y above 0 kg.m2",
+        )
+        self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the inner gimbal must stop before pi/2 (gimbal lock)")
         for i in range(3):
             for j in range(3):
                 dot = 0.0 if i != j else -1.0
@@ -159,6 +187,7 @@ class Gyro2dof(Component):
         det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
         self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
         self.per_g = -1.0 / 9.80665
+        self.per_h = 1.0 / self.H
         self.wander_x = self.noise.markov_x
         self.wander_y = self.noise.markov_y
         self.h_last = 0.0
@@ -189,13 +218,27 @@ class Gyro2dof(Component):
         rate_y = drift_y + self.k_x * self.i_x * (1.0 + self.k2_x * self.i_x + self.k3_x * self.i_x * self.i_x)
         self.der.p = 0.0
         self.der.q = 0.0
-        if self.J_x > 0.0:
-            self.der.p = (self.H * (rate_y - self.q) - self.C_x * (self.p - w[0])) / self.J_x
-            self.der.q = (self.H * (self.p - rate_x) - self.C_y * (self.q - w[1])) / self.J_y
-            rate_x = self.p
-            rate_y = self.q
-        self.der.psi_x = rate_x - w[0] + w[2] * self.psi_y
-        self.der.psi_y = rate_y - w[1] - w[2] * self.psi_x
+        if self.full:
+            c = cos(self.psi_y)
+            w_y = w[1] * cos(self.psi_x) + w[2] * sin(self.psi_x)
+            w_z = w[2] * cos(self.psi_x) - w[1] * sin(self.psi_x)
+            outer = self.H * (rate_y - self.q * c) - self.C_x * (self.p - w[0])
+            inner = self.H * (self.p * c - w_z * sin(self.psi_y) - rate_x) - self.C_y * (self.q - w_y)
+            self.der.p = (outer + self.M_x) / self.J_x
+            self.der.q = (inner + self.M_y) / self.J_y
+            self.der.psi_x = self.p - w[0]
+            self.der.psi_y = self.q - w_y
+        else:
+            if self.J_x > 0.0:
+                self.der.p = (self.H * (rate_y - self.q) - self.C_x * (self.p - w[0]) + self.M_x) / self.J_x
+                self.der.q = (self.H * (self.p - rate_x) - self.C_y * (self.q - w[1]) + self.M_y) / self.J_y
+                rate_x = self.p
+                rate_y = self.q
+            else:
+                rate_x = rate_x - self.per_h * self.M_y
+                rate_y = rate_y + self.per_h * self.M_x
+            self.der.psi_x = rate_x - w[0] + w[2] * self.psi_y
+            self.der.psi_y = rate_y - w[1] - w[2] * self.psi_x
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -205,10 +248,16 @@ class Gyro2dof(Component):
             self.h_last = self.h
         self.wander_x = self.decay * self.wander_x + self.fresh * self.noise.markov_x
         self.wander_y = self.decay * self.wander_y + self.fresh * self.noise.markov_y
+        if self.full or self.stop > 0.0:
+            limit = self.stop if self.stop > 0.0 else 0.5 * pi
+            self.refuse(fabs(self.psi_y) >= limit, "the inner gimbal has reached its stop: beta = {psi_y} rad")
 
     def outputs(self) -> None:
+        w = [0.0, 0.0, 0.0]
         g = [0.0, 0.0, 0.0]
         for j in range(3):
+            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
+            w[j] = row + self.mount[j][2] * self.omega[2]
             row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
             g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
         self.drift_x = self.static_x(g[0], g[1], g[2]) + self.noise.turn_on_x + self.wander_x + self.noise.white_x
@@ -218,3 +267,28 @@ class Gyro2dof(Component):
         self.u_x = clip(wish_x, -self.u_max, self.u_max)
         self.u_y = clip(wish_y, -self.u_max, self.u_max)
         self.saturated = 1.0 if self.u_x != wish_x or self.u_y != wish_y else 0.0
+        self.alpha = self.psi_x
+        self.beta = self.psi_y
+        rate_x = self.drift_x + self.k_y * self.i_y * (1.0 + self.k2_y * self.i_y + self.k3_y * self.i_y * self.i_y)
+        rate_y = self.drift_y + self.k_x * self.i_x * (1.0 + self.k2_x * self.i_x + self.k3_x * self.i_x * self.i_x)
+        q = self.q if self.J_x > 0.0 else rate_y + self.per_h * self.M_x
+        c = 1.0
+        s = self.psi_x
+        tilt = self.psi_y
+        rate = w[1]  # of the outer gimbal about y
+        if self.full:
+            c = cos(self.psi_x)
+            s = sin(self.psi_x)
+            tilt = sin(self.psi_y)
+            rate = c * w[1] + s * w[2]
+        # axes of the outer gimbal: bearing x, bearing y of the inner gimbal, constraint about z
+        m_x = -self.H * rate_y
+        m_y = self.H * rate_x
+        m_z = self.H * q * tilt
+        if self.J_x > 0.0:
+            m_x = m_x + self.C_x * (self.p - w[0])
+            m_y = m_y + self.C_y * (q - rate)
+        side = c * m_y - s * m_z
+        m_z = s * m_y + c * m_z
+        for j in range(3):
+            self.M_react[j] = self.mount[0][j] * m_x + self.mount[1][j] * side + self.mount[2][j] * m_z

@@ -82,7 +82,7 @@ def c_source(cls: type[Component], guid: str) -> str:
         "N_Q": counts.get("discrete", 0),
         "N_PORTS": len(ports),
         "N_BOUNDS": len(bounds),
-        "NONLINEAR": int(cls.nonlinear),
+        "NONLINEAR": f"(p->n.v.{cls.nonlinear} != 0.0)" if isinstance(cls.nonlinear, str) else int(cls.nonlinear),
         "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
         "LARGEST_STEP(p, step)": "((p)->n.v.step)" if "step" in cls.declarations else "(step)",
     }
