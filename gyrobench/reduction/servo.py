@@ -79,11 +79,13 @@ def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
     return attitude.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
 
-def window_problems(windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]]) -> list[str]:
+def window_problems(
+    windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
+) -> list[str]:
     """What is wrong with the rows of the held phases, as sentences."""
-    if "flagged" in windows:  # what happened while the table was moved does not matter
-        windows = {**windows, "flagged": np.where(np.isin(windows["phase"], list(phases)), windows["flagged"], 0)}
-    found = checks.window_problems(windows, REQUIRED)
+    for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
+        windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
+    found = checks.window_problems(windows, required)
     if found:
         return found
     there = set(np.asarray(windows["phase"]).astype(int).tolist())
