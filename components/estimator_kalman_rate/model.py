@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
+from gyrobench.math import fabs, floor
+
+
+class EstimatorKalmanRate(Component):
+    """Kalman filter of a rate that wanders: value and slope, or a level alone.  [EST-KF-GEN, EST-KF-AR: GyroRateKf]
+
+        x = (value, slope),   F = [[1, T], [0, 1]],   H = [1 0],   T = Ts,   var of a reading R
+        G Q G' = q [[T3/3, T2/2], [T2/2, T]] + walk [[T, 0], [0, 0]]
+
+    q is the density of the white noise that drives the slope (integrated random walk), walk that of the white noise
+    that drives the value itself.  With q = 0 and P0_slope = 0 the slope stays 0 and the filter is that of the local
+    level: random walk plus white noise, the model that the drift data of the thesis supports.  At each reading
+
+        x- = F x,   P- = F P F' + G Q G'
+        y  = z - H x-,   S = H P- H' + R,   K = P- H' / S
+        x  = x- + K y,   P = (I - K H) P- (I - K H)' + K R K'      (Joseph form)
+
+    and with valid = 0 only the first line: the reading is missing.  nis = y2/S; variance = P_11 of the estimate.
+    q = 0.1 ... 0.5 is the spec's range for a rate of 1 Hz and 0.01 under noise of 1.643e-3 at 1 kHz (units of z).
+
+    Not modelled: a bias.  Rate and drift cannot be told apart from one gyro: a bias state needs a reference.
+    Source: EST-KF-GEN, EST-KF-AR (spec d3); 001_5d74e91bb8fa76be.txt eq. 4.2.1-4.2.18; the model is the spec's own.
+    """
+
+    version = "1.0.0"
+
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
+    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
+    q = Parameter(0.5, "1/s3", "density of the white noise that drives the slope, (unit of z)2/s3", min=0.0)
+    walk = Parameter(0.0, "1/s", "density of the white noise that drives the value, (unit of z)2/s", min=0.0)
+    R = Parameter(2.699449e-6, "1", "variance of the noise of one reading, (unit of z)2", above=0.0)
+    P0 = Parameter(1.0, "1", "variance of the value at the start, (unit of z)2", min=0.0)
+    P0_slope = Parameter(1.0, "1/s2", "variance of the slope at the start, (unit of z)2/s2", min=0.0)
+
+    z = Input(0.0, "1", "reading")
+    valid = Input(1.0, "1", "0: this reading is missing")
+
+    estimate = Output("1", "estimate of the value, unit of z")
+    variance = Output("1", "variance of the estimate, as the filter has it")
+    innovation = Output("1", "reading less its prediction; 0 where the reading is missing")
+    nis = Output("1", "innovation squared over its variance; 0 where the reading is missing")
+    latency = Output("s", "delay of the estimate")
+
+    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
+    every = Discrete(1.0, "1", "communication steps in a sampling period")
+    due = Discrete(1.0, "1", "communication steps until the next reading")
+    x = Discrete(0.0, "1", "value")
+    v = Discrete(0.0, "1/s", "slope")
+    P_xx = Discrete(0.0, "1", "variance of the value")
+    P_xv = Discrete(0.0, "1/s", "covariance of value and slope")
+    P_vv = Discrete(0.0, "1/s2", "variance of the slope")
+    y = Discrete(0.0, "1", "last innovation")
+    e = Discrete(0.0, "1", "last innovation squared over its variance")
+
+    def start(self) -> None:
+        self.x = 0.0
+        self.v = 0.0
+        self.P_xx = self.P0
+        self.P_xv = 0.0
+        self.P_vv = self.P0_slope
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if fabs(self.h - self.coupling) > 1e-9 * self.h:
+            self.coupling = self.h
+            self.every = floor(self.Ts / self.h + 0.5)
+            self.due = self.every
+            self.refuse(
+                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
+                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
+            )
+        self.due = self.due - 1.0
+        if self.due < 0.5:
+            self.due = self.every
+            T = self.Ts
+            self.x = self.x + T * self.v
+            self.P_xx = self.P_xx + T * (2.0 * self.P_xv + T * self.P_vv) + self.q * T * T * T / 3.0 + self.walk * T
+            self.P_xv = self.P_xv + T * self.P_vv + 0.5 * self.q * T * T
+            self.P_vv = self.P_vv + self.q * T
+            self.y = 0.0
+            self.e = 0.0
+            if self.valid > 0.5:
+                self.y = self.z - self.x
+                variance = self.P_xx + self.R
+                self.e = self.y * self.y / variance
+                k = self.P_xx / variance
+                g = self.P_xv / variance
+                self.x = self.x + k * self.y
+                self.v = self.v + g * self.y
+                a = 1.0 - k
+                xx = self.P_xx
+                xv = self.P_xv
+                self.P_xx = a * a * xx + k * k * self.R
+                self.P_xv = a * (xv - g * xx) + k * g * self.R
+                self.P_vv = self.P_vv - 2.0 * g * xv + g * g * xx + g * g * self.R
+
+    def outputs(self) -> None:
+        self.estimate = self.x
+        self.variance = self.P_xx
+        self.innovation = self.y
+        self.nis = self.e
+        self.latency = 0.0
