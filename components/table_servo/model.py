@@ -117,6 +117,7 @@ class TableServo(Component):
 
     x = Discrete(0.0, "rad", "angle at the end of the last step")
     v = Discrete(0.0, "rad/s", "rate there")
+    base_last = Discrete(0.0, "rad/s", "rate of the base about the axis at the end of the last step")
     arrived = Discrete(0.0, "1", "in position")
     t_last = Discrete(0.0, "s", "time of x, v")
     mode_last = Discrete(0.0, "1", "mode of the motion planned")
@@ -223,6 +224,7 @@ class TableServo(Component):
         self.x = self.angle0
         self.theta = self.angle0
         self.spin = self.earth(2)
+        self.base_last = self.earth(2)
         self.t_last = self.t
         for k in range(5):
             self.t_s[k] = self.t
@@ -241,7 +243,7 @@ class TableServo(Component):
         return m if self.shaper == 1.0 else m * fabs(m) / self.torque_max
 
     def flow(self) -> None:
-        slip = self.spin - self.earth(2)
+        slip = self.spin - 0.5 * (self.base_last + self.earth(2))  # a base that moves: its mean over the step
         volt = self.polarity * self.u if self.stage == FINE else 0.0
         fast = (volt - self.filt) / self.lag
         self.der.filt = fast
@@ -318,6 +320,7 @@ class TableServo(Component):
             self.t_last = self.t
             self.theta = self.x
             self.spin = self.earth(2) + self.v
+        self.base_last = self.earth(2)
 
     @sampled(every=1)
     def servo(self) -> None:

@@ -253,3 +253,18 @@ def test_refuses_commands(mode, target, message):
     part = kinematic(mode=mode, target=target)
     with pytest.raises(PartError, match=message):
         part.do_step(0.0, H)
+
+
+def test_base_whose_rate_changes():
+    """Spin stays 0 without torque, so x = -(integral of e); e = a t held at its end value in each step, as the input of
+    a table that stands on another one is.  The mean of both ends makes it exact: -a t2 / 2, where the end values alone
+    would give -a t (t + h) / 2.
+    """
+    part = TableServo(capture=0)
+    part.initialize()
+    part.mode = 3.0
+    h, a = 1e-3, 0.02
+    for k in range(500):
+        part.omega_local = [0.0, 0.0, a * (k + 1) * h]
+        part.do_step(k * h, h)
+    assert part.angle == pytest.approx(-a * 0.5**2 / 2.0, rel=1e-9)
