@@ -8,14 +8,17 @@ IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class FloatedGyro(Component):
-    """Single-degree-of-freedom floated rate-integrating gyro.  [GYRO-DYN-1, GYRO-STATIC-10, GYRO-COEFF-TIME-TEMP]
+    """Single-degree-of-freedom floated gyro.  [GYRO-DYN-1, GYRO-SDF-EOM, GYRO-STATIC-10, GYRO-COEFF-TIME-TEMP]
+
+    Rate-integrating with K = 0; integrating with C = 0 as well; with a spring K > 0 a rate gyro.
 
     Axes I, O, S (input, output, spin reference) are those of the mount: v_gyro = mount v_case.
 
-        b' = r,   J r' = -C r + H (w_I cos b - w_S sin b - omega_d - k i (1 + k2 i + k3 i2)) - J alpha_O
+        b' = r,   J r' = -C r - K b + H (w_I' - omega_d - k i (1 + k2 i + k3 i2)) - J alpha_O + M_dyn
         u = K_sg b + noise, limited to +-u_max                                 [seed eq. 2-50..2-56, DYN-CROSS]
 
-    b is the float angle.  In the steady state of a rebalance loop k i (1 + k2 i + k3 i2) = omega_IA - omega_d.
+    b is the float angle, w_I' = w_I cos b - w_S sin b, w_S' = w_I sin b + w_S cos b.  In the steady state of a
+    rebalance loop k i (1 + k2 i + k3 i2) = omega_IA - omega_d.
     Drift rate omega_d in precession sign, (X, Y, Z) = -f/g0 along I, O, S, g0 = 9.80665 m/s2   [2-36, 2-47..2-49]
 
         omega_d = F + X I + Y O + Z S + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
@@ -33,16 +36,34 @@ class FloatedGyro(Component):
     rms xi, stationary from the start, held over each internal step; white drift and pickoff noise by density.
     With the default sizes a 60 s mean scatters by 0.0030 deg/h (white 0.0023, Gauss-Markov 0.0019, pickoff 0.0002).
 
+    Dynamic errors, from Euler's equations of the float with its products of inertia J_xy = integral of x y dm; the
+    sign of the cross-coupling -H w_S b is that of w_I', the printed one is wrong            [GYRO-DYNAMIC-ERR]
+
+        M_dyn = dJ w_I' w_S' + J_IO (alpha_I' + w_O w_S') + J_OS (alpha_S' - w_O w_I') + J_SI (w_S'2 - w_I'2)
+
+    Torque on the mount, given in case axes: -H (w_O + r) cos b along I, C r + K b + H (omega_d + k i (1 + ...))
+    along O, +H (w_O + r) sin b along S.  With h_I = H sin b and M_I = -H w_O cos b it is M_I - h_I' along I: a mount
+    that keeps its momentum with h_I in it needs no acceleration of the float.  Computed with reaction = 1 only.
+    The run ends where |b| reaches `stop`.
+
     Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
-    vibration, hysteresis and warm-up, float stops (b goes on where the pickoff saturates), torquer axis error.
-    Source: 000_791234d3afc34a0c.txt ch. 2.
+    vibration, hysteresis and warm-up, contact of the float with its stop, torquer axis error; in M_react the float's
+    own inertia about I and S (count it with the mount).
+    Source: 000_791234d3afc34a0c.txt ch. 2; 001_5d74e91bb8fa76be.txt 2.1, 2.2.2.2 (corrected).
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
     J = Parameter(2e-4, "kg.m2", "float inertia about the output axis", above=0.0)
-    C = Parameter(0.2, "N.m.s/rad", "float damping", above=0.0)
+    C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
+    K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)
+    stop = Parameter(0.0, "rad", "float stop: the run ends there (0: none)", min=0.0)
+    dJ = Parameter(0.0, "kg.m2", "anisoinertia J_S - J_I of the float")
+    J_IO = Parameter(0.0, "kg.m2", "product of inertia of the float, I and O")
+    J_OS = Parameter(0.0, "kg.m2", "product of inertia of the float, O and S")
+    J_SI = Parameter(0.0, "kg.m2", "product of inertia of the float, S and I")
+    reaction = Parameter(False, bool, "1: M_react, h_I and M_I are computed; 0: they stay 0, which is quicker")
     K_sg = Parameter(10.0, "V/rad", "pickoff gain", above=0.0)
     u_max = Parameter(0.1, "V", "pickoff saturation", above=0.0)
     k = Parameter(17.2e3 * DEG_H, "rad/s/A", "torquer scale factor (17.2 deg/h/mA)", above=0.0)
@@ -87,6 +108,9 @@ class FloatedGyro(Component):
     drift = Output("rad/s", "drift rate omega_d, precession sign")
     b = Output("rad", "float angle")
     saturated = Output("1", "1 while the pickoff is saturated")
+    M_react = Output("N.m", "torque of the gyro on its mount, case axes", shape=(3,))
+    h_I = Output("N.m.s", "spin momentum along I, H sin b")
+    M_I = Output("N.m", "torque on the mount along I without its part -dh_I/dt")
 
     float_angle = State(0.0, "rad", "float angle b about O relative to the case")
     float_rate = State(0.0, "rad/s", "its rate r")
@@ -96,6 +120,7 @@ class FloatedGyro(Component):
     fresh = Discrete(0.0, "1", "size of its innovation")
     h_last = Discrete(0.0, "s", "internal step they were made for")
     per_g = Discrete(0.0, "s2/m", "-1 / g0")
+    dynamic = Discrete(0.0, "1", "1 where a dynamic error is given")
 
     def start(self) -> None:
         n = self.terms
@@ -126,6 +151,10 @@ class FloatedGyro(Component):
         self.per_g = -1.0 / 9.80665
         self.wander = self.noise.markov
         self.h_last = 0.0
+        self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the float must stop before pi/2")
+        self.dynamic = 0.0
+        if self.dJ != 0.0 or self.J_IO != 0.0 or self.J_OS != 0.0 or self.J_SI != 0.0:
+            self.dynamic = 1.0
 
     def static_drift(self, x, y, z):
         age = self.age + self.t
@@ -153,6 +182,19 @@ class FloatedGyro(Component):
         sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
         self.der.float_angle = self.float_rate
         torque = self.H * (sensed - drift - pull) - self.C * self.float_rate
+        if self.K > 0.0:
+            torque = torque - self.K * self.float_angle
+        if self.dynamic > 0.0:
+            c = cos(self.float_angle)
+            s = sin(self.float_angle)
+            row = self.mount[0][0] * self.alpha[0] + self.mount[0][1] * self.alpha[1]
+            a_i = row + self.mount[0][2] * self.alpha[2]
+            row = self.mount[2][0] * self.alpha[0] + self.mount[2][1] * self.alpha[1]
+            a_s = row + self.mount[2][2] * self.alpha[2]
+            spin = w[0] * s + w[2] * c
+            torque = torque + self.dJ * sensed * spin + self.J_SI * (spin * spin - sensed * sensed)
+            torque = torque + self.J_IO * (a_i * c - a_s * s + w[1] * spin)
+            torque = torque + self.J_OS * (a_i * s + a_s * c - w[1] * sensed)
         self.der.float_rate = torque / self.J - turn
 
     @sampled(every=1)
@@ -162,6 +204,8 @@ class FloatedGyro(Component):
             self.fresh = sqrt(1.0 - self.decay * self.decay)
             self.h_last = self.h
         self.wander = self.decay * self.wander + self.fresh * self.noise.markov
+        if self.stop > 0.0:
+            self.refuse(fabs(self.float_angle) >= self.stop, "the float has reached its stop: b = {float_angle} rad")
 
     def outputs(self) -> None:
         g = [0.0, 0.0, 0.0]
@@ -174,3 +218,16 @@ class FloatedGyro(Component):
         wish = self.K_sg * self.float_angle + self.noise.pickoff
         self.u = clip(wish, -self.u_max, self.u_max)
         self.saturated = 1.0 if self.u != wish else 0.0
+        if self.reaction:
+            w_o = self.mount[1][0] * self.omega[0] + self.mount[1][1] * self.omega[1]
+            w_o = w_o + self.mount[1][2] * self.omega[2]
+            s = self.H * sin(self.float_angle)
+            c = self.H * cos(self.float_angle)
+            turn = w_o + self.float_rate
+            pull = self.k * self.i * (1.0 + self.k2 * self.i + self.k3 * self.i * self.i)
+            along_o = self.C * self.float_rate + self.K * self.float_angle + self.H * (self.drift + pull)
+            for j in range(3):
+                row = self.mount[2][j] * s * turn - self.mount[0][j] * c * turn
+                self.M_react[j] = row + self.mount[1][j] * along_o
+            self.h_I = s
+            self.M_I = -c * w_o

@@ -319,7 +319,7 @@ def test_term_sets(terms, names):
         ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
         ({"H": 0.0}, "H = 0 N.m.s must be > 0"),
         ({"J": -1.0}, "J = -1 kg.m2 must be > 0"),
-        ({"C": 0.0}, "C = 0 N.m.s/rad must be > 0"),
+        ({"C": -0.1}, "C = -0.1 N.m.s/rad must be >= 0"),
         ({"K_sg": 0.0}, "K_sg = 0 V/rad must be > 0"),
         ({"k": 0.0}, "k = 0 rad/s/A must be > 0"),
         ({"u_max": 0.0}, "u_max = 0 V must be > 0"),
