@@ -1,0 +1,76 @@
+"""Type B lines of the two-axis servo test: what a wrong mount, table or clock does to each coefficient.
+
+Every source is put into angles, axes or times, the data are made again from it, and the change goes through the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames
+from gyrobench.reduction.method import Effect, Findings
+from gyrobench.reduction.recorded import Site
+
+from .windows import Track
+
+Array = NDArray[np.float64]
+SMALL = 1e-5  # rad, size of the perturbations
+SIZES = ("u_axis", "u_square", "u_mount", "u_angle1", "u_angle2", "u_time")
+AXES = ("outer", "inner")
+
+
+def effects(
+    channel: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: Site, names: tuple[str, ...],
+    sizes: Mapping[str, float],
+) -> list[Effect]:  # fmt: skip
+    """channel: 0 x, 1 y.  Each mount is set up by itself: its errors are independent of those of the others, and so are
+    sine and cosine of an angle error.
+    """
+    y, X = seen.inertial(site)[:, channel], seen.design(site, names)
+
+    def moved(other: Track, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        dy, dX = np.zeros_like(y), np.zeros_like(X)
+        dy[rows] = (other.inertial(site)[:, channel] - y)[rows]
+        dX[rows] = (other.design(site, names) - X)[rows]
+        return found.change(dy, dX) / SMALL
+
+    def mount(k: int) -> Array:
+        turned = replace(seen, base=frames.rotation(np.eye(3)[k], SMALL) @ seen.base)
+        return np.array([moved(turned, phase == p) for p in np.unique(phase)])
+
+    def read(axis: int, error: Callable[[Array], Array], slope: Callable[[Array], Array]) -> Array:
+        angle, rate = seen.angle.copy(), seen.rate.copy()
+        at = seen.angle[..., axis]
+        angle[..., axis] += SMALL * error(at)
+        rate[..., axis] += SMALL * slope(at) * seen.rate[..., axis]
+        return moved(replace(seen, angle=angle, rate=rate))
+
+    def order(axis: int, n: int) -> Array:
+        return np.array([
+            read(axis, lambda a: np.sin(n * a), lambda a: n * np.cos(n * a)),
+            read(axis, lambda a: np.cos(n * a), lambda a: -n * np.sin(n * a)),
+        ])  # fmt: skip
+
+    each = "each mount set up by itself"
+    out = [Effect(f"table set up, about {a}", sizes["u_axis"], "rad", mount(k), each) for k, a in enumerate("XYZ")]
+    out += [
+        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", moved(replace(seen, body=_body(k))))
+        for k, a in enumerate("xyz")
+    ]
+    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", moved(replace(seen, square=SMALL))))
+    for n, often in ((1, "once"), (2, "twice")):
+        out += [
+            Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder")
+            for k, name in enumerate(AXES)
+        ]
+    slow = replace(seen, rate=(1.0 - SMALL) * seen.rate)
+    return [*out, Effect("time base", sizes["u_time"], "1", moved(slow), "relative")]
+
+
+def _body(k: int) -> Array:
+    """The gyro turned by SMALL about an axis of the plate: rows are its axes."""
+    return frames.rotation(np.eye(3)[k], SMALL).T

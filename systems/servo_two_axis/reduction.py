@@ -1,0 +1,266 @@
+"""Reduction of the two-axis servo test: drift coefficients of both channels from the angles of both table axes.
+
+    x channel   x' cos y + e . (A row 1) = omega_dx        y channel   y' + e . (A row 2) = omega_dy      [eq. 3-97]
+
+Each channel is a least squares problem of its own over all windows; rates and regressors are averaged over the window
+(windows.py), the noise (white, Gauss-Markov, errors of shared readings) is estimated from the same record.  The book's
+route, its formulas at the middles of the windows, stands beside.  [TEST-SERVO2-2DOF]
+
+Not modelled: change of the coefficients with time (mount against mount shows it), noise common to both channels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, units
+from gyrobench.reduction import recorded, servo
+from gyrobench.reduction.merge import merge
+from gyrobench.reduction.method import Findings, Group, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.result import Result
+
+from . import budget, closed, geometry, refusals
+from .windows import ANGLES, Track, track
+
+__all__ = ["ReductionError", "from_record"]
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+DPH = units.factor("deg/h")
+REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """Coefficients of both channels of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    meta = record.meta
+    options, site = dict(meta.get("options", {})), recorded.Site.of(meta)
+    terms = int(options.get("terms", 9))
+    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    known = {f"mount {m}": m for m in geometry.MOUNTS}
+    wrong = [f"phase {p}: '{n}' is none of the mounts {', '.join(known)}" for p, n in labels.items() if n not in known]
+    wrong = wrong or servo.window_problems(record.windows, {p: {"label": n} for p, n in labels.items()}, REQUIRED)
+    if wrong:
+        raise ReductionError(wrong)
+    every = np.asarray(record.windows["phase"]).astype(int)
+    held = np.isin(every, list(labels))
+    w = {c: np.asarray(record.windows[c], dtype=float)[held] for c in REQUIRED}
+    phase = every[held]
+    mount = np.array([known[labels[p]] for p in phase.tolist()])
+    seen = track(w, phase, np.array([geometry.base(m, site.latitude) for m in mount.tolist()]))
+    X = {c: seen.design(site, drift.terms_2dof(c, terms)) for c in "xy"}
+    wrong = _problems(record.windows, held, w, meta, X, terms, sorted(set(mount.tolist())), site)
+    if wrong:
+        raise ReductionError(wrong)
+    rates = seen.inertial(site)
+    middle = seen.middle()
+    book = closed.reduce(*middle, mount, site.latitude, site.g, site.earth_rate, terms)
+    truth = recorded.truth_of(meta, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
+    results: dict[str, Result] = {}
+    found: dict[str, Findings] = {}
+    for j, c in enumerate("xy"):
+        quantities = [Quantity.drift(n, (truth or {}).get(n), book[n]) for n in drift.terms_2dof(c, terms)]
+        found[c] = fit(
+            quantities, X[c], rates[:, j], seen.t_start, seen.t_end, _groups(phase, labels, seen), "drift rate", "°/h",
+            DPH, noise="readings", limit=1e6,
+        )  # fmt: skip
+        _mount_test(found[c], phase)
+        results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, meta, terms, truth, specification)
+    tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]
+    k = refusals.condition(X)
+    warnings = []
+    if k > refusals.WARN:
+        weak = [f"{refusals.regression.examine(v, drift.terms_2dof(c, terms)).weakest} ({c})" for c, v in X.items()]
+        which = " ".join(str(m) for m in dict.fromkeys(mount.tolist()))
+        warnings.append(f"Mounts {which}: condition {k:.3g} of the coefficients per g; hardly seen: {', '.join(weak)}.")
+    result = merge(results, tables=[t for t in tables if t["rows"]], warnings=warnings)
+    first = {c: results[f"{c} channel"].coefficients for c in "xy"}
+    linear = max((q for q in result.coefficients if q.unit == "°/h/g"), key=lambda q: abs(q.estimate))
+    result.summary = [
+        f"Constant drift {' and '.join(f'{v[0].name} = {plus_minus(v[0])}' for v in first.values())}.",
+        f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
+        " ".join(f"{c} channel: {found[c].noise_sentence()}" for c in "xy"),
+    ]
+    return recorded.finish(result, record)
+
+
+def _problems(
+    windows: Mapping[str, Array], held: NDArray[np.bool_], w: Mapping[str, Array], meta: Mapping[str, Any],
+    X: Mapping[str, Array], terms: int, mounts: list[int], site: recorded.Site,
+) -> list[str]:  # fmt: skip
+    """Why the rows cannot be reduced: gimbal lock, tracking, rank."""
+    found = []
+    inner = np.concatenate([w["inner_start"], w["inner_end"]])
+    worst = float(inner[np.argmin(np.cos(inner))])
+    if math.cos(worst) < geometry.LEAST:
+        found.append(
+            f"gimbal lock: the inner angle reaches {math.degrees(worst):.4g}°, "
+            f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; leave out the windows beyond"
+        )
+    limit = float(meta.get("options", {}).get("tracking", servo.TRACKING))
+    for a in "xy":
+        gain = meta.get("parameters", {}).get(f"gyro.K_sg_{a}", 0.0)
+        part = {k: windows[f"{k}_{a}"] for k in ("mean", "std") if f"{k}_{a}" in windows}
+        if len(part) == 2:
+            known = {"gyro.K_sg": gain, "gyro.H": 1.0, "gyro.C": 1.0}  # a pickoff reads the angle itself
+            found += [f"{a} axis: {text}" for text in servo.tracking_problems(part, held, known, limit)]
+    for c, x in X.items():
+        seen = refusals.regression.examine(x, drift.terms_2dof(c, terms))
+        if seen.lost:
+            found.append(
+                f"{c} channel: rank {seen.rank} of {x.shape[1]}, the record does not see {'; '.join(seen.lost)}"
+            )
+    most = refusals.MOST_SINGLE if len(mounts) == 1 else refusals.MOST
+    if not found and (k := refusals.condition(X)) > most:
+        found.append(f"mounts {' '.join(map(str, mounts))}: condition {k:.3g}, {most:g} is allowed: add another mount")
+    return found
+
+
+def _channel(
+    c: str, j: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: recorded.Site,
+    meta: Mapping[str, Any], terms: int, truth: Mapping[str, float] | None, specification: Limits | None,
+) -> Result:  # fmt: skip
+    names = drift.terms_2dof(c, terms)
+    warnings = []
+    missing = [n for n in drift.NAMES_2DOF[c] if n not in names and (truth or {}).get(n, 0.0)]
+    if missing:
+        warnings.append(f"{', '.join(missing)} is simulated but not in the {terms}-term model: the others are biased.")
+    return linear_result(
+        found,
+        system="servo_two_axis",
+        title="Two-axis servo test of a two-degree-of-freedom gyro",
+        method="The gyro holds a two-axis table still among the stars; least squares of each channel over all windows "
+        "under an estimated noise model with shared angle readings [TEST-SERVO2-2DOF]",
+        sources=[
+            "TEST-SERVO2-2DOF, SERVO2-A, SERVO2-KIN, APP2; 000_791234d3afc34a0c.txt eq. 3-94..3-102 and appendix 2, "
+            "corrected by E47, E50, E51",
+            "GYRO-STATIC-2DOF; 000_791234d3afc34a0c.txt eq. 2-29..2-46",
+            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+        ],
+        equation=_equation(c, names),
+        conventions=CONVENTIONS,
+        effects=budget.effects(j, found, seen, phase, site, names, recorded.sizes(meta, budget.SIZES)),
+        specification=specification,
+        site=site.shown(),
+        instrument=str(meta.get("instrument", "")),
+        simulated=truth is not None,
+        closed_caption="The book's formulas at the middles of the same windows, ordinary least squares",
+        warnings=warnings,
+    )  # fmt: skip
+
+
+CONVENTIONS = (
+    "Drift ω_d in precession sign: inertial rate of the plate along the gyro's x and y axes; the book's ω_M = −ω_dx.",
+    "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (book sign: a body axis that points up "
+    "reads −1); g0 = 9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+    "Outer angle x right-handed about X, inner angle y about Y of the mount; gyro x along X, y along Y at 0, 0; local "
+    "frame east, north, up. Torquers idle while the gyro holds the table; the turn about z is not controlled.",
+)
+
+
+def _groups(phase: NDArray[np.int_], labels: Mapping[int, str], seen: Track) -> list[Group]:
+    """Drift against time in each mount."""
+    middle, out = (seen.t_start + seen.t_end) / 2.0, []
+    for p, label in labels.items():
+        rows = phase == p
+        name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
+        out.append(Group(name, rows, (middle[rows] - seen.t_start[rows][0]) / 3600.0, "time in the mount", "h"))
+    return out
+
+
+def _mount_test(found: Findings, phase: NDArray[np.int_]) -> None:
+    """Is the constant drift that of the first mount in all others?"""
+    others = np.unique(phase)[1:]
+    if others.size:
+        columns = (phase[:, None] == others).astype(float)
+        found.f_test(
+            "mount to mount", columns, "change of the constant drift between mounts",
+            "the constant drift is not the same in all mounts: turn-on, warm-up, or a mount that is not true",
+            "constant drift alike in all mounts",
+        )  # fmt: skip
+
+
+def _mounts_table(
+    phase: NDArray[np.int_], labels: Mapping[int, str], seen: Track, found: Mapping[str, Findings],
+    mount: NDArray[np.int_], site: recorded.Site,
+) -> dict[str, Any]:  # fmt: skip
+    rows: list[list[Any]] = []
+    for p, label in labels.items():
+        k = phase == p
+        time = float(seen.t_end[k][-1] - seen.t_start[k][0])
+        zero = refusals.locked(int(mount[k][0]), site.latitude, time, site.earth_rate)
+        outer = seen.angle[k][..., 0]
+        scatter = [float(np.std(found[c].est.residual[k])) / DPH for c in "xy"]
+        rows.append([
+            label, p, int(k.sum()), time / 3600.0, math.degrees(float(outer[-1, -1] - outer[0, 0])),
+            math.degrees(float(np.max(np.abs(seen.angle[k][..., 1])))), math.degrees(zero), *scatter,
+        ])  # fmt: skip
+    return {
+        "title": "Mounts",
+        "caption": "Turn of the outer axis, largest inner angle and that of a gyro without drift; scatter of residuals",
+        "columns": [
+            "mount", "phase", "windows", "time / h", "outer / °", "inner / °", "no drift / °", "x / (°/h)", "y / (°/h)",
+        ],
+        "rows": rows,
+    }  # fmt: skip
+
+
+def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
+    """The estimates in the book's names: torque sign in the first line of 3-95, precession sign in the second."""
+    rows: list[list[Any]] = []
+    for c in "xy":
+        at = {q.name: k for k, q in enumerate(found[c].quantities)}
+        for symbol, (ours, sign) in closed.BOOK[c].items():
+            q, k = found[c].quantities[at[ours]], at[ours]
+            value, u = float(found[c].value[k]) / q.scale, float(found[c].u[k]) / q.scale
+            rows.append([f"{symbol}, {c}", sign * value, u, q.unit, ours, "+" if sign > 0 else "−"])
+    return {
+        "title": "In the book's names",
+        "caption": "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign of the book's against ours",
+        "columns": ["book", "estimate", "u of type A", "unit", "ours", "sign"],
+        "rows": rows,
+    }
+
+
+def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
+    """K_zx and K_zy appear in both channels; they must agree where they have a rigid-body cause.  [STATIC-DRIFT]"""
+    rows: list[list[Any]] = []
+    for symbol in ("K_zx", "K_zy"):
+        pair = []
+        for c in "xy":
+            ours, sign = closed.BOOK[c][symbol]
+            k = [q.name for q in found[c].quantities].index(ours)
+            pair.append((sign * float(found[c].value[k]) / DPH, float(found[c].u[k]) / DPH))
+        (a, ua), (b, ub) = pair
+        both = 2.0 * math.hypot(ua, ub)
+        rows.append([symbol, a, b, a - b, (a - b) / both if both > 0.0 else 0.0])
+    if any(f.ideal for f in found.values()):
+        rows = [[*row[:4], "–"] for row in rows]
+    return {
+        "title": "Compliances seen by both channels",
+        "caption": "E_n: difference over its expanded uncertainty (type A); below 1 in size they agree",
+        "columns": ["book", "x channel / (°/h/g²)", "y channel / (°/h/g²)", "difference", "E_n"],
+        "rows": rows,
+    }
+
+
+def _equation(c: str, names: tuple[str, ...]) -> str:
+    parts = []
+    for n in names:
+        axes = n.split("_")[1]
+        if axes == "0":
+            parts.append(f'D_"{c}0"')
+            continue
+        upper = axes.upper()
+        power = f"{upper[0]}^2" if len(axes) == 2 and axes[0] == axes[1] else " ".join(upper)
+        parts.append(f'D_"{c},{axes}" {power}')
+    left = (
+        "dot(x) cos y + omega_X cos y + omega_Y sin x sin y - omega_Z cos x sin y"
+        if c == "x"
+        else "dot(y) + omega_Y cos x + omega_Z sin x"
+    )
+    return f'{left} = omega_"d{c}" = {" + ".join(parts)}'

@@ -1,0 +1,105 @@
+"""What a gyro on a two-axis servo table sees, averaged over each window between two readings of both angles.
+
+Between the readings the angles follow a spline of fifth order through all readings of a stretch of windows that follow
+one another; rates come from it, so that the mean of x' cos y over a window is what was turned, and neighbouring windows
+share a reading.  Averages are Gauss-Legendre sums over 8 nodes in time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from gyrobench import drift, frames
+from gyrobench.reduction.recorded import Site
+
+from . import geometry
+
+Array = NDArray[np.float64]
+NODES, WEIGHTS = leggauss(8)
+WEIGHTS = WEIGHTS / 2.0
+#: value at the middle of a polynomial through the nodes
+MIDDLE = np.array([np.prod([-b / (a - b) for b in NODES if b != a]) for a in NODES])
+ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")
+
+
+@dataclass(frozen=True)
+class Track:
+    """Angles and rates of both axes at the nodes (n, nodes, 2), rad and rad/s, rows X, Y, Z of the mount of each window
+    in ENU (n, 3, 3), times (n,) s.  body: gyro axes in those of the plate.  square: the inner axis turned about Z.
+    """
+
+    angle: Array
+    rate: Array
+    base: Array
+    t_start: Array
+    t_end: Array
+    body: Array | None = None
+    square: float = 0.0
+
+    def axes(self) -> Array:
+        """Gyro axes x, y, z (rows) in those of the mount (n, nodes, 3, 3)."""
+        x, y = self.angle[..., 0], self.angle[..., 1]
+        A = geometry.attitude(x, y)
+        if self.square:
+            A = geometry.attitude(0.0 * x, y) @ frames.passive_z(self.square) @ geometry.attitude(x, 0.0 * y)
+        return A if self.body is None else np.asarray(self.body @ A)
+
+    def inertial(self, site: Site) -> Array:
+        """Means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
+        earth = self.base @ frames.earth_rate_local(site.latitude, site.earth_rate)
+        A = self.axes()
+        inner = np.eye(3) if self.body is None else self.body
+        moved = A @ earth[:, None, :, None]
+        x_axis = A[..., :, 0]  # the outer axis X in gyro axes
+        total = moved[..., 0] + self.rate[..., 0, None] * x_axis + self.rate[..., 1, None] * inner[:, 1]
+        return average(total)
+
+    def middle(self) -> tuple[Array, Array, Array, Array]:
+        """Outer and inner angle and their rates at the middle of each window, (n,) each."""
+        at = np.concatenate([self.angle, self.rate], axis=2)
+        x, y, x_rate, y_rate = np.einsum("nkj,k->jn", at, MIDDLE)
+        return x, y, x_rate, y_rate
+
+    def force(self, site: Site) -> Array:
+        """-f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
+        down = self.base @ np.array([0.0, 0.0, -site.g])
+        out: Array = (self.axes() @ down[:, None, :, None])[..., 0]
+        return out
+
+    def design(self, site: Site, names: tuple[str, ...]) -> Array:
+        """Means (n, p) of the regressors ``names`` of a channel."""
+        return average(drift.regressors(self.force(site), names))
+
+
+def average(values: Array) -> Array:
+    """Mean over the nodes (axis 1)."""
+    out: Array = np.einsum("nk...,k->n...", values, WEIGHTS)
+    return out
+
+
+def stretches(t_start: Array, t_end: Array, phase: NDArray[np.int_]) -> list[NDArray[np.int_]]:
+    """Indices of windows that follow one another without a gap in the same phase."""
+    gap = (np.abs(t_start[1:] - t_end[:-1]) > 1e-6 * (t_end[1:] - t_start[1:])) | (phase[1:] != phase[:-1])
+    return np.split(np.arange(phase.size), np.flatnonzero(gap) + 1)
+
+
+def track(windows: Mapping[str, Array], phase: NDArray[np.int_], base: Array) -> Track:
+    """From the columns ANGLES, t_start, t_end of the rows of held phases (n,)."""
+    t0, t1 = windows["t_start"], windows["t_end"]
+    n = phase.size
+    angle, rate = np.empty((n, NODES.size, 2)), np.empty((n, NODES.size, 2))
+    for rows in stretches(t0, t1, phase):
+        knots = np.concatenate([t0[rows], t1[rows[-1:]]])
+        at = (t0[rows] + t1[rows])[:, None] / 2.0 + (t1[rows] - t0[rows])[:, None] / 2.0 * NODES
+        k = 5 if knots.size > 5 else 3 if knots.size > 3 else 1
+        for j, name in enumerate(("outer", "inner")):
+            read = np.concatenate([windows[f"{name}_start"][rows], windows[f"{name}_end"][rows[-1:]]])
+            spline = make_interp_spline(knots - knots[0], read, k)
+            angle[rows, :, j], rate[rows, :, j] = spline(at - knots[0]), spline(at - knots[0], 1)
+    return Track(angle, rate, base, t0, t1)
