@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import Bench
+from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
 from gyrobench.system.sockets import Socket
 from gyrobench.system.values import ValueProblem, flatten, parse
@@ -158,8 +159,8 @@ class System:
         return copy
 
     # ------------------------------------------------------------ to be given by the system
-    def plan(self) -> Plan:
-        """The phases; a system without a sequencer has none."""
+    def plan(self) -> Plan | LoopPlan:
+        """The phases; a system without a sequencer or an exciter has none."""
         return Plan()
 
     def parameters(self) -> dict[str, Any]:
