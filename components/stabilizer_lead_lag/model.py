@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Input, Output, Parameter, State
+from gyrobench.math import clip
+
+
+class StabilizerLeadLag(Component):
+    """Stabilizer loop: lag and lead network with amplifier, gyro signal in, motor voltage out.  [STAB-FLOATED-2DOF]
+
+        e = u + test                    v = -G(s) e, limited to +-v_max
+        G = K (1 + tau1 s)(1 + tau2 s) / ((1 + T1 s)(1 + T2 s)) (1 + integral / s)
+
+    The lag (tau1 < T1) keeps the gain at rest and takes it back by tau1/T1 above; the lead (tau2 > T2) lifts the phase
+    about the crossover.  The text's order is T1 > tau1 > tau2 > T2; `unordered` is 1 where it does not hold.  With a
+    finite T1 the error at rest is not zero, as the text says, but M / (K_m K_x K): that takes integral > 0.  With
+    tau1 = T1 and tau2 = T2 what is left is K (1 + integral / s).  While v is limited and e pushes further, the integral
+    waits (no wind-up).
+
+    Not modelled: bandwidth, offset and noise of the amplifier; a rate command (it goes to the torquer of the gyro).
+    Source: 004_a44a05c7e88249d1.txt eq. 5-25, 5-26; spec d4, 4; integral: F of spec d3, PLATFORM-1AXIS.
+    """
+
+    version = "1.0.0"
+
+    K = Parameter(2.0, "1", "gain at rest, voltage per voltage", above=0.0)
+    tau1 = Parameter(0.2, "s", "lag: time constant of the numerator", min=0.0)
+    T1 = Parameter(2.0, "s", "lag: time constant of the denominator", above=0.0)
+    tau2 = Parameter(0.03, "s", "lead: time constant of the numerator", min=0.0)
+    T2 = Parameter(0.003, "s", "lead: time constant of the denominator", above=0.0)
+    integral = Parameter(0.0, "1/s", "corner of the integral part; 0: none", min=0.0)
+    v_max = Parameter(27.0, "V", "largest voltage", above=0.0)
+
+    u = Input(0.0, "V", "gyro signal")
+    test = Input(0.0, "V", "test signal added to it")
+
+    v = Output("V", "voltage of the torque motor")
+    e = Output("V", "the signal inside the loop, u + test")
+    saturated = Output("1", "1 while the voltage is limited")
+    unordered = Output("1", "1 where T1 > tau1 > tau2 > T2 does not hold")
+
+    lag = State(0.0, "V", "state of the lag network")
+    lead = State(0.0, "V", "state of the lead network")
+    sum = State(0.0, "V", "integral part")
+
+    def after_lag(self):
+        return self.lag + self.tau1 / self.T1 * (self.u + self.test - self.lag)
+
+    def after_lead(self):
+        return self.lead + self.tau2 / self.T2 * (self.after_lag() - self.lead)
+
+    def flow(self) -> None:
+        self.der.lag = (self.u + self.test - self.lag) / self.T1
+        self.der.lead = (self.after_lag() - self.lead) / self.T2
+        y = self.after_lead()
+        wish = -self.K * (y + self.sum)
+        self.der.sum = self.integral * y
+        if (wish > self.v_max and y < 0.0) or (wish < -self.v_max and y > 0.0):
+            self.der.sum = 0.0
+        if self.integral == 0.0:
+            self.der.sum = -self.sum  # stays 0, and leaves no pole at 0 in the linearization
+
+    def outputs(self) -> None:
+        self.e = self.u + self.test
+        wish = -self.K * (self.after_lead() + self.sum)
+        self.v = clip(wish, -self.v_max, self.v_max)
+        self.saturated = 1.0 if self.v != wish else 0.0
+        self.unordered = 0.0 if self.tau1 < self.T1 and self.tau2 < self.tau1 and self.tau2 > self.T2 else 1.0
