@@ -103,7 +103,7 @@ class EstimatorSageHusa(Component):
         self.refuse(
             stationary < 0.5 and turned > 0.5,
             "phi is not stationary, but with its signs turned it is: arburg (MATLAB, spectrum) returns a = -phi, phi "
-            "here is that of x_t = sum phi_i x_{t-i} + w_t: give phi = -a",
+            "here is that of x_t = sum phi_i x_(t-i) + w_t: give phi = -a",
         )
         self.refuse(
             stationary < 0.5,

@@ -1,0 +1,115 @@
+"""Plays a series of readings through an estimator (its native FMU)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gyrobench.packaging.instance import make
+
+Array = np.ndarray[Any, Any]
+AR3 = (-0.7466, -0.5044, -0.2538)  # table 3.4.2 of the thesis with its sign put right
+SIGMA2 = 3.3697e-6  # its innovation variance
+
+
+def arrays(parameters: dict[str, Any]) -> dict[str, float]:
+    """phi=[a, b] as phi[1] ... phi[5]."""
+    found: dict[str, float] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Sequence):
+            found |= {f"{name}[{i + 1}]": float(x) for i, x in enumerate([*value, *[0.0] * (5 - len(value))])}
+        else:
+            found[name] = float(value)
+    return found
+
+
+def play(
+    part: str,
+    z: Array | Sequence[float],
+    outputs: str | Sequence[str] = "estimate",
+    *,
+    T: float = 1e-3,
+    valid: Array | None = None,
+    target: str = "native",
+    **parameters: Any,
+) -> Array:
+    """Outputs after each reading: (n,) for one output, (n, m) for a list; T: communication step, s."""
+    names = [outputs] if isinstance(outputs, str) else list(outputs)
+    one = make(part, target)
+    try:
+        one.set(arrays(parameters))
+        one.initialize(0.0)
+        found = np.empty((len(z), len(names)))
+        for k, x in enumerate(z):
+            one.set({"z": float(x)} if valid is None else {"z": float(x), "valid": float(valid[k])})
+            one.step(k * T, T)
+            found[k] = one.get(names)
+    finally:
+        one.free()
+    return found[:, 0] if isinstance(outputs, str) else found
+
+
+def companion(phi: Sequence[float], Q: float) -> tuple[Array, Array]:
+    """Transition matrix and process covariance of x_t = sum phi_i x_{t-i} + w_t, var w = Q."""
+    p = len(phi)
+    F = np.zeros((p, p))
+    F[0] = phi
+    F[1:, :-1] = np.eye(p - 1)
+    G = np.zeros((p, p))
+    G[0, 0] = Q
+    return F, G
+
+
+def rate_model(q: float, T: float, walk: float = 0.0) -> tuple[Array, Array]:
+    """The same of value and slope, slope driven by white noise of density q, value by one of density walk."""
+    G = q * np.array([[T**3 / 3.0, T**2 / 2.0], [T**2 / 2.0, T]])
+    G[0, 0] += walk * T
+    return np.array([[1.0, T], [0.0, 1.0]]), G
+
+
+def kalman(z: Array, F: Array, G: Array, R: float, P0: Array, valid: Array | None = None) -> Array:
+    """(n, 4): estimate, variance, innovation, nis of the textbook filter in matrices, H = [1 0 ... 0]."""
+    n = len(F)
+    H = np.eye(1, n)
+    x, P = np.zeros((n, 1)), np.array(P0, dtype=float)
+    found = []
+    for k, reading in enumerate(z):
+        x, P = F @ x, F @ P @ F.T + G
+        y = e = 0.0
+        if valid is None or valid[k]:
+            S = float((H @ P @ H.T)[0, 0]) + R
+            K = P @ H.T / S
+            y = float(reading - (H @ x)[0, 0])
+            e = y * y / S
+            x = x + K * y
+            P = (np.eye(n) - K @ H) @ P @ (np.eye(n) - K @ H).T + K @ K.T * R
+        found.append((x[0, 0], P[0, 0], y, e))
+    return np.array(found)
+
+
+def riccati(F: Array, G: Array, R: float) -> tuple[float, float]:
+    """Steady gain of the first state and variance of its estimate, from scipy's solve_discrete_are."""
+    from scipy.linalg import solve_discrete_are
+
+    H = np.eye(1, len(F))
+    P = solve_discrete_are(F.T, H.T, G, np.array([[R]]))
+    gain = float(P[0, 0] / (P[0, 0] + R))
+    return gain, gain * R  # P+ = P- R / (P- + R)
+
+
+def autoregressive(rng: np.random.Generator, n: int, Q: float, phi: Sequence[float] = AR3) -> Array:
+    """A stationary series of n values."""
+    from scipy.signal import lfilter
+
+    w = rng.normal(size=n + 500) * np.sqrt(Q)
+    return np.asarray(lfilter([1.0], [1.0, *(-c for c in phi)], w)[500:])
+
+
+def rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+def decibel(x: Array, of: float) -> float:
+    return float(20.0 * np.log10(rms(x) / of))
