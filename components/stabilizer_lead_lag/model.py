@@ -7,7 +7,7 @@ from gyrobench.math import clip
 class StabilizerLeadLag(Component):
     """Stabilizer loop: lag and lead network with amplifier, gyro signal in, motor voltage out.  [STAB-FLOATED-2DOF]
 
-        e = u + test                    v = -G(s) e, limited to +-v_max
+        e = u + test                    v = -G(s) (e - K_u command), limited to +-v_max
         G = K (1 + tau1 s)(1 + tau2 s) / ((1 + T1 s)(1 + T2 s)) (1 + integral / s)
 
     The lag (tau1 < T1) keeps the gain at rest and takes it back by tau1/T1 above; the lead (tau2 > T2) lifts the phase
@@ -16,7 +16,9 @@ class StabilizerLeadLag(Component):
     tau1 = T1 and tau2 = T2 what is left is K (1 + integral / s).  While v is limited and e pushes further, the integral
     waits (no wind-up).
 
-    Not modelled: bandwidth, offset and noise of the amplifier; a rate command (it goes to the torquer of the gyro).
+    K_u is for a rate signal (rate gyro, or gyro in rebalance); one whose signal is an angle is turned by its torquer.
+
+    Not modelled: bandwidth, offset and noise of the amplifier.
     Source: 004_a44a05c7e88249d1.txt eq. 5-25, 5-26; spec d4, 4; integral: F of spec d3, PLATFORM-1AXIS.
     """
 
@@ -28,10 +30,12 @@ class StabilizerLeadLag(Component):
     tau2 = Parameter(0.03, "s", "lead: time constant of the numerator", min=0.0)
     T2 = Parameter(0.003, "s", "lead: time constant of the denominator", above=0.0)
     integral = Parameter(0.0, "1/s", "corner of the integral part; 0: none", min=0.0)
+    K_u = Parameter(0.0, "V.s/rad", "gyro signal per rate, for the rate command; 0: no command", min=0.0)
     v_max = Parameter(27.0, "V", "largest voltage", above=0.0)
 
     u = Input(0.0, "V", "gyro signal")
     test = Input(0.0, "V", "test signal added to it")
+    command = Input(0.0, "rad/s", "rate commanded to the platform")
 
     v = Output("V", "voltage of the torque motor")
     e = Output("V", "the signal inside the loop, u + test")
@@ -42,14 +46,17 @@ class StabilizerLeadLag(Component):
     lead = State(0.0, "V", "state of the lead network")
     sum = State(0.0, "V", "integral part")
 
+    def error(self):
+        return self.u + self.test - self.K_u * self.command
+
     def after_lag(self):
-        return self.lag + self.tau1 / self.T1 * (self.u + self.test - self.lag)
+        return self.lag + self.tau1 / self.T1 * (self.error() - self.lag)
 
     def after_lead(self):
         return self.lead + self.tau2 / self.T2 * (self.after_lag() - self.lead)
 
     def flow(self) -> None:
-        self.der.lag = (self.u + self.test - self.lag) / self.T1
+        self.der.lag = (self.error() - self.lag) / self.T1
         self.der.lead = (self.after_lag() - self.lead) / self.T2
         y = self.after_lead()
         wish = -self.K * (y + self.sum)

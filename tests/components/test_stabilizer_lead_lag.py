@@ -29,20 +29,20 @@ def network(K=2.0, tau1=0.2, T1=2.0, tau2=0.03, T2=0.003, integral=0.0):
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 5e-3])
 @pytest.mark.parametrize("given", [{}, {"integral": 3.0}, {"K": 0.7, "tau1": 0.5, "T1": 0.1, "tau2": 0.0, "T2": 0.02}])
 def test_held_inputs_are_exact(given, h):
-    """v = -G e for a held, random e (u and test): the exact discrete network by zero-order hold."""
+    """v = -G (u + test - K_u command), held and random: the exact discrete network by zero-order hold."""
     num, den, _ = cont2discrete(network(**given), h, "zoh")
-    num, part = num.ravel(), started(**given, v_max=1e9, step=1.0)
+    num, part = num.ravel(), started(**given, K_u=3.0, v_max=1e9, step=1.0)
     rng = np.random.default_rng(3)
     e = rng.normal(size=300)
     out, n = np.zeros(300), len(den)
     for k in range(300):
-        part.u, part.test = 0.25 * e[k], 0.75 * e[k]
+        part.u, part.test, part.command = 0.25 * e[k], e[k], e[k] / 12.0
         part._dirty = True
         past = slice(max(0, k - n + 1), k)
         m = min(k, n - 1)
         out[k] = num[: m + 1] @ e[k - m : k + 1][::-1] - (den[1 : m + 1] @ out[past][::-1] if m else 0.0)
         assert part.get("v") == pytest.approx(-out[k], rel=1e-8, abs=1e-9)
-        assert part.get("e") == pytest.approx(e[k], rel=1e-15)
+        assert part.get("e") == pytest.approx(1.25 * e[k], rel=1e-15)
         part.do_step(k * h, h)
 
 
