@@ -40,6 +40,9 @@ Map = Annotated[
 Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0)]
 Spec = Annotated[str | None, typer.Option("--spec", metavar="NAME|FILE", help="Acceptance specification to judge by.")]
 Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
+Data = Annotated[
+    list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; of a suite its runs.  Repeatable.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in --out.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue this run where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
@@ -60,8 +63,7 @@ class Form(StrEnum):
     container = "container"
 
 
-def say(text: str = "") -> None:
-    typer.echo(text)
+say = typer.echo
 
 
 def pairs(values: list[str] | None, option: str, example: str) -> dict[str, str]:
@@ -163,9 +165,9 @@ def show(
     \b
     Example: gyrobench show tumble_single_axis --picture wiring.svg
     """
-    from gyrobench import work
+    from gyrobench import showing
 
-    work.show(system, settings(values), *swaps(part, mapping), picture, as_json)
+    showing.show(system, settings(values), *swaps(part, mapping), picture, as_json)
 
 
 @app.command()
@@ -236,6 +238,7 @@ def run(
       gyrobench run tumble_single_axis --set latitude=45.75deg --set gyro.D_I=0.9deg/h/g --seed 7
       gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml --isolate gyro
       gyrobench run tumble_single_axis --spec floated_gyro --strict
+      gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench import work
 
@@ -261,7 +264,7 @@ def run(
 @app.command()
 def reduce(
     system: System,
-    data: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Measured record.")] = None,
+    data: Data = None,
     values: Set = None,
     template: Annotated[
         bool, typer.Option("--template", help="Print an empty record: columns, units and what to state.")
@@ -278,13 +281,14 @@ def reduce(
     Examples:
       gyrobench reduce tumble_single_axis --template > record.csv
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
+      gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
     """
     from gyrobench import work
 
     if template:
         say(work.template(system).rstrip("\n"))
         return
-    if data is None:
+    if not data:
         raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
     judge(work.reduce(system, data, settings(values), spec, out, force, as_json), strict)
 

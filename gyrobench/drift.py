@@ -67,6 +67,16 @@ def name_2dof(channel: str, name: str) -> str:
 NAMES_2DOF = {c: tuple(name_2dof(c, n) for n in NAMES) for c in ("x", "y")}
 
 
+def meaning(name: str) -> str:
+    """What a coefficient multiplies, in words."""
+    if name in MEANING:
+        return MEANING[name]
+    channel, axes = name[1:].split("_")
+    along = f"{axes[0]} axis" if len(set(axes)) == 1 else f"{axes[0]} and {axes[-1]} axes"
+    what = ("constant drift", f"drift per g along the {along}", f"drift per g² along the {along}")[order(name)]
+    return f"{what}, {channel} channel"
+
+
 def order(name: str) -> int:
     """Power of g of a coefficient: D_F 0, D_I 1, D_IS 2; Dx_0 0, Dx_xz 2."""
     return len(_axes(name))

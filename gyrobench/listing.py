@@ -12,8 +12,8 @@ from typing import Any
 from gyrobench.bench import ROOMS, Bench, BenchError, nearest
 
 
-def _class_text(file: Path, base: str) -> tuple[str, dict[str, Any]]:
-    """(first sentence of the docstring, literal class attributes) of the one class derived from ``base``."""
+def _class_text(file: Path, base: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
+    """(first sentence of the docstring, literal class attributes) of the one class derived from one of ``base``."""
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ClassDef) and any(ast.unparse(b).endswith(base) for b in node.bases):
             attributes: dict[str, Any] = {}
@@ -28,7 +28,7 @@ def _class_text(file: Path, base: str) -> tuple[str, dict[str, Any]]:
     return "", {}
 
 
-def _entry(name: str, file: Path, base: str) -> dict[str, Any]:
+def _entry(name: str, file: Path, *base: str) -> dict[str, Any]:
     doc, attributes = _class_text(file, base)
     first = doc.splitlines()[0] if doc else ""
     marks = re.search(r"\[([A-Z][A-Z0-9-]+(?:[,;] *[A-Z][A-Z0-9-]+)*)", first)
@@ -50,7 +50,7 @@ def listing(bench: Bench) -> dict[str, list[dict[str, Any]]]:
 
     return {
         "parts": [_entry(n, f / "model.py", "Component") for n, f in bench.parts().items()],
-        "systems": [_entry(n, f / "system.py", "System") for n, f in bench.systems().items()],
+        "systems": [_entry(n, f / "system.py", "System", "Suite") for n, f in bench.systems().items()],
         "sockets": [{"name": s.name, "what": s.meaning} for s in SOCKETS.values()],
         "specifications": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.specifications().items()],
     }

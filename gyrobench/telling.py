@@ -61,6 +61,18 @@ def answer(result: Result) -> str:
     return "\n".join([result.title, "", *columns(rows, left), "", *notes])
 
 
+def suite_answer(result: Result) -> str:
+    """The combined values, then what the methods say of each other."""
+    found = result.suite
+    rows = [["quantity", "methods", "largest E_n", "p", ""]]
+    for q in found["quantities"]:
+        if q["p"] is not None:
+            rows.append([q["name"], str(len(q["values"])), f"{q['largest E_n']:.2f}", f"{q['p']:.2g}", q["words"]])
+    table = ["", *columns(rows, {0, 4})] if len(rows) > 1 else []
+    said = [f"methods: {found['consistency']}", *result.summary]
+    return "\n".join([answer(result), *table, "", *said])
+
+
 # ------------------------------------------------------------------------------------------- systems
 def system(found: Mapping[str, Any]) -> str:
     """The description of a system (:func:`gyrobench.system.describe.describe`)."""
@@ -78,7 +90,8 @@ def system(found: Mapping[str, Any]) -> str:
     if found["plan"]:
         lines += ["", f"plan: {found['duration']:,.0f} s without the ways between the phases"]
         rows = [_phase(p) for p in found["plan"]]
-        lines += columns([["", "phase", "mode", "", "settle", "window"], *rows], {1, 2, 3}, "  ")
+        last = "dwell" if "shape" in found["plan"][0] else "window"
+        lines += columns([["", "phase", "mode", "", "settle", last], *rows], {1, 2, 3}, "  ")
     if found["options"]:
         lines += ["", "options (--set NAME=VALUE), and any slot.parameter of a part"]
         options = [[k, quantity(o["value"], o["unit"]), o["doc"]] for k, o in found["options"].items()]
@@ -86,7 +99,32 @@ def system(found: Mapping[str, Any]) -> str:
     return "\n".join([*lines, *(f"note: {n}" for n in found["notes"])])
 
 
+def suite(found: Mapping[str, Any]) -> str:
+    """The description of a suite (:func:`gyrobench.suites.describe`)."""
+    lines = [f"{found['title']}  [{', '.join(found['spec'])}]", "", f"tests of one {found['item']}, in their order"]
+    rows = [
+        [m["name"], m["title"], f"{len(m['plan'])} phases", f"{m['duration']:,.0f} s", f"--seed {m['seed']}"]
+        for m in found["tests"]
+    ]
+    lines += columns(rows, {0, 1, 4}, "  ")
+    lines += ["", f"sets: {'; '.join(f'{k}: {v}' for k, v in found['sets'].items())}"] if found["sets"] else []
+    lines += ["", "options (--set NAME=VALUE)"]
+    lines += columns(
+        [[k, quantity(o["value"], o["unit"]), o["doc"]] for k, o in found["options"].items()], {0, 1, 2}, "  "
+    )
+    first = found["tests"][0]["name"]
+    lines += [
+        f"any option of a test, and slot.parameter, goes to all tests that have it; {first}.option and",
+        f"{first}.slot.parameter to this one alone",
+    ]
+    return "\n".join(lines)
+
+
 def _phase(p: Mapping[str, Any]) -> list[str]:
+    if "shape" in p:  # of a loop test
+        size = "" if p["mode"] == "hold" else f"{p['shape']} {quantity(p['amplitude'], p['unit'])}, axis {p['axis']}"
+        size += f", {p['frequency']:.4g} Hz" if p["frequency"] else ""
+        return [str(p["phase"]), p["label"], p["mode"], size, f"{p['settle']:.4g} s", f"{p['dwell']:.4g} s"]
     turning = p["mode"] == "rate"
     if turning:
         size = f"{quantity(p['travel'], 'rad')} at {quantity(p['target'], 'rad/s')}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from gyrobench.folders import claim, keep, labels, run_folder
 from gyrobench.progress import Meter
 from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record, RecordError
+from gyrobench.system.suite import Suite
 from gyrobench.system.system import System, load_system
 from gyrobench.system.values import ValueProblem, parse
 
@@ -83,7 +84,7 @@ def load(name: str, values: Mapping[str, Any] | None = None, step: float | None 
         system = load_system(name, Bench.find().folder)
     for key, value in (values or {}).items():
         slot, dot, _ = key.partition(".")
-        if dot and slot not in system.slots:
+        if dot and slot not in system.slots and not isinstance(system, Suite):
             raise UsageError(f"--set {key}: no slot '{slot}'; {nearest(slot, system.slots)}")
         try:
             system.set(key, value)
@@ -140,15 +141,43 @@ def limits_of(spec: Path | None) -> Limits | None:
 
 
 # ---------------------------------------------------------------------------------------------- run
+@dataclass(frozen=True)
+class Done:
+    """A run: where it is kept, and its result and report (none of a system without reduction).  stopped: what the user
+    stopped after the run itself.
+    """
+
+    folder: Path
+    record: Record
+    result: Result | None = None
+    paths: Mapping[str, Path] = field(default_factory=dict)
+    stopped: str = ""
+
+
 def run(job: Job, as_json: bool = False) -> str:
-    """Record, reduction and report of one run; returns the verdict.
+    """Record, reduction and report of one run, or of a suite; returns the verdict.  Raises as :func:`perform`."""
+    step = parse("--step", job.step, "s") if job.step else None
+    system = load(job.system, job.values, step)
+    if isinstance(system, Suite):
+        from gyrobench import suites
+
+        return suites.run(job, system, as_json)
+    done = perform(job, runnable(system), step)
+    if done.result is None:
+        return no_reduction(done.record, done.folder, as_json)
+    show_paths(done.paths, None if as_json else telling.answer(done.result))
+    if done.stopped:
+        raise Interrupted(done.stopped)
+    return done.result.verdict
+
+
+def perform(job: Job, system: System, step: float | None) -> Done:
+    """Runs a system with its values set; writes record and report.
 
     Raises what Session.run raises, and WorkError when reduction or report fail after the run.
     """
     from gyrobench.system.run import RunError, RunInterrupted, Session
 
-    step = parse("--step", job.step, "s") if job.step else None
-    system = runnable(load(job.system, job.values, step))
     spec = specification(job.spec)
     limits = limits_of(spec)
     system.refuse()
@@ -174,23 +203,20 @@ def run(job: Job, as_json: bool = False) -> str:
         stopped = ""
         try:
             if not reduces(system):
-                return no_reduction(record, folder, as_json)
+                return Done(folder, record)
             result = reduced(system, record, limits)
             if job.check_step:
                 try:
                     result.step_check = step_check(session, system, result, job.seed, h)
                 except RunInterrupted as error:
                     stopped = f"step check {error}; the report is without it"
-            verdict = publish(result, folder, record, as_json, spec)
+            return Done(folder, record, result, publish(result, folder, record, spec), stopped)
         except Exception as error:
             if not ours(error):
                 raise
             raise WorkError(
                 f"{error}\nthe record is kept in {short(folder)}; when mended: gyrobench report {short(folder)}"
             ) from error
-    if stopped:
-        raise Interrupted(stopped)
-    return verdict
 
 
 def reduces(system: System) -> bool:
@@ -230,15 +256,13 @@ def step_check(session: Any, system: System, result: Result, seed: int, step: fl
     return {"step": step, "rows": rows, "worst": max(r["ratio"] for r in rows)}
 
 
-def publish(result: Result, folder: Path, record: Record, as_json: bool, spec: Path | None) -> str:
-    """Writes the report, prints the answer, returns the verdict."""
+def publish(result: Result, folder: Path, record: Record | None, spec: Path | None) -> dict[str, Path]:
+    """Writes the report; returns its files."""
     from gyrobench.report import check_units, write
 
     if spec is not None:
         check_units(spec, {c.name: c.unit for c in result.coefficients})
-    paths = write(result, folder, record=record.channels or None, bench=Bench.find().folder)
-    show_paths(paths, None if as_json else telling.answer(result))
-    return result.verdict
+    return write(result, folder, record=(record and record.channels) or None, bench=Bench.find().folder)
 
 
 def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
@@ -266,27 +290,36 @@ def template(name: str) -> str:
 
 def reduce(
     name: str,
-    data: Path,
+    data: Sequence[Path],
     values: Mapping[str, str],
     spec: str | None,
     out: Path | None,
     force: bool = False,
     as_json: bool = False,
 ) -> str:
-    """A laboratory's CSV to a report; returns the verdict."""
+    """A laboratory's CSV to a report, or runs to that of a suite; returns the verdict."""
+    suite = load(name, values) if isinstance(load(name), Suite) else None
+    if isinstance(suite, Suite):
+        from gyrobench import suites
+
+        return suites.reduce(suite, data, spec, out, force, as_json)
     system = measuring(name)
+    if len(data) > 1:
+        raise UsageError(f"{name} reduces one record at a time; --data was given {len(data)} times")
     file = specification(spec)
     limits = limits_of(file)
-    text = data.read_bytes()
-    record = system.measured(data, values)
-    record.meta["data"] = {"file": data.name, "sha256": hashlib.sha256(text).hexdigest()}
+    one = data[0]
+    text = one.read_bytes()
+    record = system.measured(one, values)
+    record.meta["data"] = {"file": one.name, "sha256": hashlib.sha256(text).hexdigest()}
     result: Result = system.reduce(record, limits)
     result.provenance = dict(record.meta)
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
     folder = out or Bench.find().out / name / f"measured-{identity}"
-    claim(folder, {"system": name, "data": {"file": data.name}}, force)
+    claim(folder, {"system": name, "data": {"file": one.name}}, force)
     record.save(folder)
-    return publish(result, folder, record, as_json, file)
+    show_paths(publish(result, folder, record, file), None if as_json else telling.answer(result))
+    return result.verdict
 
 
 def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
@@ -296,8 +329,12 @@ def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
     """
     if not (folder / "run.json").is_file():
         raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
+    system = load(str(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("system")))
+    if isinstance(system, Suite):
+        from gyrobench import suites
+
+        return suites.report(folder, system, spec, as_json)
     record = Record.load(folder)
-    system = load(str(record.meta["system"]))
     file = specification(spec)
     try:
         result = reduced(system, record, limits_of(file))
@@ -310,7 +347,8 @@ def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
     old = folder / "result.json"
     if old.exists():  # the step check is a run of its own and is kept
         result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
-    return publish(result, folder, record, as_json, file)
+    show_paths(publish(result, folder, record, file), None if as_json else telling.answer(result))
+    return result.verdict
 
 
 def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
@@ -333,41 +371,7 @@ def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
     show_paths(reports.compare(results, target, bench=Bench.find().folder), None if as_json else "")
 
 
-# -------------------------------------------------------------------------------------- show, export
-def show(
-    name: str,
-    values: Mapping[str, str],
-    parts: Mapping[str, str],
-    maps: Mapping[str, Path],
-    picture: Path | None,
-    as_json: bool,
-) -> None:
-    """Slots, wires, order, cuts, delays and plan of a system."""
-    from gyrobench.system.describe import describe
-    from gyrobench.system.parameters import defaults, resolve
-    from gyrobench.system.parts import resolve_parts
-    from gyrobench.system.wiring import assemble
-
-    if picture is not None and picture.suffix != ".svg":
-        raise UsageError(f"--picture {picture}: the drawing is an SVG; write {picture.with_suffix('.svg')}")
-    system = runnable(load(name, values))
-    check_fmus(parts)
-    notes: list[str] = []
-    paths, _ = resolve_parts(system, parts, "native", Bench.find().folder, notes)
-    assembly = assemble(system, paths, maps)
-    resolve(assembly, system, 1, defaults(assembly))  # refuses parameters that do not exist
-    found = describe(assembly)
-    if picture is not None:
-        from gyrobench.report import drawing
-
-        picture.write_text(drawing.system(found["order"], found, "system"), encoding="utf-8")
-        note(str(picture)) if as_json else print(picture)
-    if as_json:
-        print(json.dumps(found, indent=1, ensure_ascii=False))
-    elif picture is None:
-        print(telling.system(found))
-
-
+# -------------------------------------------------------------------------------------------- export
 def export(
     name: str,
     to: str,

@@ -61,21 +61,11 @@ class Quantity:
     def drift(cls, name: str, truth: float | None = None, closed: float | None = None, meaning: str = "") -> Quantity:
         """A drift coefficient in rad/s per g0^n: D_F, D_IS ..., or Dx_0, Dy_yz ... of a channel."""
         unit = units.display(drift.surface_unit(name))
-        return cls(name, meaning or _meaning(name), unit, units.factor("deg/h"), truth, closed)
+        return cls(name, meaning or drift.meaning(name), unit, units.factor("deg/h"), truth, closed)
 
     @property
     def title(self) -> str:
         return self.shown or self.name
-
-
-def _meaning(name: str) -> str:
-    """What a drift coefficient multiplies, in words."""
-    if name in drift.MEANING:
-        return drift.MEANING[name]
-    channel, axes = name[1:].split("_")
-    along = f"{axes[0]} axis" if len(set(axes)) == 1 else f"{axes[0]} and {axes[-1]} axes"
-    what = ("constant drift", f"drift per g along the {along}", f"drift per g² along the {along}")[drift.order(name)]
-    return f"{what}, {channel} channel"
 
 
 @dataclass(frozen=True)

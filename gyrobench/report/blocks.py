@@ -115,6 +115,14 @@ class Answer:
 
 
 @dataclass
+class Signatures:
+    """Lines to sign on: role and, where it is known, name."""
+
+    items: list[tuple[str, str]]
+    kind: str = "signatures"
+
+
+@dataclass
 class Fold:
     """Blocks folded away in HTML, printed in full in PDF."""
 

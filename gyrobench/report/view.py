@@ -10,6 +10,7 @@ from typing import Any
 from . import evidence, method, plots
 from .blocks import Answer, Cell, Column, Page, Picture, Row, Section, Table, number_cell, pictures, text_cell
 from .numbers import write_number
+from .signing import signing
 from .style import styled
 from .tables import heading, how_tables, limit_text, words
 
@@ -24,8 +25,8 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
     """
     with styled():
         sections = [
-            Section("The answer", "answer", [_answer(doc)]),
-            Section("Coefficients", "coefficients", _coefficients(doc)),
+            Section("The answer", "answer", [answer(doc)]),
+            Section("Coefficients", "coefficients", coefficients(doc)),
             Section("What was measured", "measured", _measured(doc, record or {})),
             Section("Can it be believed", "believed", []),
             Section("Residuals", "residuals", evidence.residuals(doc), sub=True),
@@ -38,26 +39,28 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
             Section("System and plan", "system", method.system(doc), sub=True),
             Section("Parts, parameters and provenance", "provenance", how_tables(doc), sub=True),
             Section("Full values", "values", method.full_values(doc), sub=True),
+            Section("Statements and signatures", "signatures", signing(doc)),
         ]
-    return Page(doc["title"], doc["report_id"], _head(doc), sections).finish()
+    return Page(doc["title"], doc["report_id"], head(doc), sections).finish()
 
 
-def _head(doc: Json) -> list[tuple[str, str]]:
+def head(doc: Json) -> list[tuple[str, str]]:
     run = doc["provenance"]
     site = ", ".join(f"{words(k)[0]} {_plain(v)}{_unit(k)}" for k, v in doc["site"].items() if v is not None)
     rows = [
         ("Report", doc["report_id"]),
-        ("Date", _date(str(run.get("date") or "not recorded"))),
+        ("Date", date(str(run.get("date") or "not recorded"))),
         ("Instrument", doc["instrument"] or "not named"),
         ("Site", site or "not stated"),
         ("Operator", str(run.get("operator") or "not recorded")),
+        *((name.capitalize(), str(run[name])) for name in ("laboratory", "customer") if run.get(name)),
         ("Method", doc["method"]),
         ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
     ]
     return rows
 
 
-def _date(text: str) -> str:
+def date(text: str) -> str:
     """ "2026-03-14T09:30:00Z" for people; other texts stay as they are."""
     match = re.fullmatch(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d)[\d:.]*(Z|\+00:00)", text)
     return f"{match[1]} {match[2]} UTC" if match else text
@@ -72,7 +75,7 @@ def _unit(key: str) -> str:
     return "" if not unit else unit if unit == "°" else f" {unit}"
 
 
-def _answer(doc: Json) -> Answer:
+def answer(doc: Json) -> Answer:
     rows = []
     for k, c in enumerate(doc["coefficients"]):
         if c["limit"] is None:
@@ -103,7 +106,7 @@ def _answer(doc: Json) -> Answer:
     return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
 
 
-def _coefficients(doc: Json) -> list[Any]:
+def coefficients(doc: Json) -> list[Any]:
     limits = any(c["limit"] is not None for c in doc["coefficients"])
     truth = any(c["truth"] is not None for c in doc["coefficients"])
     columns = [

@@ -22,6 +22,10 @@ def write_all(
     doc = document(result)
 
     def view() -> Page:
+        if doc["suite"]:
+            from . import suite
+
+            return suite.page(doc)
         from .view import page
 
         return page(doc, record)

@@ -159,8 +159,9 @@ def test_sections_in_order(written):
     titles = re.findall(r"<h2 id=\"[a-z]+\"><span>(\d+)</span> ([^<]+)</h2>", written.html)
     assert [t for _, t in titles] == [
         "The answer", "Coefficients", "What was measured", "Can it be believed", "Error budget", "How it was done",
+        "Statements and signatures",
     ]  # fmt: skip
-    assert [n for n, _ in titles] == ["1", "2", "3", "4", "5", "6"]
+    assert [n for n, _ in titles] == ["1", "2", "3", "4", "5", "6", "7"]
     text = written.pdf_text()
     places = [text.index(f"{n} {t}" if f"{n} {t}" in text else f"{n}  {t}") for n, t in titles]
     assert places == sorted(places)
