@@ -67,7 +67,9 @@ def best_pairs(
 
 
 def _advice(latitude: float, time: float, terms: int, earth_rate: float) -> str:
-    pairs = best_pairs(latitude, time, terms, earth_rate)
+    pairs = [p for p in best_pairs(latitude, time, terms, earth_rate) if p[0] <= MOST]
+    if not pairs:
+        return f"no pair of mounts does at latitude {math.degrees(latitude):.4g}° in {time / 3600.0:.3g} h"
     return "best pairs here: " + ", ".join(f"{a} {b} (condition {k:.3g})" for k, a, b in pairs)
 
 
@@ -85,12 +87,12 @@ def lock_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
     found = []
     for m, a in bad.items():
         rest = [k for k in mounts if k not in bad]
-        lost = " and ".join(_lost(rest, latitude, time, terms, earth_rate)) if rest else "all coefficients"
-        without = f"without it {lost} would not be seen; " if lost else ""
+        lost = " and ".join(_lost(rest, latitude, time, terms, earth_rate)) if rest else ""
         found.append(
             f"mount {m}: gimbal lock: at latitude {math.degrees(latitude):.4g}° its inner angle reaches "
             f"{math.degrees(a):.4g}° ({math.degrees(math.acos(geometry.LEAST)):.3g}° allowed), where the outer axis "
-            f"turns the gyro about its spin axis and ω_x is lost; {without}"
+            "turns the gyro about its spin axis and the x channel, x' cos y, is lost; "
+            f"{'the mounts that are left do not see ' + lost + '; ' if lost else ''}"
             f"{_advice(latitude, time, terms, earth_rate)}"
         )
     return found
