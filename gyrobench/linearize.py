@@ -8,21 +8,8 @@ from typing import Any
 from gyrobench.component import Component, PartError
 
 
-def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> Any:
-    """The part's linearization at its present point, as a continuous ``control.StateSpace``.
-
-        dx' = A dx + B du        dy = C dx + D du
-
-    ``inputs`` and ``outputs`` are FMI names ("omega[1]", "u"); the states are all of the part's, in their
-    declared order; units are those declared (SI).  The derivatives are the part's own, by forward-mode
-    differentiation of ``flow`` and ``outputs``: exact at a smooth point; where a limit or a quantizer is active,
-    those of the branch taken.  Set inputs, and step or set states, to move the point.
-
-    Raises PartError for a name that is no input, or no output, of the part.
-
-    Not modelled: sampled methods and the held inputs of a communication step.
-    """
-    import control
+def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Any, Any, Any, Any]:
+    """A, B, C, D of the part at its present point, numpy arrays; see :func:`state_space`."""
     import numpy as np
 
     for names, section in ((inputs, "input"), (outputs, "output")):
@@ -42,4 +29,25 @@ def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) 
 
     a, c = columns(states)
     b, d = columns(inputs)
+    return a, b, c, d
+
+
+def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> Any:
+    """The part's linearization at its present point, as a continuous ``control.StateSpace``.
+
+        dx' = A dx + B du        dy = C dx + D du
+
+    ``inputs`` and ``outputs`` are FMI names ("omega[1]", "u"); the states are all of the part's, in their
+    declared order; units are those declared (SI).  The derivatives are the part's own, by forward-mode
+    differentiation of ``flow`` and ``outputs``: exact at a smooth point; where a limit or a quantizer is active,
+    those of the branch taken.  Set inputs, and step or set states, to move the point.
+
+    Raises PartError for a name that is no input, or no output, of the part.
+
+    Not modelled: sampled methods and the held inputs of a communication step.
+    """
+    import control
+
+    a, b, c, d = jacobians(part, inputs, outputs)
+    states = [s.name for s in part.states]
     return control.ss(a, b, c, d, inputs=list(inputs), outputs=list(outputs), states=states, name=part.instance)

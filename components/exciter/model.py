@@ -13,12 +13,13 @@ class Exciter(Component):
 
     kind    0 hold (no signal), 1 disturbance torque, 2 rate command, 3 test voltage, 4 rotation of the base
     shape   0 constant: there from the start of the phase; 1 step: there while the gate is open; 2 sine
-    stages  settle (gate 0), open (gate 1, for `dwell`), a sine then fades (gate 0, as long as it settled)
+    stages  settle (gate 0), open (gate 1, for `dwell`), a sine then fades (gate 0, for half of settle)
 
-    s = time since the phase began, T = settle, F = fade, both raised cosines w (1 - cos)/2 of length T:
+    s = time since the phase began:
 
         constant   A                                   step       A while the gate is open, else 0
-        sine       A w(s) sin(2 pi f s),               w rises while settling, is 1 while open, falls while fading
+        sine       A w(s) sin(2 pi f s): w rises by (1 - cos)/2 in the first half of settle, is 1 in the second and while
+                   the gate is open, and falls by the same law in the fading, which takes half of settle
 
     A rotation of the base is given as angle, rate and acceleration, exact derivatives of each other.  Its step turns to
     A within 1/f after the gate has opened, by A (x - sin(2 pi x) / 2 pi), x = 0..1, and back before the gate closes; a
@@ -113,7 +114,7 @@ class Exciter(Component):
                 self.stage = FADE
                 self.t_ref = self.t
                 over = 0.0
-        elif self.stage == FADE and since > self.settle[index(self.now - 1.0)]:
+        elif self.stage == FADE and since > 0.5 * self.settle[index(self.now - 1.0)]:
             over = 1.0
         if over > 0.0:
             self.t_begin = self.t
@@ -147,12 +148,12 @@ class Exciter(Component):
             wv = 0.0
             wa = 0.0
             if self.stage != OPEN and self.settle[index(self.now - 1.0)] > 0.0:
-                turn = pi / self.settle[index(self.now - 1.0)]
+                turn = 2.0 * pi / self.settle[index(self.now - 1.0)]
                 x = clip(turn * (self.t - self.t_ref), 0.0, pi)
                 up = 1.0 if self.stage == SETTLE else -1.0
                 w = 0.5 - 0.5 * up * cos(x)
                 wv = 0.5 * up * turn * sin(x)
-                wa = 0.5 * up * turn * turn * cos(x)
+                wa = 0.5 * up * turn * turn * cos(x) if x < pi else 0.0
             omega = 2.0 * pi * self.frequencies[index(self.now - 1.0)]
             s = sin(omega * (self.t - self.t_begin))
             c = cos(omega * (self.t - self.t_begin))

@@ -41,7 +41,7 @@ class LoopPhase:
 
     def duration(self) -> float:
         """s, with the fading of a sine."""
-        fade = self.settle if self.shape == "sine" and self.kind != "hold" else 0.0
+        fade = 0.5 * self.settle if self.shape == "sine" and self.kind != "hold" else 0.0
         return self.settle + self.dwell + fade
 
 

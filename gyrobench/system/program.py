@@ -146,4 +146,4 @@ def _absent(assembly: Assembly, name: str) -> bool:
     """True for an optional output that the FMU in the slot does not have."""
     slot, _, element = name.partition(".")
     binding = assembly.bindings.get(slot)
-    return binding is not None and element.split("[")[0] in binding.absent
+    return binding is not None and element not in binding.outputs and element.split("[")[0] in binding.absent

@@ -81,6 +81,8 @@ class Session:
         self.notes: list[str] = []
         paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
         self.swapped = sorted(parts or {})
+        self.bench = bench
+        self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
         self.notes += self.assembly.notes
         self.program = build_program(self.assembly)
@@ -158,7 +160,8 @@ class Session:
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
         if problems := system.check_parameters(parameters):
             raise RefusedError(system.name, problems)
-        meta = self._meta(system, seed, parameters, notes)
+        linear = self._linear(system, parameters, notes) if system.loops else {}
+        meta = {**self._meta(system, seed, parameters, notes), **linear}
         every = max(1, round(system.channel_period / system.step))
         if keeper is not None:
             job = {k: meta[k] for k in ("system", "seed", "step", "options", "parameters")}
@@ -196,6 +199,24 @@ class Session:
             said = isinstance(problem, PartFailure) and problem.messages and "(Error)" in problem.status
             raise (PartRefusal if said else RunError)(str(problem))
         return self._finish(state, system, meta, out, problem, keeper)
+
+    def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+        """The linear model for run.json; what it warns about goes to the log at once, and into the notes."""
+        import logging
+
+        from gyrobench.packaging import load_part
+        from gyrobench.system.linear import NotLinear, loops
+
+        def part_of(slot: str) -> Any:
+            if slot not in self.names:
+                raise NotLinear(f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known")
+            return load_part(self.names[slot], self.bench)
+
+        found, said = loops(self.assembly, parameters, part_of, system.step)
+        for text in said:
+            logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
+        notes += said
+        return {"linear": found}
 
     def _finish(
         self,

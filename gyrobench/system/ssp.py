@@ -66,7 +66,7 @@ def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
     names = [*(system.windows.columns.values() if system.windows else ()), *system.channels]
     names += [system.windows.watch] if system.windows else []
     names += [system.done] if system.done else []
-    absent = {f"{s}.{n}" for s, b in assembly.bindings.items() for n in b.absent}
+    absent = {f"{s}.{n}" for s, b in assembly.bindings.items() for n in b.absent if n not in b.outputs}
     return {n: assembly.output(n) for n in dict.fromkeys(names) if n.partition("[")[0] not in absent}
 
 

@@ -116,7 +116,8 @@ class System:
     windows: ClassVar[Windows | None] = None
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
-    channel_period: ClassVar[float] = 1.0  # s
+    channel_period: float = 1.0  # s
+    loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.system.linear
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
     name: str = ""
