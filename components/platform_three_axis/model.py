@@ -1,0 +1,299 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.math import clip, cos, fabs, minimum, pi, sin, sqrt
+
+ONES = [1.0, 1.0, 1.0]
+NONE = [0.0, 0.0, 0.0]
+PITCH, ROLL, AZ = 0, 1, 2  # the A order
+X, Y, Z = 0, 1, 2
+
+
+class PlatformThreeAxis(Component):
+    """Stabilized platform with three gimbals: roll outside, pitch, azimuth inside.  [PLATFORM-3AXIS-DYN, -KIN]
+
+    Drives, joint angles q and torques come in A order: (1) x_f pitch, (2) y_r roll, (3) z_a azimuth.  Passive rotations
+    from the base, C_b^a = R3(azimuth) R1(pitch) R2(roll); rigid bodies with diagonal inertias about the common centre:
+
+        M(q) q'' + b(q, q', omega_b, alpha_b) = k_t i + M_load + M_bearing + M_stop + (M_gyro and unbalance on the axes)
+        L i' = v - R i - k_e q'          |v| <= v_max, |i| <= i_max; an axis with L = 0: i at once
+
+    b by Newton-Euler: n = I alpha + omega x I omega of each body with q'' = 0, passed outwards; M by the same
+    recursion, azimuth eliminated (q_a'' = t_a / I_az + sin(pitch) q_r''), then two equations.  Unbalance: n + u x f,
+    u = mass times offset of a body in its own axes.  Rates of the platform: omega = T1 omega_A + T3 omega_b (spec d3).
+
+    Bearings as in platform_single_axis: viscous friction and a contact that sticks, elastic to break-away.  The pitch
+    gimbal stops at +-pitch_stop on a spring with damping 0.5; `lock` is 1 beyond lock_angle, where sec(pitch) is large.
+    A pitch of 90 deg is refused.
+
+    Not modelled: elastic gimbals and shafts, products of inertia, rotors of geared motors (direct drive: their inertia
+    belongs to the gimbals), stops of roll and azimuth, base motion within a communication step (held).
+    Source: 001_5d74e91bb8fa76be.txt ch. 5.1, eq. 5.1.1-5.1.7; the dynamics are the spec's own model.
+    """
+
+    version = "1.0.0"
+    integrator = "rk4"
+    rk4_substeps = 1
+
+    I_r = Parameter([0.8, 0.9, 0.7], "kg.m2", "inertia of the roll gimbal about its axes x, y, z", above=0.0)
+    I_f = Parameter([0.4, 0.6, 0.5], "kg.m2", "inertia of the pitch gimbal", above=0.0)
+    I_a = Parameter([0.6, 0.5, 0.7], "kg.m2", "inertia of the inner element", above=0.0)
+    unbalance = Parameter([NONE, NONE, NONE], "kg.m", "mass times offset of roll, pitch gimbal, inner element: rows")
+    viscous = Parameter([0.05, 0.05, 0.05], "N.m.s/rad", "viscous friction, A order", min=0.0)
+    friction = Parameter(NONE, "N.m", "Coulomb friction, A order", min=0.0)
+    stiction = Parameter(NONE, "N.m", "break-away torque, A order; 0: that of friction", min=0.0)
+    presliding = Parameter(5e-5, "rad", "joint angle at break-away", above=0.0)
+    pitch_stop = Parameter(85.0 * pi / 180.0, "rad", "stop of the pitch gimbal", above=0.0, max=pi / 2.0 - 1e-3)
+    stop_stiffness = Parameter(2e4, "N.m/rad", "its stiffness", above=0.0)
+    lock_angle = Parameter(80.0 * pi / 180.0, "rad", "pitch beyond which `lock` is 1", above=0.0, max=pi / 2.0)
+
+    k_t = Parameter(ONES, "N.m/A", "motors: torque constants, A order", above=0.0)
+    k_e = Parameter(ONES, "V.s/rad", "motors: back EMF constants, A order", min=0.0)
+    R = Parameter([2.0, 2.0, 2.0], "Ohm", "motors: resistances, A order", above=0.0)
+    L = Parameter(
+        [4e-3, 4e-3, 4e-3], "Ohm.s", "motors: inductances, A order (1 H = 1 Ohm.s); 0: current at once", min=0.0
+    )
+    v_max = Parameter([48.0, 48.0, 48.0], "V", "largest voltages, A order", above=0.0)
+    i_max = Parameter([24.0, 24.0, 24.0], "A", "largest currents, A order", above=0.0)
+
+    theta_0 = Parameter(NONE, "rad", "joint angles at the start, A order")
+    theta_dot_0 = Parameter(NONE, "rad/s", "joint rates at the start, A order")
+
+    v = Input(NONE, "V", "motor voltages, A order")
+    M_load = Input(NONE, "N.m", "disturbance torques about the motor axes, A order")
+    M_gyro = Input(NONE, "N.m", "torque of the gyros on the inner element, platform axes")
+    omega_b = Input(NONE, "rad/s", "inertial rate of the base, base axes")
+    alpha_b = Input(NONE, "rad/s2", "its derivative")
+    f_b = Input([0.0, 0.0, 9.80665], "m/s2", "specific force, base axes")
+
+    theta = Output("rad", "joint angles, A order", shape=(3,))
+    theta_dot = Output("rad/s", "joint rates, A order", shape=(3,))
+    omega = Output("rad/s", "inertial rate of the inner element, platform axes", shape=(3,))
+    alpha = Output("rad/s2", "its derivative at the end of the step", shape=(3,))
+    f = Output("m/s2", "specific force, platform axes", shape=(3,))
+    attitude = Output("rad", "integral of omega", shape=(3,))
+    i_motor = Output("A", "motor currents, A order", shape=(3,))
+    lock = Output("1", "1 beyond lock_angle")
+    saturated = Output("1", "1 while a voltage or a current is at its limit")
+
+    q = State(NONE, "rad", "joint angles, A order")
+    dq = State(NONE, "rad/s", "joint rates, A order")
+    turned = State(NONE, "rad", "integral of the inertial rate, platform axes")
+    i = State(NONE, "A", "motor currents, A order")
+
+    spring = Discrete(NONE, "N.m/rad", "stiffness of the contacts")
+    rub = Discrete(NONE, "N.m.s/rad", "their damping")
+    reach = Discrete(NONE, "rad", "way at Coulomb friction")
+    anchor = Discrete(NONE, "rad", "where a contact is free of torque")
+    slipping = Discrete(NONE, "1", "0 sticking, else the sense of slip")
+    rough = Discrete(0.0, "1", "1: there is Coulomb friction")
+    heavy = Discrete(0.0, "1", "1: there is unbalance")
+    bump = Discrete(0.0, "N.m.s/rad", "damping of the pitch stop")
+    pitch = Discrete(0.0, "rad", "pitch, for messages")
+
+    def start(self) -> None:
+        for k in range(3):
+            j = self.I_r[k] > 0.5 * (self.I_r[X] + self.I_r[Y] + self.I_r[Z])
+            self.refuse(j, "I_r is of no rigid body: each of its three must be <= the sum of the other two")
+            j = self.I_f[k] > 0.5 * (self.I_f[X] + self.I_f[Y] + self.I_f[Z])
+            self.refuse(j, "I_f is of no rigid body: each of its three must be <= the sum of the other two")
+            j = self.I_a[k] > 0.5 * (self.I_a[X] + self.I_a[Y] + self.I_a[Z])
+            self.refuse(j, "I_a is of no rigid body: each of its three must be <= the sum of the other two")
+        least = [0.0, 0.0, 0.0]
+        inner = minimum(self.I_a[X], self.I_a[Y])
+        least[PITCH] = self.I_f[X] + inner
+        least[ROLL] = self.I_r[Y] + minimum(self.I_f[Y] + inner, self.I_f[Z])
+        least[AZ] = self.I_a[Z]
+        self.rough = 0.0
+        self.heavy = 0.0
+        for k in range(3):
+            short = self.stiction[k] > 0.0 and self.stiction[k] < self.friction[k]
+            self.refuse(short, "stiction of an axis must be 0 or at least its friction")
+            late = self.L[k] > 0.0 and self.step * self.R[k] > self.L[k]
+            self.refuse(late, "step = {step} s must be <= L / R of each motor: shorten it, or take L = 0 for that axis")
+            most = self.friction[k] if self.friction[k] > self.stiction[k] else self.stiction[k]
+            self.spring[k] = most / self.presliding
+            self.rub[k] = sqrt(self.spring[k] * least[k])
+            stiff = self.step * self.step * self.spring[k] > 0.25 * least[k]
+            self.refuse(stiff, "step = {step} s is too long for presliding = {presliding} rad: shorten it")
+            self.reach[k] = self.friction[k] / self.spring[k] if most > 0.0 else 0.0
+            self.rough = 1.0 if most > 0.0 else self.rough
+            for n in range(3):
+                self.heavy = 1.0 if self.unbalance[k][n] != 0.0 else self.heavy
+            self.q[k] = self.theta_0[k]
+            self.anchor[k] = self.theta_0[k]
+            self.dq[k] = self.theta_dot_0[k]
+        hard = self.step * self.step * self.stop_stiffness > least[PITCH]
+        self.refuse(hard, "step = {step} s is too long for stop_stiffness = {stop_stiffness} N.m/rad: shorten it")
+        self.bump = sqrt(self.stop_stiffness * least[PITCH])
+        self.pitch = self.theta_0[PITCH]
+        beyond = fabs(self.pitch) > self.pitch_stop
+        self.refuse(beyond, "theta_0[1] = {pitch} rad must be within the pitch stop, +-{pitch_stop} rad")
+
+    def current(self, x, limit, volts, volts_max, emf, resistance, inductance):
+        if inductance > 0.0:
+            return x
+        return clip((clip(volts, -volts_max, volts_max) - emf) / resistance, -limit, limit)
+
+    def flow(self) -> None:
+        t = [0.0, 0.0, 0.0]
+        for k in range(3):
+            rate = self.dq[k]
+            emf = self.k_e[k] * rate
+            amps = self.current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
+            t[k] = self.k_t[k] * amps + self.M_load[k] - self.viscous[k] * rate
+            self.der.q[k] = rate
+            self.der.i[k] = 0.0
+            if self.L[k] > 0.0:
+                di = (clip(self.v[k], -self.v_max[k], self.v_max[k]) - self.R[k] * self.i[k] - emf) / self.L[k]
+                held = (self.i[k] >= self.i_max[k] and di > 0.0) or (self.i[k] <= -self.i_max[k] and di < 0.0)
+                self.der.i[k] = 0.0 if held else di
+            if self.rough == 1.0:
+                way = self.q[k] - self.anchor[k]
+                if self.slipping[k] == 0.0:
+                    most = self.spring[k] * self.presliding
+                    t[k] = t[k] - clip(self.spring[k] * way + self.rub[k] * rate, -most, most)
+                else:
+                    t[k] = t[k] - self.spring[k] * clip(way, -self.reach[k], self.reach[k])
+        over = self.q[PITCH] - clip(self.q[PITCH], -self.pitch_stop, self.pitch_stop)
+        if over != 0.0:
+            push = self.stop_stiffness * over + self.bump * self.dq[PITCH]
+            t[PITCH] = t[PITCH] - (push if push * over > 0.0 else 0.0)  # the stop pushes back, it does not pull
+
+        cr = cos(self.q[ROLL])
+        sr = sin(self.q[ROLL])
+        cf = cos(self.q[PITCH])
+        sf = sin(self.q[PITCH])
+        ca = cos(self.q[AZ])
+        sa = sin(self.q[AZ])
+        df = self.dq[PITCH]
+        dr = self.dq[ROLL]
+        da = self.dq[AZ]
+        # rates w and, with q'' = 0, accelerations a of roll gimbal (r), pitch gimbal (f), inner element
+        wrx = cr * self.omega_b[X] - sr * self.omega_b[Z]
+        wry = self.omega_b[Y] + dr
+        wrz = sr * self.omega_b[X] + cr * self.omega_b[Z]
+        arx = cr * self.alpha_b[X] - sr * self.alpha_b[Z] - wrz * dr
+        ary = self.alpha_b[Y]
+        arz = sr * self.alpha_b[X] + cr * self.alpha_b[Z] + wrx * dr
+        wfx = wrx + df
+        wfy = cf * wry + sf * wrz
+        wfz = cf * wrz - sf * wry
+        afx = arx
+        afy = cf * ary + sf * arz + wfz * df
+        afz = cf * arz - sf * ary - wfy * df
+        wx = ca * wfx + sa * wfy
+        wy = ca * wfy - sa * wfx
+        wz = wfz + da
+        ax = ca * afx + sa * afy + wy * da
+        ay = ca * afy - sa * afx - wx * da
+        # torques each body needs, passed outwards
+        nx = self.I_a[X] * ax + (self.I_a[Z] - self.I_a[Y]) * wy * wz - self.M_gyro[X]
+        ny = self.I_a[Y] * ay + (self.I_a[X] - self.I_a[Z]) * wz * wx - self.M_gyro[Y]
+        nz = self.I_a[Z] * afz + (self.I_a[Y] - self.I_a[X]) * wx * wy - self.M_gyro[Z]
+        nfx = self.I_f[X] * afx + (self.I_f[Z] - self.I_f[Y]) * wfy * wfz
+        nfy = self.I_f[Y] * afy + (self.I_f[X] - self.I_f[Z]) * wfz * wfx
+        nfz = self.I_f[Z] * afz + (self.I_f[Y] - self.I_f[X]) * wfx * wfy
+        nry = self.I_r[Y] * ary + (self.I_r[X] - self.I_r[Z]) * wrz * wrx
+        if self.heavy == 1.0:
+            frx = cr * self.f_b[X] - sr * self.f_b[Z]
+            fry = self.f_b[Y]
+            frz = sr * self.f_b[X] + cr * self.f_b[Z]
+            ffy = cf * fry + sf * frz
+            ffz = cf * frz - sf * fry
+            fx = ca * frx + sa * ffy
+            fy = ca * ffy - sa * frx
+            nx = nx + self.unbalance[2][Y] * ffz - self.unbalance[2][Z] * fy
+            ny = ny + self.unbalance[2][Z] * fx - self.unbalance[2][X] * ffz
+            nz = nz + self.unbalance[2][X] * fy - self.unbalance[2][Y] * fx
+            nfx = nfx + self.unbalance[1][Y] * ffz - self.unbalance[1][Z] * ffy
+            nfy = nfy + self.unbalance[1][Z] * frx - self.unbalance[1][X] * ffz
+            nfz = nfz + self.unbalance[1][X] * ffy - self.unbalance[1][Y] * frx
+            nry = nry + self.unbalance[0][Z] * frx - self.unbalance[0][X] * frz
+        nfx = nfx + ca * nx - sa * ny
+        nfy = nfy + sa * nx + ca * ny
+        nfz = nfz + nz
+        nry = nry + cf * nfy - sf * nfz
+        tp = t[PITCH] - nfx
+        ta = t[AZ] - nz
+        tr = t[ROLL] - nry + sf * ta
+        # M: pitch, roll without what the azimuth takes up, and between the two
+        mp = self.I_f[X] + ca * ca * self.I_a[X] + sa * sa * self.I_a[Y]
+        mr = self.I_r[Y] + cf * cf * (self.I_f[Y] + sa * sa * self.I_a[X] + ca * ca * self.I_a[Y])
+        mr = mr + sf * sf * self.I_f[Z]
+        mpr = cf * sa * ca * (self.I_a[X] - self.I_a[Y])
+        det = mp * mr - mpr * mpr
+        ddr = (mp * tr - mpr * tp) / det
+        self.der.dq[PITCH] = (mr * tp - mpr * tr) / det
+        self.der.dq[ROLL] = ddr
+        self.der.dq[AZ] = ta / self.I_a[Z] + sf * ddr
+        self.der.turned[X] = wx
+        self.der.turned[Y] = wy
+        self.der.turned[Z] = wz
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        self.pitch = self.q[PITCH]
+        through = fabs(self.pitch) >= pi / 2.0 - 1e-3
+        self.refuse(through, "pitch = {pitch} rad, through its stop at {pitch_stop} rad: it must stay below 1.5698 rad")
+        for k in range(3):
+            self.i[k] = clip(self.i[k], -self.i_max[k], self.i_max[k])
+            if self.spring[k] > 0.0:
+                way = self.q[k] - self.anchor[k]
+                if self.slipping[k] == 0.0:
+                    push = way + self.rub[k] / self.spring[k] * self.dq[k]
+                    if fabs(push) > self.presliding:
+                        self.slipping[k] = 1.0 if push > 0.0 else -1.0
+                        self.anchor[k] = self.q[k] - self.slipping[k] * self.reach[k]
+                elif way * self.slipping[k] >= self.reach[k]:
+                    self.anchor[k] = self.q[k] - self.slipping[k] * self.reach[k]
+                else:
+                    self.slipping[k] = 0.0
+
+    def outputs(self) -> None:
+        full = 0.0
+        for k in range(3):
+            self.theta[k] = self.q[k]
+            self.theta_dot[k] = self.dq[k]
+            emf = self.k_e[k] * self.dq[k]
+            amps = self.current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
+            self.i_motor[k] = amps
+            if fabs(self.v[k]) > self.v_max[k] or fabs(amps) >= self.i_max[k]:
+                full = 1.0
+            self.attitude[k] = self.turned[k]
+        self.saturated = full
+        self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0
+        cr = cos(self.q[ROLL])
+        sr = sin(self.q[ROLL])
+        cf = cos(self.q[PITCH])
+        sf = sin(self.q[PITCH])
+        ca = cos(self.q[AZ])
+        sa = sin(self.q[AZ])
+        df = self.dq[PITCH]
+        dr = self.dq[ROLL]
+        da = self.dq[AZ]
+        wrx = cr * self.omega_b[X] - sr * self.omega_b[Z]
+        wry = self.omega_b[Y] + dr
+        wrz = sr * self.omega_b[X] + cr * self.omega_b[Z]
+        arx = cr * self.alpha_b[X] - sr * self.alpha_b[Z] - wrz * dr
+        ary = self.alpha_b[Y] + self.der.dq[ROLL]
+        arz = sr * self.alpha_b[X] + cr * self.alpha_b[Z] + wrx * dr
+        wfx = wrx + df
+        wfy = cf * wry + sf * wrz
+        wfz = cf * wrz - sf * wry
+        afx = arx + self.der.dq[PITCH]
+        afy = cf * ary + sf * arz + wfz * df
+        wx = ca * wfx + sa * wfy
+        wy = ca * wfy - sa * wfx
+        self.omega[X] = wx
+        self.omega[Y] = wy
+        self.omega[Z] = wfz + da
+        self.alpha[X] = ca * afx + sa * afy + wy * da
+        self.alpha[Y] = ca * afy - sa * afx - wx * da
+        self.alpha[Z] = cf * arz - sf * ary - wfy * df + self.der.dq[AZ]
+        frx = cr * self.f_b[X] - sr * self.f_b[Z]
+        frz = sr * self.f_b[X] + cr * self.f_b[Z]
+        ffy = cf * self.f_b[Y] + sf * frz
+        self.f[X] = ca * frx + sa * ffy
+        self.f[Y] = ca * ffy - sa * frx
+        self.f[Z] = cf * frz - sf * self.f_b[Y]
