@@ -18,8 +18,8 @@ class Exciter(Component):
     s = time since the phase began:
 
         constant   A                                   step       A while the gate is open, else 0
-        sine       A w(s) sin(2 pi f s): w rises by (1 - cos)/2 in the first half of settle, is 1 in the second and while
-                   the gate is open, and falls by the same law in the fading, which takes half of settle
+        sine       A w(s) sin(2 pi f s): w rises by (1 - cos)/2 in the first half of settle, is 1 in the second and
+                   while the gate is open, and falls by the same law in the fading, which takes half of settle
 
     A rotation of the base is given as angle, rate and acceleration, exact derivatives of each other.  Its step turns to
     A within 1/f after the gate has opened, by A (x - sin(2 pi x) / 2 pi), x = 0..1, and back before the gate closes; a
