@@ -99,14 +99,16 @@ def resolve(
         else:
             notes.append(f"{name}: no parameter or input of that name; not set")
     for name, value in system.flat_parameters().items():
+        where_known = name.endswith("?")
+        name = name.rstrip("?")
         slot, _, parameter = name.partition(".")
         if slot not in assembly.bindings:
             raise ValueProblem(f"{name}: {system.name} has no slot '{slot}'")
         bound = _target(parameter, assembly.bindings[slot])
-        if bound is None:
-            notes.append(f"{slot} has no parameter '{parameter}' (set by {system.name}); it stays as it is")
-        else:
+        if bound is not None:
             chosen[name] = _si(name, value, bound)
+        elif not where_known:
+            notes.append(f"{slot} has no parameter '{parameter}' (set by {system.name}); it stays as it is")
     for name, value in system.overrides.items():
         chosen.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
     starts: Starts = {slot: [] for slot in assembly.bindings}

@@ -165,7 +165,10 @@ class System:
         return Plan()
 
     def parameters(self) -> dict[str, Any]:
-        """Parameters of the parts derived from plan and options: "slot.parameter" -> SI value or nested list."""
+        """Parameters of the parts derived from plan and options: "slot.parameter" -> SI value or nested list.
+
+        A scalar named "slot.parameter?" is set where the part has it, and not missed where it has not.
+        """
         return {}
 
     def check(self) -> list[str]:
