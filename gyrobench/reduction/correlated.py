@@ -9,11 +9,10 @@ Estimates and intervals are the mixture over the candidates, weighted by likelih
 noise models that the data cannot tell apart goes into u.  A single "best" model would be too sure of itself: the
 regressors swallow a good part of the slow noise they are to be judged by.  Deterministic; no iteration.
 
-Measured by tests/reduction/coverage.py: how often the 95 % intervals of the nine coefficients of a tumble hold the
-truth (lowest to highest of the nine, 1000 to 2000 records), for white noise and for Gauss-Markov noise of 0.5 to 10
-windows: 0.924 to 0.976 with 72 windows a turn and 10 in each dwell, 0.918 to 0.985 with 36 and 5.  White and
-Gauss-Markov noise together are harder where slow noise hides: 3 windows, half of the variance: 0.943 to 0.973 (short
-plan 0.89 to 0.92); 8 windows, 30 % of the variance: 0.83 to 0.89 (short plan 0.81 to 0.90).  Longer records help.
+The prior is a population of instruments (constants of gyrobench.reduction.noise).  Given a candidate the estimate is
+a t of n - p degrees of freedom exactly (scale with the Jeffreys prior), so 95 % intervals hold the truth of 95 % of
+the instruments of that population, whatever the design; of one certain instrument they may hold it more or less
+often.  tests/benchmarks/coverage.py counts, for every test method; its README has the figures.
 
 Standard uncertainty u: standard deviation of the mixture, or the 95 % half width over 1.96 where heavy tails make
 that smaller.  [RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88]
@@ -34,6 +33,30 @@ from gyrobench.reduction.regression import Design, RegressionError, check_data, 
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
+LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Candidates that count: weights (g,), their estimates less the mean (g, p), covariances (g, p, p), t's dof."""
+
+    weight: Array
+    off: Array
+    covariance: Array
+    dof: int
+
+    def spread(self, J: Array) -> tuple[Array, Array]:
+        """Standard deviation and 95 % half width of the combinations J (q, p) of the coefficients."""
+        off = self.off @ J.T
+        variance = np.einsum("qi,gij,qj->gq", J, self.covariance, J)
+        sd = np.sqrt(np.maximum(variance, 0.0))
+        half = _half_width(self.weight, off, sd, self.dof)
+        return np.sqrt(self.weight @ (sd**2 + off**2)), half
+
+    def outside(self, J: Array, distance: Array) -> Array:
+        """Probability that a combination lies farther than ``distance`` (q,) from its mean."""
+        sd = np.sqrt(np.maximum(np.einsum("qi,gij,qj->gq", J, self.covariance, J), 1e-300))
+        return _tails(self.weight, self.off @ J.T, sd, self.dof, distance)
 
 
 @dataclass(frozen=True)
@@ -57,6 +80,7 @@ class Estimate:
     density: tuple[float, float, float]  # density N of the white part (unit sqrt(s)): likeliest, 5 % and 95 % point
     best: tuple[float, float]  # tau and share of the most likely model
     warnings: tuple[str, ...]
+    mixture: Mixture
     reading: float = 0.0  # share of reading errors in the most likely model
     sigma_reading: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of one reading: likeliest, 5 % and 95 % point
 
@@ -98,13 +122,13 @@ def fit(
     cov_each = s2[:, None, None] * (T @ Mi @ T.T)
     off = each - beta
     covariance = np.einsum("g,gpq->pq", w, cov_each) + np.einsum("g,gp,gq->pq", w, off, off)
-    sd_each = np.sqrt(np.diagonal(cov_each, axis1=1, axis2=2))
-    half = _half_width(w, off, sd_each, n - p)
-    sd = np.sqrt(np.diag(covariance))
+    counts = w > LIGHT * w.max()
+    mixture = Mixture(w[counts] / w[counts].sum(), off[counts], cov_each[counts], n - p)
+    sd, half = mixture.spread(np.eye(p))
     sd = np.maximum(sd, 1e-300)
     u = np.minimum(sd, half / NORMAL)
     covariance = covariance * np.outer(u / sd, u / sd)
-    probability = _tails(w, off, sd_each, n - p, np.abs(beta))
+    probability = mixture.outside(np.eye(p), np.abs(beta))
 
     k = int(np.argmax(ll))
     Z = _whitened(t0, t1, both, grid, slice(k, k + 1))[0][0]
@@ -127,9 +151,9 @@ def fit(
             f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval holds for this record only."
         )
     return Estimate(
-        tuple(names), beta, covariance, u, half, probability, _dof(half / u), y - X @ beta,
+        tuple(names), beta, covariance, u, half, probability, dof_of(half / u), y - X @ beta,
         scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
-        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings), float(grid.reading[k]),
+        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings), mixture, float(grid.reading[k]),
         _spread(w, np.sqrt(s2 * grid.reading / 2.0) * window, k),
     )  # fmt: skip
 
@@ -153,6 +177,7 @@ def ordinary(
     return Estimate(
         found.names, found.beta, found.covariance, found.u, found.half_width(), found.p, dof, found.residual, whitened,
         found.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
+        Mixture(np.ones(1), np.zeros((1, len(names))), found.covariance[None], found.dof),
     )  # fmt: skip
 
 
@@ -174,19 +199,28 @@ def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
 
 
 def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) -> Array:
-    heavy = w > 1e-9
-    w, off, sd = w[heavy], off[heavy], sd[heavy]
-    high = np.max(np.abs(off) + special.stdtrit(dof, 0.5 + level / 2) * sd, axis=0)
+    """Newton's method on the tails between bounds that close in; bisection where a narrow candidate makes it creep."""
+    quantile = float(special.stdtrit(dof, 0.5 + level / 2))
+    high = np.max(np.abs(off) + quantile * sd, axis=0)
     low = np.zeros_like(high)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        outside = _tails(w, off, sd, dof, middle) > 1.0 - level
-        low, high = np.where(outside, middle, low), np.where(outside, high, middle)
-    out: Array = high
+    height = math.exp(math.lgamma((dof + 1) / 2) - math.lgamma(dof / 2)) / math.sqrt(dof * math.pi)
+    size = np.maximum(sd, 1e-300)
+    x = np.minimum(quantile * np.sqrt(w @ (sd**2 + off**2)), high)
+    for k in range(40):
+        excess = _tails(w, off, size, dof, x) - (1.0 - level)
+        low, high = np.where(excess > 0.0, x, low), np.where(excess > 0.0, high, x)
+        density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
+        step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
+        new = np.where((step > low) & (step < high) & (k < 12), step, (low + high) / 2.0)
+        done = bool(np.all(np.abs(new - x) <= 1e-9 * high))
+        x = new
+        if done:
+            break
+    out: Array = x
     return out
 
 
-def _dof(ratio: Array) -> Array:
+def dof_of(ratio: Array) -> Array:
     """Degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
     table = np.concatenate([np.arange(1.0, 30.0, 0.25), np.geomspace(30.0, 1e4, 60)])
     quantile = special.stdtrit(table, 0.975)

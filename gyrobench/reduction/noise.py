@@ -63,46 +63,72 @@ class Cells:
     reading: Array  # (G,)
 
 
-#: Prior weights of the three families white / Gauss-Markov / both.  Correlation times run from 0.3 windows (1 window
-#: for both) to LONGEST times the root of the length of the record, in windows, with a density proportional to
-#: tau**slope per unit of log tau.  A short record leans to long times, because its regressors swallow much of the
-#: slow noise: the slopes fall by TILT for each doubling of the 82 windows they are given for.  Chosen by Monte Carlo
-#: (tests/reduction/coverage.py) so that 95 % intervals of a nine-term tumble cover whatever the noise is.
-FAMILIES = (0.5, 0.2, 0.3)
-LONGEST = 2.2
-SLOPES = (0.2, 0.6)
-TILT = (0.2, 0.4)
-#: Shares of reading errors where data are differences of readings, with their prior weights.
-READING = ((0.0, 0.25), (0.1, 0.15), (0.3, 0.15), (0.6, 0.15), (0.85, 0.15), (0.97, 0.15))
+#: The population of instrument noise that intervals are made for; candidates are a quadrature over it, draw() samples
+#: it.  One in four instruments has white noise alone, one in four Gauss-Markov drift alone, two have both.
+FAMILIES = (0.25, 0.25, 0.5)
+#: Correlation time, log-uniform: from SHORTEST windows to LONGEST of the record (of slower drift a record holds no
+#: more than a constant and a trend).
+SHORTEST, LONGEST = 0.3, 0.5
+#: Of both: variance of the Gauss-Markov part of a window over that of the white part, log-uniform: from a density at
+#: zero frequency FAINTEST times the white one (less changes no mean) to STRONGEST (more is as without white noise).
+FAINTEST, STRONGEST = 0.3, 100.0
+#: Where data are differences of readings: how often reading errors are negligible, else their variance over that of
+#: the rest of a window, log-uniform.
+NO_READING, READING = 0.25, (0.05, 100.0)
+TAUS, ODDS, READINGS = 9, 6, 4  # cells of the quadrature; more change no coverage
+
+
+def _taus(t0: Array, t1: Array) -> tuple[float, float, float]:
+    """Typical window, shortest and longest correlation time, s."""
+    window, record = float(np.median(t1 - t0)), float(t1[-1] - t0[0])
+    return window, SHORTEST * window, max(LONGEST * record, 3.0 * window)
+
+
+def _least_odds(window: float, tau: Array) -> Array:
+    out: Array = FAINTEST * mean_variance(window / tau) * window / (2.0 * tau)
+    return out
+
+
+def _middles(low: Array | float, high: float, n: int) -> Array:
+    """n middles (n,) or (n, k) of equal steps of the logarithm."""
+    step = (np.arange(n) + 0.5) / n
+    out: Array = np.exp(np.log(low) + np.multiply.outer(step, np.log(high / np.asarray(low))))
+    return out
 
 
 def cells(t0: Array, t1: Array, readings: bool = False) -> Cells:
     """The grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
-    window, record = float(np.median(t1 - t0)), float(t1[-1] - t0[0])
-    longest = max(LONGEST * np.sqrt(record / window), 3.0) * window
-    doublings = min(max(float(np.log2(t0.size / 82.0)), 0.0), 2.5)
-    slopes = [a - b * doublings for a, b in zip(SLOPES, TILT, strict=True)]
-    tau_p = np.geomspace(0.3 * window, longest, 12)
-    tau_b = np.repeat(np.geomspace(window, longest, 10), 7)
-    v = mean_variance(window / tau_b)
-    # odds of the correlated part: from a density at zero frequency 0.3 of the white one up to 60 : 1 in variance
-    low, high = np.log(0.3 * v * window / (2.0 * tau_b)), np.log(60.0)
-    odds = np.exp(low + np.tile(np.linspace(0.0, 1.0, 7), 10) * (high - low))
-    tau = np.concatenate([[window], tau_p, tau_b])
-    share = np.concatenate([[0.0], np.ones(12), odds / (1.0 + odds)])
-    prior = np.concatenate([[1.0], _weights(tau_p, slopes[0]), _weights(tau_b, slopes[1])])
-    prior = prior * np.repeat(FAMILIES, (1, 12, 70))
+    window, shortest, longest = _taus(t0, t1)
+    tau = _middles(shortest, longest, TAUS)
+    odds = _middles(_least_odds(window, tau), STRONGEST, ODDS).ravel()
+    every = np.concatenate([[window], tau, np.tile(tau, ODDS)])
+    share = np.concatenate([[0.0], np.ones(TAUS), odds / (1.0 + odds)])
+    prior = np.repeat(np.array(FAMILIES) / (1, TAUS, TAUS * ODDS), (1, TAUS, TAUS * ODDS))
     if not readings:
-        return Cells(tau, share, prior, np.zeros_like(tau))
-    size, weight = np.array(READING).T
-    return Cells(
-        np.tile(tau, size.size), np.tile(share, size.size), np.outer(weight, prior).ravel(), np.repeat(size, tau.size)
-    )
+        return Cells(every, share, prior, np.zeros_like(every))
+    part = _middles(*READING, READINGS)
+    size = np.concatenate([[0.0], part / (1.0 + part)])
+    weight = np.concatenate([[NO_READING], np.full(READINGS, (1.0 - NO_READING) / READINGS)])
+    n = size.size
+    return Cells(np.tile(every, n), np.tile(share, n), np.outer(weight, prior).ravel(), np.repeat(size, every.size))
 
 
-def _weights(tau: Array, slope: float) -> Array:
-    out: Array = tau**slope / np.sum(tau**slope)
-    return out
+def draw(rng: np.random.Generator, t0: Array, t1: Array, readings: bool = False) -> tuple[float, float, float]:
+    """tau (s), share and reading of one instrument of the population, as :class:`Cells` has them."""
+
+    def log_uniform(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    window, shortest, longest = _taus(t0, t1)
+    family = rng.choice(3, p=FAMILIES)
+    tau, share, reading = log_uniform(shortest, longest), float(family > 0), 0.0
+    if family == 2:
+        odds = log_uniform(float(_least_odds(window, np.array(tau))), STRONGEST)
+        share = odds / (1.0 + odds)
+    if readings and rng.random() >= NO_READING:
+        part = log_uniform(*READING)
+        reading = part / (1.0 + part)
+    return tau, share, reading
 
 
 def whiten(

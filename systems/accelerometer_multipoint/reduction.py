@@ -34,7 +34,6 @@ __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
 Array = NDArray[np.float64]
 UG, ARCSEC = 1e-6, math.pi / 648000.0
-ENOUGH = 24  # visits from which the noise model is estimated; fewer are taken as white
 KS = ("k0", "k1", "k2", "k3", "k4", "k5")
 MEANING = {
     "k0": ("bias", "µg", UG),
@@ -85,7 +84,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
     C, D = model.columns(v, zeros, gamma), model.slopes(v, zeros, gamma, k)
     # theta_0 enters as a correction to where the model is linearized, so that the data stay the data
     steps = [*model.terms, *(f"correction of θ₀ {m}" for m in model.mounts)]
-    noise = "estimated" if v.y.size >= ENOUGH else "white"
+    # four positions see combinations that differ a little from mount to mount: equal weights, as the formulas have them
+    noise = "white" if four else "estimated"
     book, fits, why = _closed(v, setup, four)
     linear = fit(
         steps, np.column_stack([C, D]), v.y, v.t_start, v.t_end, _groups(v, model, zeros, gamma, k), "λi/g₀", "µg", UG,

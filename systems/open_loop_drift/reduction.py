@@ -158,7 +158,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
     share = dt @ drift.regressors(np.array([setup.xyz(a) for a in between]), names) / span
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
-    found = fit([wanted], np.ones((y.size, 1)), y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH)
+    ones = np.ones((y.size, 1))  # the intervals share their readings, and so the errors of these
+    found = fit([wanted], ones, y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH, noise="readings")
     used = float(np.max(np.abs(theta - null)))
     coupled = float(cross @ dt) / span / max(setup.float_gain, 1e-9)
     result = linear_result(

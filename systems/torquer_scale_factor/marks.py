@@ -2,10 +2,6 @@
 
 The table angle at the ends of the windows is a curve over time; the marks are the ends of the range that both senses
 cover, and the times at which the table passes them are interpolated between neighbouring readings.
-
-How well a rate is known follows from the scatter of the window rates, pooled over all currents: random drift of density
-q makes q/w of it in windows of w, errors of the angle readings 2 sigma2/w2, which also makes neighbours correlate by
--sigma2/w2.  Over a range timed in T that is q/T + 2 sigma2/T2.
 """
 
 from __future__ import annotations
@@ -24,8 +20,7 @@ SHARED = 0.5  # of the range turned, least part that both senses must cover
 
 
 def rows(windows: Mapping[str, Array], plan: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
-    """current (A), rate_plus, rate_minus (rad/s, magnitudes), range_plus, range_minus (rad), by rising current; and,
-    where the readings scatter, sigma: standard deviation of the mean rate over the current, up to a factor.
+    """current (A), rate_plus, rate_minus (rad/s, magnitudes), range_plus, range_minus (rad), by rising current.
 
     plan: rows of run.json; the target of a servo phase is its current.  Raises ReductionError for flagged windows, a
     current with one sense only, and senses that do not share their angles.
@@ -33,13 +28,9 @@ def rows(windows: Mapping[str, Array], plan: Sequence[Mapping[str, Any]]) -> dic
     if problems := window_problems(windows):
         raise ReductionError(problems)
     phase = np.asarray(windows["phase"]).astype(int)
-    pairs: dict[float, dict[int, int]] = {}
-    for p in plan:
-        if p["mode"] == "servo" and p["target"]:
-            pairs.setdefault(abs(float(p["target"])), {})[int(math.copysign(1, p["target"]))] = int(p["phase"])
+    pairs = _pairs(plan)
     problems: list[str] = []
     found: list[tuple[float, ...]] = []
-    scatter: list[tuple[float, float, float, float]] = []
     for size in sorted(pairs):
         missing = [s for s in (1, -1) if s not in pairs[size] or not np.any(phase == pairs[size][s])]
         if missing:
@@ -59,37 +50,25 @@ def rows(windows: Mapping[str, Array], plan: Sequence[Mapping[str, Any]]) -> dic
         rate = {s: _rate(t, s * a, s * low, s * high) for s, (t, a, _) in curves.items()}
         current = float(np.mean([abs(i) for _, _, i in curves.values()]))
         found.append((current, rate[1], rate[-1], high - low, high - low))
-        scatter += [_scatter(t, s * a) for s, (t, a, _) in curves.items()]
     if problems:
         raise ReductionError(problems)
     names = ("current", "rate_plus", "rate_minus", "range_plus", "range_minus")
-    out = dict(zip(names, np.array(found, dtype=float).reshape(-1, 5).T, strict=True))
-    if found and (q_sigma2 := _noise(scatter)) is not None:
-        seconds = np.stack([out["range_plus"] / out["rate_plus"], out["range_minus"] / out["rate_minus"]])
-        variance = q_sigma2[0] / seconds + 2.0 * q_sigma2[1] / seconds**2
-        out["sigma"] = np.sqrt(variance.sum(axis=0)) / 2.0 / out["current"]
-    return out
+    return dict(zip(names, np.array(found, dtype=float).reshape(-1, 5).T, strict=True))
 
 
-def _scatter(t: Array, rising: Array) -> tuple[float, float, float, float]:
-    """Length of a window, variance and neighbour covariance of the window rates about a parabola, and their mean."""
-    rate, w = np.diff(rising) / np.diff(t), float(np.mean(np.diff(t)))
-    n = rate.size
-    if n < 6:
-        return w, 0.0, 0.0, float(np.mean(rate))
-    x = np.linspace(-1.0, 1.0, n)
-    r = rate - np.polyval(np.polyfit(x, rate, 2), x)
-    return w, float(r @ r) / (n - 3), float(r[1:] @ r[:-1]) / (n - 1), float(np.mean(rate))
+def _pairs(plan: Sequence[Mapping[str, Any]]) -> dict[float, dict[int, int]]:
+    """Magnitude of a current -> sense -> phase."""
+    pairs: dict[float, dict[int, int]] = {}
+    for p in plan:
+        if p["mode"] == "servo" and p["target"]:
+            pairs.setdefault(abs(float(p["target"])), {})[int(math.copysign(1, p["target"]))] = int(p["phase"])
+    return pairs
 
 
-def _noise(scatter: Sequence[tuple[float, float, float, float]]) -> tuple[float, float] | None:
-    """q (rad2/s) and sigma2 (rad2); None where there is nothing but rounding."""
-    w, variance, neighbour, rate = (np.array(v) for v in zip(*scatter, strict=True))
-    if np.all(np.sqrt(variance) <= 1e-9 * rate):
-        return None
-    sigma2 = max(-float(np.sum(neighbour)), 0.0) / float(np.sum(1.0 / w**2))
-    q = max(float(np.mean(w * (variance + 2.0 * neighbour))), 0.0)
-    return (q, sigma2) if q + sigma2 > 0.0 else None
+def senses(plan: Sequence[Mapping[str, Any]]) -> dict[int, int]:
+    """Phase -> number of its current, by rising current."""
+    pairs = _pairs(plan)
+    return {phase: k for k, size in enumerate(sorted(pairs)) for phase in pairs[size].values()}
 
 
 def _curve(windows: Mapping[str, Array], mine: NDArray[np.bool_]) -> tuple[Array, Array, float]:

@@ -7,11 +7,11 @@ r_minus are the magnitudes of its rate:
     K_n = omega/i  (E48: no minus)    K = mean K_n      linearity_n = (K_n - K)/K
     drift_n = (r_plus - r_minus)/2
 
-Noise: the angle marks have a constant error, so over an angle range Theta the rate has one proportional to i/Theta
-and K_n one proportional to 1/Theta.  Least squares weighs K_n with Theta^2 (alike when no ranges are given), first
-with one constant, then with K_1 + K_3 i^2, the cubic torquer.  A run knows more: the scatter of its angle readings
-gives each K_n its own standard deviation (marks.py), and that weighs.  Not modelled: heating by the current, drift that
-changes between the two senses.
+A table of rates: the angle marks have a constant error, so over an angle range Theta the rate has one proportional to
+i/Theta and K_n one proportional to 1/Theta.  Least squares weighs K_n with Theta^2 (alike when no ranges are given),
+first with one constant, then with K_1 + K_3 i^2, the cubic torquer.  A run knows more: its windows are fitted together
+under an estimated noise model (precession.py).  Not modelled: heating by the current, drift that changes between the
+two senses otherwise than as noise.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from gyrobench.reduction.checks import ReductionError
 from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
 
 from . import marks
+from .estimates import Estimates, Number, of_table, of_windows
+from .precession import Precession, precession
 
 Array = NDArray[np.float64]
 Limits = Mapping[str, tuple[float | None, float | None]]
@@ -98,50 +100,31 @@ def problems(rows: Mapping[str, Array]) -> list[str]:
     return found
 
 
-def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Result:
-    """Scale factor, linearity and drift of a torquer; raises ReductionError with everything that is wrong."""
+def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: Precession | None = None) -> Result:
+    """Scale factor, linearity and drift of a torquer from one row for each current; found: of the windows of a run,
+    whose estimates then take the place of those from the rows.  Raises ReductionError with everything that is wrong.
+    """
     s = setup or TorquerSetup()
     wrong = problems(rows)
     if wrong:
         raise ReductionError(wrong)
     i, plus, minus = (np.asarray(rows[n], dtype=float) for n in ("current", "rate_plus", "rate_minus"))
     theta = np.asarray(rows["range_plus"], dtype=float) if "range_plus" in rows else np.ones_like(i)
-    K_n, half = (plus + minus) / 2.0 / i, (plus - minus) / 2.0
-    sigma = np.asarray(rows["sigma"], dtype=float) if "sigma" in rows else 1.0 / theta
-    n, w = i.size, (sigma.min() / sigma) ** 2
-    one = np.ones((n, 1))
-    line = regression.least_squares(one, K_n, ("K",), w)
-    full = i.max()
-    curve = np.column_stack([one, (i / full) ** 2])
-    cubic = regression.least_squares(curve, K_n, ("K_1", "K_3"), w)
-    offset = regression.least_squares(one, half, ("drift",), w / (i / full) ** 2)
-    mean = float(K_n.mean())
-    s_mean, dof_mean = _scatter_beside_mean(K_n, w, line)
-    u_mean = s_mean * math.sqrt(float(np.sum(1.0 / w))) / n
-    pooled = math.sqrt((offset.s**2 * (n - 1) + (line.s * full) ** 2 * (n - 1)) / (2 * (n - 1)))
-    u_drift = pooled / math.sqrt(float(np.sum(w / (i / full) ** 2)))
-    k = int(np.argmax(np.abs(K_n - mean)))
-    worst = float((K_n[k] - mean) / mean)
-    u_worst = line.s / math.sqrt(float(w[k])) / mean
-    cubic_size = float(cubic.beta[1] / cubic.beta[0])
-    u_cubic = float(cubic.u[1] / abs(cubic.beta[0]))
+    marked, half, n, full = (plus + minus) / 2.0 / i, (plus - minus) / 2.0, i.size, float(i.max())
+    K_n = marked if found is None else found.K
+    book = of_table(i, marked, half, theta)
+    e = book if found is None else of_windows(i, found)
+    mean, k, u_mean = e.mean[0], e.worst_at, e.mean[1]
     make = _Maker(s)
     coefficients = [
-        make("K", "scale factor, mean of the K_n of all currents", UNIT, mean / KU, u_mean / KU, dof_mean, True),
-        make("K_LS", "scale factor, weighted least squares", UNIT, float(line.beta[0]) / KU,
-             float(line.u[0]) / KU, n - 1, True),
-        make("K_1", "scale factor at zero current of the cubic torquer", UNIT, float(cubic.beta[0]) / KU,
-             float(cubic.u[0]) / KU, n - 2, True),
-        make("K_3/K_1", f"relative change of the scale factor from 0 to {full / MA:g} mA, as i²", "%",
-             cubic_size * 100.0, u_cubic * 100.0, n - 2),
-        make("linearity", f"largest departure (K_n − K)/K, at {i[k] / MA:g} mA", "%", worst * 100.0, u_worst * 100.0,
-             n - 1),
-        make("drift", "drift along the torqued axis, half the difference of the two senses", "°/h",
-             float(offset.beta[0]) / DPH, u_drift / DPH, 2 * (n - 1)),
-    ]  # fmt: skip
-    f = ((line.s**2 * (n - 1)) - (cubic.s**2 * (n - 2))) / cubic.s**2 if cubic.s > 0.0 else 0.0
-    p = float(special.fdtrc(1, n - 2, max(f, 0.0))) if cubic.s > 0.0 else None
-    seen = p is not None and p < 0.05
+        make("K", "scale factor, mean of the K_n of all currents", UNIT, e.mean, 1.0 / KU, True),
+        make("K_LS", "scale factor, weighted least squares", UNIT, e.line, 1.0 / KU, True),
+        make("K_1", "scale factor at zero current of the cubic torquer", UNIT, e.K_1, 1.0 / KU, True),
+        make("K_3/K_1", f"relative change of the scale factor from 0 to {full / MA:g} mA, as i²", "%", e.cubic, 100.0),
+        make("linearity", f"largest departure (K_n − K)/K, at {i[k] / MA:g} mA", "%", e.worst, 100.0),
+        make("drift", "drift along the torqued axis, half the difference of the two senses", "°/h", e.drift, 1.0 / DPH),
+    ]
+    seen = e.p is not None and e.p < 0.05
     warnings = []
     if np.all(half == 0.0):
         warnings.append(
@@ -149,10 +132,8 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
         )
     if "range_plus" not in rows:
         warnings.append("No angle ranges given: all currents weigh alike in the least squares.")
-    gain = np.vstack([np.full(n, 1.0 / n), line.gain, cubic.gain[0], cubic.gain[1], np.zeros(n), np.zeros(n)])
-    gain[4, :] = -1.0 / n
-    gain[4, k] += 1.0
-    covariance = (gain / w) @ gain.T
+    gain = np.vstack([e.gain, np.zeros(n)])
+    covariance = gain @ e.cofactor @ gain.T
     covariance[5, 5] = 1.0
     return Result(
         system="torquer_scale_factor",
@@ -164,38 +145,38 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
             "Positive current makes positive precession: K = ω/i (the book's A3-5 prints a minus that its own table "
             "does not have).",
             "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
-            "Noise of each K_n from the scatter of the angle readings, up to a factor."
-            if "sigma" in rows
-            else "Noise of K_n is proportional to 1/angle range (constant error of the angle marks).",
+            "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
+            if found is None
+            else "Noise, white, Gauss-Markov and of the angle readings, estimated from all windows together.",
         ],
         coefficients=coefficients,
         series=[
             Series(
                 label="scale factor of each current", x=(i / MA).tolist(), x_name="current", x_unit="mA",
-                y=(K_n / KU).tolist(), fit=(cubic.fitted / KU).tolist(), residual=(cubic.residual / KU).tolist(),
+                y=(K_n / KU).tolist(), fit=(e.fitted / KU).tolist(), residual=((K_n - e.fitted) / KU).tolist(),
                 y_name="scale factor", y_unit=UNIT, t=np.arange(n, dtype=float).tolist(),
                 shown_fit_x=np.linspace(0.0, full / MA, 101).tolist(),
-                shown_fit_y=((cubic.beta[0] + cubic.beta[1] * np.linspace(0.0, 1.0, 101) ** 2) / KU).tolist(),
+                shown_fit_y=((e.beta[0] + e.beta[1] * np.linspace(0.0, 1.0, 101) ** 2) / KU).tolist(),
             )
         ],
         correlation=regression.correlation(covariance).tolist(),
-        condition=regression.examine(curve * np.sqrt(w)[:, None], ("K_1", "K_3")).condition,
+        condition=regression.examine(np.column_stack([np.ones(n), (i / full) ** 2]) * theta[:, None],
+                                     ("K_1", "K_3")).condition,
         rank=2,
-        dof=float(n - 2),
-        noise={"model": "white, K_n weighted by their " + ("readings' scatter" if "sigma" in rows else "range"),
-               "standard deviation of the best K_n / (°/h/mA)": line.s / KU},
+        dof=float(n - 2 if found is None else found.est.mixture.dof),
+        noise=_noise(e, found),
         tests=[
-            Test("cubic term", f, p, "curvature of the torquer",
+            Test("cubic term", e.F, e.p, "curvature of the torquer",
                  "the scale factor depends on the current" if seen else "no curvature beyond the scatter")
         ],
-        residual_std=cubic.s / KU,
+        residual_std=e.scatter / KU,
         residual_unit=UNIT,
         budget=_budget(s, mean, u_mean),
-        tables=[_table(i, plus, minus, K_n, half, mean)],
+        tables=[_table(i, plus, minus, marked, half, book.mean[0]), *_windows_table(i, found)],
         warnings=warnings,
         summary=[
             f"Scale factor K = {mean / KU:.3f} °/h/mA from {n} currents, {i.min() / MA:g} to {full / MA:g} mA.",
-            f"Linearity: within {abs(worst) * 100:.3f} %, worst at {i[k] / MA:g} mA.",
+            f"Linearity: within {abs(e.worst[0]) * 100:.3f} %, worst at {i[k] / MA:g} mA.",
             f"Drift along the axis {coefficients[-1].estimate:.3g} °/h.",
         ],
         decision_rule=uncertainty.DECISION_RULE,
@@ -206,13 +187,30 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None) -> Resu
     )  # fmt: skip
 
 
-def _scatter_beside_mean(K_n: Array, w: Array, line: regression.Fit) -> tuple[float, int]:
-    """Standard deviation of unit weight from what neither weighted nor plain mean takes up, so that the t of the
-    plain mean is a t; with its degrees of freedom."""
-    if np.ptp(w) < 1e-9:
-        return line.s, line.dof
-    fit = regression.least_squares(np.column_stack([np.ones_like(w), 1.0 / w]), K_n, ("K", "1/w"), w)
-    return fit.s, fit.dof
+def _noise(e: Estimates, found: Precession | None) -> dict[str, Any]:
+    if found is None:
+        return {"model": "white, K_n weighted by their range", "scatter of the best K_n / (°/h/mA)": e.scatter / KU}
+    est = found.est
+    return {
+        "model": "white, Gauss-Markov and reading errors, estimated from the windows",
+        "white density / (°/h/√Hz)": est.density[0] / DPH,
+        "Gauss-Markov rms / (°/h)": est.sigma[0] / DPH,
+        "reading error, standard deviation / ″": est.sigma_reading[0] / units.factor("arcsec"),
+    }
+
+
+def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
+    if found is None:
+        return []
+    n = i.size
+    rows: list[list[Any]] = [
+        [float(i[k] / MA), float(found.K[k] / KU), float(found.est.u[k] / KU), float(found.drift[k] / DPH),
+         float(found.est.u[n + k] / DPH)]
+        for k in range(n)
+    ]  # fmt: skip
+    head = ["current / mA", "K_n / (°/h/mA)", "u / (°/h/mA)", "drift / (°/h)", "u / (°/h)"]
+    caption = "Fit to all windows together; drift: at the middle of the angles of all currents"
+    return [{"title": "Scale factors from the windows", "caption": caption, "columns": head, "rows": rows}]
 
 
 class _Maker:
@@ -222,9 +220,10 @@ class _Maker:
         self.setup = setup
 
     def __call__(
-        self, name: str, meaning: str, unit: str, value: float, u_a: float, dof: float, scale: bool = False
+        self, name: str, meaning: str, unit: str, number: Number, size: float, scale: bool = False
     ) -> Coefficient:
-        half_a = float(special.stdtrit(dof, 0.975)) * u_a
+        value, u_a, dof = number[0] * size, number[1] * size, number[2]
+        half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
         b = [abs(value) * self.setup.u_current] if scale else []
         u, U = uncertainty.combine(u_a, half_a, b)
         limit = (self.setup.specification or {}).get(name)
@@ -233,7 +232,8 @@ class _Maker:
         return Coefficient(
             name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=U / u if u > 0.0 else uncertainty.NORMAL,
             interval=(value - U, value + U), t=t,
-            p=float(2.0 * special.stdtr(dof, -abs(t))) if t is not None else None, u_a=u_a, dof=float(dof),
+            p=float(2.0 * special.stdtr(min(dof, 1e9), -abs(t))) if t is not None else None, u_a=u_a,
+            dof=float(dof) if math.isfinite(dof) else None,
             truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None, limit=limit,
             verdict=uncertainty.verdict(value, U, limit),
         )  # fmt: skip
@@ -285,9 +285,11 @@ def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float]
 def from_record(record: Any, specification: Limits | None = None) -> Result:
     """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
     options, measured = record.meta.get("options", {}), bool(record.meta.get("measured", False))
-    rows = record.windows if measured else marks.rows(record.windows, record.meta.get("plan", []))
-    truth = None
-    if not measured and len(rows["current"]):
+    plan = record.meta.get("plan", [])
+    rows = record.windows if measured else marks.rows(record.windows, plan)
+    truth, found = None, None
+    if not measured and not problems(rows):
+        found = precession(record.windows, marks.senses(plan), np.asarray(rows["current"]))
         truth = truth_of(record.meta.get("parameters", {}), np.asarray(rows["current"]))
     setup = TorquerSetup(
         u_current=float(options.get("u_current", 0.0)),
@@ -297,4 +299,4 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         truth=truth,
         site={} if measured else recorded.Site.of(record.meta).shown(),
     )
-    return recorded.finish(reduce(rows, setup), record)
+    return recorded.finish(reduce(rows, setup, found), record)

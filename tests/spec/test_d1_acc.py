@@ -16,7 +16,7 @@ from multipoint import KS, estimates, module, polynomial, reading, reduced, wind
 
 from gyrobench.reduction.checks import ReductionError
 
-C = module("closed")
+C, MODEL = module("closed"), module("model")
 UG = 1e-6
 
 
@@ -141,7 +141,7 @@ def test_seven_points_are_needed() -> None:
 @pytest.mark.parametrize("n", [8, 12, 24])
 def test_uncertainties_are_those_of_the_spec(n: int) -> None:
     """sigma(k1) = sigma sqrt(20/N)/g, (k0) sqrt(3/N), (k2) sqrt(8/N)/g2, (k3) sqrt(32/N)/g3, (k4, k5) sqrt(8/N)/g2:
-    u of the reduction over its residual standard deviation, and the scatter of the closed formulas.
+    of the design that the reduction fits, and the scatter of the closed formulas.
     """
     rng = np.random.default_rng(n)
     gamma, k = 1.005, {**dict.fromkeys(KS, 2e-5), "k1": 1.0}
@@ -149,13 +149,13 @@ def test_uncertainties_are_those_of_the_spec(n: int) -> None:
         "k0": math.sqrt(3), "k1": math.sqrt(20) / gamma, "k2": math.sqrt(8) / gamma**2, "k3": math.sqrt(32) / gamma**3,
         "k5": math.sqrt(8) / gamma**2,
     }  # fmt: skip
-    if n < 24:  # white noise assumed
-        r = reduced(windows(k, {"a": 0.0}, gamma, n, sigma=2e-6, rng=rng), gamma, {"a": 0.0})
-        for c in r.coefficients:
-            if c.name in factor:
-                size = 1.0 if c.name == "k1" else UG
-                expected = factor[c.name] * r.residual_std * UG / math.sqrt(n)
-                assert c.u * size == pytest.approx(expected, rel=1e-4), c.name
+    data = windows(k, {"a": 0.0}, gamma, n)
+    visits = MODEL.visits(data, MODEL.Setup(gravity=gamma * 9.80665, scale=9806.65, mounts={1: "a"}))
+    model = MODEL.Model(["a"], False)
+    at, one = {"a": 0.0}, np.array([0.0, 1.0, 0.0, 0.0, 0.0])  # k1 = 1
+    X = np.column_stack([model.columns(visits, at, gamma), model.slopes(visits, at, gamma, one)])
+    for name, v in zip(model.terms, np.diag(np.linalg.inv(X.T @ X)), strict=False):
+        assert math.sqrt(v) == pytest.approx(factor[name] / math.sqrt(n), rel=1e-4), name
     found = []
     angle = 2 * math.pi * np.arange(n) / n
     ideal = np.array([reading(k, "a", a, 0.0, gamma) for a in angle])

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import math
 import re
+import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,7 @@ def load() -> System:
 
 
 M: Any = importlib.import_module(".marks", type(load()).__module__)
+P: Any = importlib.import_module(".precession", type(load()).__module__)
 
 
 @pytest.fixture(scope="module")
@@ -80,18 +83,35 @@ def test_marks_by_hand() -> None:
         M.rows({**w, "flagged": np.ones(len(keep))}, plan)
 
 
-@pytest.mark.parametrize(("drift", "reading"), [(1.0, 0.0), (0.0, 1.0)])
-def test_noise_of_the_readings(drift: float, reading: float) -> None:
-    """Random drift of density 1 and angle errors of 1: q = 1 or sigma2 = 1, from 40 phases of 20 windows of 2 s."""
-    rng = np.random.default_rng(5)
-    scatter = []
-    for _ in range(40):
-        t = 2.0 * np.arange(21)
-        angle = np.cumsum(drift * math.sqrt(2.0) * rng.normal(size=21)) + reading * rng.normal(size=21) + 100.0 * t
-        scatter.append(M._scatter(t, angle))
-    q, sigma2 = M._noise(scatter)
-    # a parabola taken out of 20 windows takes some of the noise with it
-    assert q == pytest.approx(drift, abs=0.4) and sigma2 == pytest.approx(reading, abs=0.25)
+def test_fit_to_the_windows_by_hand() -> None:
+    """rate = K i + d(theta) with K = 2, 3, 4 at i = 1, 2, 3 and d = 0.1 + 0.2 theta + 0.3 theta2: back exactly, as the
+    mean of theta2 over a window is the difference of theta3/3; o_n is d less what Legendre polynomials of the range
+    -1..1 hold: 0.1 + 0.3/3.
+    """
+    rows, t = [], 0.0
+    for k, (K, i) in enumerate(((2.0, 1.0), (3.0, 2.0), (4.0, 3.0))):
+        for sense in (1.0, -1.0):
+            edges = sense * np.linspace(-1.0, 1.0, 13) * (1.0 if k else 0.8)
+            for a, b in itertools.pairwise(edges):
+                mean_d = 0.1 + 0.1 * (b**2 - a**2) / (b - a) + 0.1 * (b**3 - a**3) / (b - a)
+                dt = (b - a) / (sense * K * i + mean_d)
+                rows.append((2 * k + (sense < 0.0), t, t + dt, a, b, sense * i))
+                t += dt
+    names = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
+    w = dict(zip(names, np.array(rows).T, strict=True))
+    found = P.precession(w, {p: p // 2 for p in range(6)}, np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(found.K, [2.0, 3.0, 4.0], rtol=1e-12)
+    np.testing.assert_allclose(found.drift, 0.1 + 0.3 / 3.0, rtol=1e-10)
+
+
+def test_generalized_weights_by_hand() -> None:
+    """Two values of variances 1 and 4, uncorrelated: weights 0.8 and 0.2; with covariance 0.5 between them the
+    weights go as (4 - 0.5) : (1 - 0.5) = 7 : 1.
+    """
+    for cross, expected in ((0.0, [0.8, 0.2]), (0.5, [0.875, 0.125])):
+        est = types.SimpleNamespace(covariance=np.array([[1.0, cross], [cross, 4.0]]))
+        found = P.Precession(np.ones(2), np.zeros(2), est)
+        np.testing.assert_allclose(found.weights(np.ones((2, 1)), slice(0, 2)), [expected], rtol=1e-12)
 
 
 # ------------------------------------------------------------------------------------------ co-simulation

@@ -1,0 +1,88 @@
+"""Scale factors of the currents of a run from all its windows, under an estimated noise model.
+
+    theta' = sign K_n i_n + o_n + sum_j p_j P_j(theta) + noise
+
+Both senses of a current share its drift o_n (an even torquer term goes there too, as into the book's half difference);
+what the drift changes with the angle, the same for all currents, is a polynomial of degree 4 in the table angle,
+averaged over each window as the rate is.  The noise - random drift and errors of the angle readings, which neighbours
+share - is estimated from the same windows.  K_n from the times between marks (marks.py) stand beside.
+
+Not modelled: change of the drift between the two senses of a current other than as noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.reduction import correlated
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.regression import RegressionError
+
+Array = NDArray[np.float64]
+DEGREE = 4
+
+
+@dataclass(frozen=True)
+class Precession:
+    """K (n,) of the n currents and their drifts o (n,), SI, with the fit they come from."""
+
+    K: Array
+    drift: Array
+    est: correlated.Estimate
+
+    def weights(self, columns: Array, of: Array | slice) -> Array:
+        """(q, n) W of generalized least squares W values = c of ``values = columns c``, under their covariance."""
+        C = self.est.covariance[of, of]
+        size = np.sqrt(np.diag(C))
+        A, B = columns / size[:, None], C / np.outer(size, size)
+        gain = np.linalg.solve(A.T @ np.linalg.solve(B, A), np.linalg.solve(B, A).T)
+        out: Array = gain / size
+        return out
+
+    def u(self, of_K: Array | None = None, of_drift: Array | None = None) -> tuple[float, float]:
+        """Standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
+        n, J = self.K.size, np.zeros(self.est.beta.size)
+        J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
+        sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
+        u = min(sd, half / correlated.NORMAL)
+        return u, float(correlated.dof_of(np.array([half / u if u > 0.0 else correlated.NORMAL]))[0])
+
+
+def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array) -> Precession:
+    """phases: number of a phase -> number of its current in ``currents`` (A).  Raises ReductionError."""
+    phase = np.asarray(windows["phase"]).astype(int)
+    mine = np.isin(phase, list(phases))
+    t0, t1, a0, a1, i = (
+        np.asarray(windows[c], dtype=float)[mine] for c in ("t_start", "t_end", "angle_start", "angle_end", "mean")
+    )
+    which = np.array([phases[p] for p in phase[mine].tolist()])
+    n = currents.size
+    own = (which[:, None] == np.arange(n)).astype(float)
+    low, high = float(min(a0.min(), a1.min())), float(max(a0.max(), a1.max()))
+    start, end = (2.0 * (a - low) / (high - low) - 1.0 for a in (a0, a1))
+    shape = np.column_stack([_mean_legendre(j, start, end) for j in range(1, DEGREE + 1)])
+    X = np.column_stack([own * i[:, None], own, shape])
+    names = [f"K at {c * 1e3:g} mA" for c in currents] + [f"drift at {c * 1e3:g} mA" for c in currents]
+    try:
+        est = correlated.fit(
+            X, (a1 - a0) / (t1 - t0), [*names, *(f"P{j}" for j in range(1, DEGREE + 1))], t0, t1, readings=True
+        )
+    except RegressionError as error:
+        raise ReductionError(str(error)) from None
+    return Precession(est.beta[:n], est.beta[n : 2 * n], est)
+
+
+def _mean_legendre(j: int, start: Array, end: Array) -> Array:
+    """Mean of P_j between two arguments: its integral is (P_(j+1) - P_(j-1)) / (2 j + 1)."""
+
+    def integral(x: Array) -> Any:
+        return (special.eval_legendre(j + 1, x) - special.eval_legendre(j - 1, x)) / (2.0 * j + 1.0)
+
+    out: Array = (integral(end) - integral(start)) / (end - start)
+    return out

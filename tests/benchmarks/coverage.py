@@ -1,0 +1,326 @@
+"""How often the 95 % intervals hold the truth: every test system, random gyros, latitudes and noise.
+
+    python tests/benchmarks/coverage.py [SYSTEM ...] --runs 1000 [--noise population] [--seed 1] [--markdown]
+
+Each run draws true coefficients, a latitude and an instrument's noise, runs the whole dynamic co-simulation (FMUs, loop
+or servo, sampler) on a shortened plan and reduces the record; nothing is quasi-static.  What is counted is whether the
+printed interval holds the printed truth.
+
+Noise: by default drawn from the population that the reduction takes for granted (gyrobench.reduction.noise): white
+alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windows to half the record; where data are
+differences of readings, with errors of the readings too.  Windows are shortened, so the sizes are scaled: the parts get
+the densities that give a window the drawn shares.  ``--noise`` takes one instrument instead, a corner of the
+population; there intervals may hold the truth more or less often than 95 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from gyrobench import drift, frames
+from gyrobench.reduction import correlated, noise
+from gyrobench.reduction.noise import mean_variance
+from gyrobench.system.run import Session
+from gyrobench.system.system import System, load_system
+
+DPH, ARCSEC, G0 = math.pi / 648000.0, math.pi / 648000.0, 9.80665
+KU = 1e3 * DPH  # deg/h/mA
+Values = dict[str, Any]
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One instrument, as noise.Cells has it, on windows of the length ``window`` (s)."""
+
+    tau: float
+    share: float
+    reading: float
+    window: float
+
+    def white(self, size: float) -> float:
+        """Density (unit/sqrt(Hz)) of the white part where a window scatters by ``size``."""
+        return size * math.sqrt((1.0 - self.reading) * (1.0 - self.share) * self.window)
+
+    def markov(self, size: float) -> float:
+        v = float(mean_variance(np.array(self.window / self.tau)))
+        return size * math.sqrt((1.0 - self.reading) * self.share / v)
+
+    def error(self, size: float) -> float:
+        """Standard deviation of one reading."""
+        return size * self.window * math.sqrt(self.reading / 2.0)
+
+
+#: Corners of the population: correlation time in windows, share, reading.
+CORNERS = {
+    "white": (1.0, 0.0, 0.0),
+    "markov-1": (1.0, 1.0, 0.0),
+    "markov-5": (5.0, 1.0, 0.0),
+    "both-3": (3.0, 0.5, 0.0),
+    "hidden-8": (8.0, 0.3, 0.0),
+}
+
+
+# ---------------------------------------------------------------------------------------------- instruments
+def sign(rng: Rng) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def latitude(low: float, high: float) -> Callable[[Rng], float]:
+    return lambda rng: math.radians(rng.uniform(low, high)) * sign(rng)
+
+
+SIZES = (0.55, 1.3, 0.1)  # deg/h per g^n
+
+
+def floated(rng: Rng) -> Values:
+    return {f"gyro.{n}": rng.uniform(-1.0, 1.0) * SIZES[drift.order(n)] * DPH for n in drift.terms(9)}
+
+
+def two_channels(rng: Rng, terms: int = 9) -> Values:
+    found: Values = {"gyro.k_x": rng.uniform(15.0, 19.0) * KU, "gyro.k_y": rng.uniform(15.0, 19.0) * KU}
+    for c in "xy":
+        found[f"gyro.terms_{c}"] = terms
+        for n in drift.terms_2dof(c, terms):
+            found[f"gyro.{n}"] = rng.uniform(-1.0, 1.0) * SIZES[drift.order(n)] * DPH
+    return found
+
+
+def simple_channels(rng: Rng) -> Values:
+    """The four terms a channel of the simple model; the others are 0."""
+    return {n: v if n[6:] in SIMPLE or ".k" in n or "terms" in n else 0.0 for n, v in two_channels(rng).items()}
+
+
+SIMPLE = [f"{c}_{t}" for c in "xy" for t in ("0", "z", c, f"{c}z")]
+
+
+def attitude(rng: Rng) -> str:
+    return json.dumps(frames.rotation(rng.normal(size=3), rng.uniform(0.0, math.pi)).tolist())
+
+
+def accelerometer(rng: Rng) -> Values:
+    k = {f"accelerometer.k{j}": rng.uniform(-2e-4, 2e-4) for j in range(6)}
+    tilt = rng.uniform(-70.0, 70.0, 2) * ARCSEC
+    mount = frames.rotation(np.array([0.0, tilt[0], tilt[1]]), float(np.hypot(*tilt)))
+    return {**k, "accelerometer.k1": rng.uniform(0.99, 1.01), "accelerometer.mount": mount.tolist()}
+
+
+def torquer(rng: Rng) -> Values:
+    """Half of them are proportional: only those have a K_LS."""
+    return {**floated(rng), "gyro.k": rng.uniform(17.0, 17.4) * KU, "gyro.k3": rng.uniform(-0.1, 0.1) * rng.integers(2)}
+
+
+# ---------------------------------------------------------------------------------------------- noise of the parts
+def of_gyro(n: Noise, _: Values, size: float = 0.02 * DPH) -> Values:
+    return {"gyro.white": n.white(size), "gyro.markov": n.markov(size), "gyro.markov_tau": n.tau, "gyro.pickoff": 5e-9}
+
+
+def of_two_channels(n: Noise, _: Values) -> Values:
+    size = 0.02 * DPH
+    each = {"white": n.white(size), "markov": n.markov(size), "pickoff": 5e-9}
+    return {"gyro.markov_tau": n.tau, **{f"gyro.{k}_{c}": v for k, v in each.items() for c in "xy"}}
+
+
+def of_accelerometer(n: Noise, _: Values) -> Values:
+    size = 20e-6 * G0
+    own = {"white": n.white(size), "markov": n.markov(size), "markov_tau": n.tau}
+    return {f"accelerometer.{k}": v for k, v in own.items()}
+
+
+def of_encoder(n: Noise, values: Values) -> Values:
+    """Errors of the angle readings are quanta."""
+    return {**of_gyro(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
+
+
+def of_pickoff(dwell: float, size: float) -> Callable[[Noise, Values], Values]:
+    """Errors of the voltage readings are white noise over the dwell; H = C in the standard gyro."""
+
+    def values(n: Noise, drawn: Values) -> Values:
+        gain = drawn.get("gyro.K_sg", 10.0)  # V per rad of the case
+        return {**of_gyro(n, drawn, size), "gyro.pickoff": gain * n.error(size) * math.sqrt(dwell)}
+
+    return values
+
+
+@dataclass(frozen=True)
+class Case:
+    """A system on a shortened plan."""
+
+    system: str
+    values: Values
+    truth: Callable[[Rng], Values]
+    latitude: Callable[[Rng], float]
+    noise: Callable[[Noise, Values], Values] = of_gyro
+    attitude: bool = False
+
+    def drawn(self, rng: Rng) -> Values:
+        found = {**self.values, **self.truth(rng), "latitude": self.latitude(rng)}
+        return {**found, "attitude": attitude(rng)} if self.attitude else found
+
+
+TURNING: Values = {"rate": 0.15, "windows": 24, "dwell": 17.5, "settle": 2.0}
+FAST: Values = {"table.acceleration": 20.0}
+CASES = {
+    "tumble_single_axis": Case("tumble_single_axis", TURNING, floated, latitude(12.0, 78.0)),
+    "tumble_two_channel, nine": Case(
+        "tumble_two_channel", {**TURNING, **FAST}, two_channels, latitude(20.0, 70.0), of_two_channels
+    ),
+    "tumble_two_channel, simple": Case(
+        "tumble_two_channel", {**TURNING, **FAST, "model": "simple"}, simple_channels, latitude(20.0, 70.0),
+        of_two_channels,
+    ),
+    "tumble_two_axis": Case(
+        "tumble_two_axis",
+        {"dwell": 3.0, "settle": 2.0, "inner_rate": 0.05, "rebalance.i_max": 1.0, "table.index_rate[1]": 1.0,
+         "table.acceleration": [1.0, 1.0]},
+        floated, latitude(12.0, 78.0),
+    ),
+    "eight_position": Case(
+        "eight_position", {"dwell": 1.5, "settle": 1.5, "readings": 2}, lambda rng: two_channels(rng, 10),
+        latitude(0.0, 70.0), of_two_channels,
+    ),
+    "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
+    "open_loop_drift": Case(
+        "open_loop_drift", {"wait": 2.0, "dwell": 0.1}, floated, latitude(0.0, 85.0), of_pickoff(0.1, 0.02 * DPH),
+        attitude=True,
+    ),
+    "accelerometer_multipoint": Case(
+        "accelerometer_multipoint", {"dwell": 1.0, "settle": 1.0}, accelerometer, latitude(0.0, 85.0), of_accelerometer
+    ),
+    "accelerometer_multipoint, 12": Case(
+        "accelerometer_multipoint", {"dwell": 1.0, "settle": 1.0, "points": 12, "mounts": "a"}, accelerometer,
+        latitude(0.0, 85.0), of_accelerometer,
+    ),
+    "servo_vertical_level": Case(
+        "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0}, floated, latitude(0.0, 70.0), of_encoder
+    ),
+    "servo_polar": Case(
+        "servo_polar",
+        {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "time": 172.4, "window": 4.8, "dwell": 48.0,
+         "settle": 2.0},
+        floated, latitude(12.0, 78.0), of_encoder,
+    ),
+    "pickoff_scale_factor": Case(
+        "pickoff_scale_factor", {}, lambda rng: {**floated(rng), "gyro.K_sg": rng.uniform(8.0, 10.0)},
+        latitude(0.0, 85.0), of_pickoff(0.1, 0.1 * DPH),
+    ),
+    "torquer_scale_factor": Case(
+        "torquer_scale_factor", {"currents": "5 10 20 40 70 100", "range": "0.5deg", "range_large": "5deg"}, torquer,
+        latitude(0.0, 85.0), of_encoder,
+    ),
+}  # fmt: skip
+
+
+# ---------------------------------------------------------------------------------------------- counting
+@contextmanager
+def seen_windows() -> Iterator[list[tuple[Any, Any, bool]]]:
+    """What the reducer gives the fit: t0, t1 and whether the data are differences of readings."""
+    found: list[tuple[Any, Any, bool]] = []
+    inner = correlated.fit
+
+    def fit(X: Any, y: Any, names: Any, t0: Any, t1: Any, limit: float = 1e3, readings: bool = False) -> Any:
+        found.append((t0, t1, readings))
+        return inner(X, y, names, t0, t1, limit, readings)
+
+    correlated.fit = fit
+    try:
+        yield found
+    finally:
+        correlated.fit = inner
+
+
+@dataclass
+class Count:
+    """Of one coefficient: intervals that hold the truth, intervals, and errors over u."""
+
+    hits: int
+    runs: int
+    z: list[float]
+
+    def bounds(self, level: float = 0.95) -> tuple[float, float]:
+        """Clopper-Pearson bounds of the coverage."""
+        a, h, n = (1.0 - level) / 2.0, self.hits, self.runs
+        low = float(stats.beta.ppf(a, h, n - h + 1)) if h else 0.0
+        return low, float(stats.beta.ppf(1.0 - a, h + 1, n - h)) if h < n else 1.0
+
+
+def coverage(case: Case, runs: int, seed: int = 1, corner: str = "population") -> dict[str, Count]:
+    """Counts of each coefficient whose truth is known."""
+    rng = np.random.default_rng(seed)
+    system: System = load_system(case.system)
+    found: dict[str, Count] = {}
+    with Session(case.system) as session:
+        probe = case.drawn(rng)
+        with seen_windows() as seen:
+            system.with_values(probe).reduce(session.run(probe, seed=1))
+        t0, t1, readings = seen[0]
+        window = float(np.median(t1 - t0))
+        for run in range(runs):
+            if corner == "population":
+                noisy = Noise(*noise.draw(rng, t0, t1, readings), window)
+            else:
+                tau, share, reading = CORNERS[corner]
+                noisy = Noise(tau * window, share, reading, window)
+            drawn = case.drawn(rng)
+            values = {**drawn, **case.noise(noisy, drawn)}
+            record = session.run(values, seed=seed * 1_000_000 + run)
+            for c in system.with_values(values).reduce(record).coefficients:
+                if c.truth is None:
+                    continue
+                count = found.setdefault(c.name, Count(0, 0, []))
+                count.hits += bool(c.interval[0] <= c.truth <= c.interval[1])
+                count.runs += 1
+                count.z.append((c.estimate - c.truth) / c.u)
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("system", nargs="*", help=", ".join(CASES))
+    parser.add_argument("--runs", type=int, default=1000)
+    parser.add_argument("--noise", default="population", choices=["population", *CORNERS])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--markdown", action="store_true", help="one line of a table for each system")
+    given = parser.parse_args()
+    unknown = [n for n in given.system if not any(c == n or c.startswith(f"{n},") for c in CASES)]
+    if unknown:
+        parser.error(f"{', '.join(unknown)} unknown; there are {', '.join(CASES)}")
+    bad = []
+    for name, case in CASES.items():
+        if given.system and not any(name == n or name.startswith(f"{n},") for n in given.system):
+            continue
+        began = time.monotonic()
+        found = coverage(case, given.runs, given.seed, given.noise)
+        took = time.monotonic() - began
+        if given.markdown:
+            parts = ", ".join(f"{n} {c.hits / c.runs:.3f}" for n, c in found.items())
+            print(f"| {name} | {given.noise} | {given.runs} | {parts} |", flush=True)
+        else:
+            print(f"\n{name}, {given.noise}: {given.runs} runs in {took:.0f} s")
+            print(f"{'coefficient':<24}{'coverage':>9}   95 % bounds       rms of z")
+        for n, c in found.items():
+            low, high = c.bounds()
+            inside = 0.93 <= c.hits / c.runs <= 0.97
+            if not inside:
+                bad.append(f"{name} {n}")
+            if not given.markdown:
+                rms = float(np.sqrt(np.mean(np.square(c.z))))
+                note = "" if inside else "  OUTSIDE"
+                print(f"{n:<24}{c.hits / c.runs:>9.3f}   {low:.3f} .. {high:.3f}   {rms:9.2f}{note}", flush=True)
+    print("\nall between 0.93 and 0.97" if not bad else f"\noutside 0.93..0.97: {', '.join(bad)}", file=sys.stderr)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
