@@ -43,7 +43,9 @@ class FloatedGyro(Component):
 
     Torque on the mount, given in case axes: -H (w_O + r) cos b along I, C r + K b + H (omega_d + k i (1 + ...))
     along O, +H (w_O + r) sin b along S.  With h_I = H sin b and M_I = -H w_O cos b it is M_I - h_I' along I: a mount
-    that keeps its momentum with h_I in it needs no acceleration of the float.  Computed with reaction = 1 only.
+    that keeps its momentum with h_I in it needs no acceleration of the float.  h_I is given for the middle of the
+    coming internal step: held over the step by the mount, it neither drives nor damps the nutation (the map of one
+    step has determinant 1).  Computed with reaction = 1 only.
     The run ends where |b| reaches `stop`.
 
     Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
@@ -109,7 +111,7 @@ class FloatedGyro(Component):
     b = Output("rad", "float angle")
     saturated = Output("1", "1 while the pickoff is saturated")
     M_react = Output("N.m", "torque of the gyro on its mount, case axes", shape=(3,))
-    h_I = Output("N.m.s", "spin momentum along I, H sin b")
+    h_I = Output("N.m.s", "spin momentum along I, H sin b, half an internal step ahead")
     M_I = Output("N.m", "torque on the mount along I without its part -dh_I/dt")
 
     float_angle = State(0.0, "rad", "float angle b about O relative to the case")
@@ -229,5 +231,5 @@ class FloatedGyro(Component):
             for j in range(3):
                 row = self.mount[2][j] * s * turn - self.mount[0][j] * c * turn
                 self.M_react[j] = row + self.mount[1][j] * along_o
-            self.h_I = s
+            self.h_I = self.H * sin(self.float_angle + 0.5 * self.h * self.float_rate)
             self.M_I = -c * w_o
