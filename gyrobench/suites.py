@@ -210,8 +210,9 @@ def _write(folder: Path, meta: Mapping[str, Any]) -> None:
 
 
 # -------------------------------------------------------------------------------------- from what is there
-def reduce(suite: Suite, runs: Sequence[Path], spec: str | None, out: Path | None, force: bool, as_json: bool) -> str:
+def reduce(suite: System, runs: Sequence[Path], spec: str | None, out: Path | None, force: bool, as_json: bool) -> str:
     """The report of a suite from runs that exist, simulated or measured; returns the verdict."""
+    assert isinstance(suite, Suite)
     if suite.passed:
         raise UsageError(
             f"--set {next(iter(suite.passed))}: the tests have been run; options: {', '.join(suite.about)}"

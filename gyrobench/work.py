@@ -117,6 +117,8 @@ def check_fmus(parts: Mapping[str, str]) -> None:
 
 
 def runnable(system: System) -> System:
+    if isinstance(system, Suite):
+        raise UsageError(f"{system.name} is a suite; name one of its tests: {', '.join(system.tests())}")
     if not system.slots:
         raise UsageError(
             f"{system.name} has nothing to run: it reduces measured data (gyrobench reduce {system.name} --template)"
@@ -278,6 +280,9 @@ def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
 # ------------------------------------------------------------------------------- measured data, again
 def measuring(name: str) -> Any:
     system = load(name)
+    if isinstance(system, Suite):
+        hint = f"reduce each record by its own test, then gyrobench reduce {name} --data RUN --data RUN"
+        raise UsageError(f"{name} compares runs: {hint}")
     if not hasattr(system, "measured"):
         raise UsageError(f"{system.name} has no reduction of measured data")
     return system
@@ -298,11 +303,10 @@ def reduce(
     as_json: bool = False,
 ) -> str:
     """A laboratory's CSV to a report, or runs to that of a suite; returns the verdict."""
-    suite = load(name, values) if isinstance(load(name), Suite) else None
-    if isinstance(suite, Suite):
+    if isinstance(load(name), Suite):
         from gyrobench import suites
 
-        return suites.reduce(suite, data, spec, out, force, as_json)
+        return suites.reduce(load(name, values), data, spec, out, force, as_json)
     system = measuring(name)
     if len(data) > 1:
         raise UsageError(f"{name} reduces one record at a time; --data was given {len(data)} times")

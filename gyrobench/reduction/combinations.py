@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,15 +65,16 @@ def _shown(c: Coefficient) -> Compared:
 
 def quantities(results: Mapping[str, Result]) -> list[Compared]:
     """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
-    found: list[Compared] = []
+    each: list[tuple[Compared, str]] = []
     for label, result in results.items():
         for c in result.coefficients:
             new = _shown(c)
-            if any(_same(new.combination, q.combination) for q in found):
-                continue
-            if any(q.name == new.name for q in found):  # ω_d in another attitude
-                new = Compared(f"{new.name}, {label}", new.unit, new.meaning, new.combination)
-            found.append(new)
+            if not any(_same(new.combination, q.combination) for q, _ in each):
+                each.append((new, label))
+    names = [q.name for q, _ in each]
+    found = [  # ω_d in one attitude, and in another
+        q if names.count(q.name) == 1 else replace(q, name=f"{q.name}, {label}") for q, label in each
+    ]
     place = {n: k for k, n in enumerate((*drift.NAMES, *drift.NAMES_2DOF["x"], *drift.NAMES_2DOF["y"]))}
 
     def rank(q: Compared) -> tuple[int, int]:

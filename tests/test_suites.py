@@ -1,0 +1,257 @@
+"""Suites by command: what they leave, one failed or stopped test, runs that exist, refusals."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from gyrobench import cli, suites
+from gyrobench.bench import standard_folder
+from gyrobench.system.record import Record
+from gyrobench.system.run import run
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import load_system
+
+Call = Callable[..., tuple[int, str, str]]
+NAME = "drift_test_suite"
+PLANS = {
+    "tumble_single_axis": ["rate=30deg/s", "dwell=20", "settle=0.5", "windows=12"],
+    "fixed_position": ["dwell=40", "readings=20", "settle=1"],
+    "servo_vertical_level": ["dwell=40", "windows=8", "cycles=1", "settle=1"],
+}
+
+
+def words(*tests: str, sets: tuple[str, ...] = ()) -> list[str]:
+    values = [f"tests={' '.join(tests)}", *(f"{t}.{v}" for t in tests for v in PLANS[t]), "gyro.markov_tau=3", *sets]
+    return [w for v in values for w in ("--set", v)]
+
+
+TWO = words("tumble_single_axis", "fixed_position")
+
+
+@pytest.fixture
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, arguments)])
+        capsys.readouterr()
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return code, out, err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A suite that ran: three tests, with a name for the signature."""
+    folder = tmp_path_factory.mktemp("suite")
+    more = ["--set", "operator=A. B.", "--set", "instrument=gyro 17", "--set", "tumble_single_axis.u_scale_factor=1e-3"]
+    made = subprocess.run(
+        [sys.executable, "-m", "gyrobench.cli", "run", NAME, *words(*PLANS), *more, "--seed", "3", "--out", "s"],
+        cwd=folder, capture_output=True, text=True, check=False, env=_env(),
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    (folder / "out.txt").write_text(made.stdout, encoding="utf-8")
+    return folder / "s"
+
+
+def _env() -> dict[str, str]:
+    import os
+
+    return {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1])}
+
+
+def result(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return found
+
+
+# ------------------------------------------------------------------------------------------- what it leaves
+def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
+    for name in PLANS:
+        assert Record.load(done / name).complete
+        for file in ("result.json", "report.html", "report.pdf"):
+            assert (done / name / file).stat().st_size > 1000
+    meta = json.loads((done / "run.json").read_text(encoding="utf-8"))
+    assert meta["complete"] and list(meta["tests"]) == list(PLANS)
+    for name, test in meta["tests"].items():
+        assert test["report_id"] == result(done / name)["report_id"]
+
+
+def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Path) -> None:
+    suite = load_system(NAME)
+    assert isinstance(suite, Suite)
+    values: dict[str, Any] = dict(v.split("=") for v in PLANS["fixed_position"]) | {"gyro.markov_tau": 3.0}
+    alone = run("fixed_position", values=values, seed=suite.seed_of(3, "fixed_position"))
+    assert alone.windows["mean"].tolist() == Record.load(done / "fixed_position").windows["mean"].tolist()
+
+
+def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> None:
+    from html.parser import HTMLParser
+
+    found = result(done)
+    schema = json.loads((standard_folder() / "reports" / "result.schema.json").read_text(encoding="utf-8"))
+    jsonschema.validate(found, schema)
+    page = (done / "report.html").read_text(encoding="utf-8")
+    checked = 0
+
+    class Reader(HTMLParser):
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+            nonlocal checked
+            a = dict(attrs)
+            if tag == "data" and a.get("data-pointer"):
+                value: Any = found
+                for part in str(a["data-pointer"]).split("/")[1:]:
+                    part = part.replace("~1", "/").replace("~0", "~")
+                    value = value[int(part)] if isinstance(value, list) else value[part]
+                assert float(str(a["data-value"])) == value
+                checked += 1
+
+    Reader().feed(page)
+    assert checked > 200
+    for text in (
+        "Methods against each other",
+        "Statements and signatures",
+        "A. B.",
+        "gyro 17",
+        "All data are simulated",
+    ):
+        assert text in page
+    for m in found["suite"]["members"]:
+        assert m["report_id"] in page and m["record_sha256"] in page
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext")
+def test_the_pdf_says_the_same(done: Path) -> None:
+    text = subprocess.run(
+        ["pdftotext", "-layout", done / "report.pdf", "-"], capture_output=True, text=True, check=True
+    )
+    for words_ in ("Tested by", "Approved by", "A. B.", "weighted mean", "end of report", result(done)["report_id"]):
+        assert words_ in text.stdout
+
+
+def test_the_terminal_gives_the_answer(done: Path) -> None:
+    said = (done.parent / "out.txt").read_text(encoding="utf-8")
+    assert "methods: consistent" in said and "largest E_n" in said and "ω_d" in said
+
+
+def test_the_shared_scale_factor_is_named(done: Path) -> None:
+    found = result(done)["suite"]
+    assert found["shared"] == ["torquer scale factor"]
+
+
+def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
+    """The same numbers from the suite's folder, and from the folders of its tests as if they came from elsewhere."""
+    before = result(done)
+    assert gyrobench("report", done)[0] == 0
+    again = result(done)
+    assert again["coefficients"] == before["coefficients"] and again["suite"] == before["suite"]
+    code, out, _ = gyrobench("reduce", NAME, *(w for n in PLANS for w in ("--data", done / n)), "--out", "r", "--json")
+    assert code == 0 and json.loads(out)["coefficients"] == before["coefficients"]
+    assert [q["words"] for q in json.loads(out)["suite"]["quantities"]] == [
+        q["words"] for q in before["suite"]["quantities"]
+    ]
+
+
+def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -> None:
+    spec = tmp_path / "limits.toml"
+    for limit, code, verdict in ((5.0, 0, "pass"), (0.001, 1, "fail")):
+        spec.write_text(f'[coefficients.D_F]\nunit = "deg/h"\nmin = {-limit}\nmax = {limit}\n', encoding="utf-8")
+        assert gyrobench("report", done, "--spec", spec, "--strict")[0] == code
+        assert result(done)["verdict"] == verdict
+
+
+def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
+    """The fixed position of another gyro: the run says so, and names the parameter."""
+    other = words("fixed_position", "servo_vertical_level", sets=("fixed_position.gyro.D_F=0.5deg/h",))
+    code, out, _ = gyrobench("run", NAME, *other, "--strict", "--out", "o")
+    assert code == 1 and "methods: inconsistent" in out and "gyro.D_F" in out
+    assert result(Path("o"))["suite"]["disagreeing"] == ["ω_d"]
+
+
+# ------------------------------------------------------------------------------------ stopped and failed
+def test_a_stopped_suite_goes_on(gyrobench: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second test is stopped; --resume runs it and leaves the first as it is."""
+    perform, ran = suites.perform, []
+
+    def stopping(job: Any, *more: Any) -> Any:
+        ran.append(job.system)
+        if job.system == "fixed_position":
+            raise suites.Interrupted("stopped at t = 1 s by the user")
+        return perform(job, *more)
+
+    monkeypatch.setattr(suites, "perform", stopping)
+    code, _, err = gyrobench("run", NAME, *TWO, "--out", "s")
+    assert code == 130 and "the suite goes on with the same command and --resume" in err
+    assert not (Path("s") / "result.json").exists()
+    code, _, err = gyrobench("report", "s")
+    assert code == 2 and "did not end" in err
+    first = (Path("s/tumble_single_axis/run.json")).stat().st_mtime_ns
+    monkeypatch.setattr(suites, "perform", lambda job, *more: ran.append(job.system) or perform(job, *more))
+    code, _, err = gyrobench("run", NAME, *TWO, "--out", "s", "--resume")
+    assert code == 0 and "tumble_single_axis (1 of 2): kept" in err
+    assert ran == ["tumble_single_axis", "fixed_position", "fixed_position"]
+    assert (Path("s/tumble_single_axis/run.json")).stat().st_mtime_ns == first
+    assert gyrobench("run", NAME, *TWO, "--seed", "2", "--out", "s")[2].count("holds another run") == 1
+
+
+def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
+    """A current limit that saturates: the reduction of this one test refuses, the report is of the others."""
+    three = words(*PLANS, sets=("fixed_position.rebalance.i_max=1e-9",))
+    code, out, err = gyrobench("run", NAME, *three, "--out", "s")
+    assert code == 3 and "fixed_position failed; the report in s is of the others" in err
+    found = result(Path("s"))
+    assert [m["label"] for m in found["suite"]["members"]] == ["tumble_single_axis", "servo_vertical_level"]
+    assert found["suite"]["failed"][0]["label"] == "fixed_position"
+    assert any(w.startswith("fixed_position gave no result") for w in found["warnings"])
+    assert Record.load(Path("s/fixed_position")).complete  # what it recorded is there
+    assert "methods: " in out
+
+
+# ------------------------------------------------------------------------------------------- refusals
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["run", NAME, "--set", "tests=servo_polar eight_position"], "are not of one gyro"),
+        (["run", NAME, "--set", "tests=servo_polar,fixed_position", "--set", "gyro.D_X=1"], "has no parameter 'D_X'"),
+        (["run", NAME, "--set", "latitude=5deg"], "servo_polar: latitude 5"),
+        (["run", NAME, "--set", "gyr.D_I=1"], "no slot 'gyr'; did you mean gyro"),
+        (["run", NAME, "--part", "wheel=x"], "no test of the suite has a slot 'wheel'"),
+        (["run", NAME, "--resume", "--set", "tests=nothing"], "no test 'nothing'"),
+        (["show", NAME, "--picture", "x.svg"], "a suite has no wiring of its own"),
+        (["export", NAME, "--to", "ssp"], "is a suite"),
+        (["reduce", NAME, "--template"], "reduce each record by its own test"),
+        (["reduce", NAME, "--data", "a"], "name the runs, two or more"),
+        (["reduce", NAME, "--data", "a", "--data", "b"], "a: no result.json there"),
+        (["reduce", NAME, "--data", "a", "--data", "b", "--set", "gyro.D_I=1"], "the tests have been run"),
+        (["reduce", "fixed_position", "--data", "a", "--data", "b"], "one record at a time"),
+    ],
+)  # fmt: skip
+def test_refused(gyrobench: Call, arguments: list[str], text: str) -> None:
+    code, _, err = gyrobench(*arguments)
+    assert code == 2 and text in err
+    assert not Path("reports").exists()
+
+
+def test_show_and_list(gyrobench: Call) -> None:
+    code, out, _ = gyrobench("show", NAME, "--json")
+    found = json.loads(out)
+    assert code == 0 and [t["name"] for t in found["tests"]] == found["sets"]["floated"].split()
+    assert all(t["duration"] > 0.0 and t["plan"] for t in found["tests"])
+    assert "--seed" in gyrobench("show", NAME)[1]
+    assert NAME in gyrobench("list")[1]
