@@ -110,7 +110,7 @@ class System:
     spec: ClassVar[tuple[str, ...]] = ()
     slots: ClassVar[Mapping[str, Slot]] = {}
     wires: ClassVar[str] = ""
-    factors: ClassVar[Mapping[str, float]] = {}  # of wires: "a.y -> b.u" -> factor (SI to SI), 1 where not named
+    factors: ClassVar[Mapping[str, float]] = {}  # of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too)
     raw: ClassVar[Mapping[str, Any]] = {}  # "slot.variable" -> start value in the FMU's own unit
     options: ClassVar[Mapping[str, Option]] = {}
     windows: ClassVar[Windows | None] = None

@@ -119,10 +119,11 @@ class _Layer:
             self.problems.append(f"{wire}: {len(outputs)} elements meet {len(inputs)}: the shapes must be equal")
             return
         ua, ub = self.dimension(a, x), self.dimension(b, y)
-        if ua not in ("", "1") and ub not in ("", "1") and not units.same_dimension(ua, ub):
-            self.problems.append(f"{wire}: {ua} into {ub}: the dimensions differ")
+        known = ua not in ("", "1") and ub not in ("", "1") and wire not in self.system.factors
+        if known and not units.same_dimension(ua, ub):
+            self.problems.append(f"{wire}: {ua} into {ub}: the dimensions differ, and the wire has no factor")
             return
-        factor = self.system.factors.get(wire, 1.0)
+        factor = self.system.factors.get(wire, 1.0)  # may turn one quantity into another
         source = self.bindings[a].socket.connector(x.split("[")[0])
         whole = source is not None and source.whole
         for index, out in outputs.items():
