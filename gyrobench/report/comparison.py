@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.reduction.result import Result
 
-from . import plots
+from . import plots, ranking
 from .blocks import Cell, Column, Fold, Page, Picture, Pictures, Row, Section, Table, Text, number_cell, text_cell
 from .document import content_hash, document
 from .numbers import write_number
@@ -42,9 +42,10 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
     content = {
         "baseline": baseline,
         "runs": [
-            {k: doc[k] for k in ("report_id", "system", "title", "verdict", "simulated")} | {"name": name}
+            {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")} | {"name": name}
             for name, doc in zip(names, docs, strict=True)
         ],
+        "ranking": ranking.ranking(docs),
         "differing": [r for r in rows if any(v != r["values"][0] for v in r["values"])],
         "equal": [
             {"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])
@@ -122,6 +123,7 @@ def page(doc: Json) -> Page:
     titles = dict.fromkeys(run["title"] for run in runs)
     with styled():
         sections = [
+            ranking.section(doc, [_letter(k) for k in range(len(runs))]),
             Section("What differs", "differs", [_runs(doc), *_differing(doc)]),
             Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
             Section("Side by side", "figures", _figures(doc)),
