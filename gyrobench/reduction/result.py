@@ -78,6 +78,30 @@ class BudgetLine:
 
 
 @dataclass
+class Response:
+    """A measured response of a loop, with the curves of its linear models laid over it.
+
+    kind: "loop" (open loop gain: Bode plot with margins), "ratio" (a gain against frequency), "step" (against time).
+    x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
+    of a gain (u rad of its phase too), in y_unit of a step; None: not known.  curves: {"label", "x", "y", "phase"}.
+    """
+
+    name: str
+    kind: str
+    caption: str
+    x: list[float]
+    x_name: str
+    x_unit: str
+    y: list[float]
+    y_name: str
+    y_unit: str
+    phase: list[float] = field(default_factory=list)
+    u: list[float | None] = field(default_factory=list)
+    coherence: list[float] = field(default_factory=list)
+    curves: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass
 class Result:
     """What a reduction found.  Every field is JSON-able through :meth:`as_dict`."""
 
@@ -114,6 +138,8 @@ class Result:
     instrument: str = ""
     simulated: bool = True
     provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
+    ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
+    responses: list[Response] = field(default_factory=list)  # of loops
     suite: dict[str, Any] = field(default_factory=dict)  # of several tests: see gyrobench.reduction.suite
 
     def as_dict(self) -> dict[str, Any]:
@@ -127,6 +153,7 @@ class Result:
         d["series"] = [Series(**s) for s in d["series"]]
         d["tests"] = [Test(**t) for t in d["tests"]]
         d["budget"] = [BudgetLine(**b) for b in d.get("budget", [])]
+        d["responses"] = [Response(**r) for r in d.get("responses", [])]
         for c in d["coefficients"]:
             c.interval = tuple(c.interval)
             c.limit = tuple(c.limit) if c.limit is not None else None

@@ -13,6 +13,8 @@ Json = dict[str, Any]
 
 
 def residuals(doc: Json) -> list[Any]:
+    if not doc["series"] and not doc["tests"]:
+        return generic(doc, ("noise",), "Noise model of the estimation.")
     left = [r for s in doc["series"] for r in s["residual"]]
     blocks = pictures(
         Picture(
@@ -91,12 +93,16 @@ def stability(doc: Json) -> list[Any]:
 def estimates(doc: Json) -> list[Any]:
     names = [c["name"] for c in doc["coefficients"]]
     condition = number_cell(doc, ("condition",), significant=3).text
-    blocks: list[Any] = [
-        Text(
-            f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "
-            f"{condition}. Above 100 a small error of the model makes a large one in some combination."
-        )
-    ]
+    blocks: list[Any] = (
+        []
+        if not doc["series"]
+        else [
+            Text(
+                f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "
+                f"{condition}. Above 100 a small error of the model makes a large one in some combination."
+            )
+        ]
+    )
     columns = [
         Column(h)
         for h in (

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from . import evidence, method, plots
+from . import evidence, method, plots, responses
 from .blocks import Answer, Cell, Column, Page, Picture, Row, Section, Table, number_cell, pictures, text_cell
 from .numbers import write_number
 from .signing import signing
@@ -154,7 +154,7 @@ def _capital(text: str) -> str:
 
 def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
     curves = [s for s in doc["series"] if plots.is_curve(s)]
-    blocks: list[Any] = []
+    blocks: list[Any] = responses.blocks(doc)
     number = 0
     axes = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
     for axis, _ in axes.most_common():  # the richest record first

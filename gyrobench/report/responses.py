@@ -1,0 +1,127 @@
+"""Responses of loops: Bode plots, ratios and steps, with their linear curves laid over them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .blocks import Picture, pictures
+from .plots import finite, short
+from .style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
+
+Json = Mapping[str, Any]
+LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their order
+
+
+def blocks(doc: Json) -> list[Any]:
+    """One figure for each response of a result document."""
+    found: list[Any] = []
+    for k, r in enumerate(doc.get("responses") or []):
+        key = f"response-{k + 1}"
+        alt = f"{r['name']}: measured points and linear curves"
+        found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
+    return found
+
+
+def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = ()) -> str:
+    """The same response of one or several runs in one figure; gain in dB over phase, or values over time."""
+    first = named[0][1]
+    if first["kind"] == "step":
+        return _steps(named, key, curves)
+    phases = first["kind"] == "loop"
+    fig, axes = figure(WIDE * 0.8, 96 if phases else 62, nrows=2 if phases else 1, sharex=True)
+    top = axes[0, 0]
+    for i, (label, r) in enumerate(named):
+        colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
+        x, y, u = finite(r["x"], r["y"], [0.0 if v is None else v for v in r["u"] or [0.0] * len(r["x"])])
+        style: dict[str, Any] = {"color": colour, "markersize": 3.6, "markeredgewidth": 0, "label": label, "zorder": 3}
+        line = "-" if len(named) > 1 else ""
+        bars = [20.0 * math.log10(1.0 + 1.96 * v) for v in u]
+        top.errorbar(x, _db(y), yerr=bars, fmt=MARKERS[i % len(MARKERS)] + line, elinewidth=0.9, linewidth=0.8, **style)
+        if phases and r["phase"]:
+            bars = [math.degrees(1.96 * v) for v in u]
+            near = _nearest(r["phase"], first)
+            axes[1, 0].errorbar(
+                x, near, yerr=bars, fmt=MARKERS[i % len(MARKERS)] + line, elinewidth=0.9, linewidth=0.8, **style
+            )
+    for (colour, dashes), curve in zip(LINES, curves, strict=False):
+        top.plot(curve["x"], _db(curve["y"]), dashes, color=colour, linewidth=1.0, label=curve["label"])
+        if phases:
+            shift = _shift(curve, first)
+            axes[1, 0].plot(curve["x"], [p + shift for p in curve["phase"]], dashes, color=colour, linewidth=1.0)
+    for ax in axes[:, 0]:
+        ax.set_xscale("log")
+    unit = first["y_unit"]
+    top.set_ylabel(axis_label(first["y_name"], "dB" if unit in ("", "1") else f"dB re {unit}"))
+    if phases:
+        top.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
+        bottom = axes[1, 0]
+        bottom.set_ylabel(axis_label("phase", "°"))
+        _phase_axis(bottom)
+        fig.align_ylabels(axes[:, 0])
+    axes[-1, 0].set_xlabel(axis_label("frequency", "Hz"))
+    _frequency_axis(axes[-1, 0])
+    if len(named) + len(curves) > 1:
+        fig.legend(*top.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=2.2)
+    return svg(fig, key)
+
+
+def _steps(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json]) -> str:
+    fig, axes = figure(WIDE * 0.8, 62)
+    ax = axes[0, 0]
+    for i, (label, r) in enumerate(named):
+        x, y = finite(r["x"], r["y"])
+        colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
+        marks = {"marker": "o", "linestyle": "", "markersize": 2.4} if len(named) == 1 else {"linestyle": "-"}
+        every = max(1, len(x) // 120) if len(named) == 1 else 1
+        ax.plot(x[::every], y[::every], color=colour, markeredgewidth=0, label=short(label), zorder=3, **marks)
+    for (colour, dashes), curve in zip(LINES, curves, strict=False):
+        ax.plot(curve["x"], curve["y"], dashes, color=colour, linewidth=1.0, label=curve["label"])
+    first = named[0][1]
+    ax.set_xlabel(axis_label(first["x_name"], first["x_unit"]))
+    ax.set_ylabel(axis_label(first["y_name"], first["y_unit"]))
+    ax.margins(x=0.01)
+    if len(named) + len(curves) > 1:
+        fig.legend(loc="outside upper left", ncols=3, handlelength=2.2)
+    return svg(fig, key)
+
+
+def _db(values: Sequence[float]) -> list[float]:
+    return [20.0 * math.log10(v) if v > 0.0 else math.nan for v in values]
+
+
+def _shift(curve: Json, points: Json) -> float:
+    """Whole turns that bring a curve's phase to that of the points."""
+    if not points["phase"] or not curve["phase"]:
+        return 0.0
+    x0 = points["x"][0]
+    k = min(range(len(curve["x"])), key=lambda i: abs(math.log(curve["x"][i] / x0)))
+    return 360.0 * float(round((points["phase"][0] - curve["phase"][k]) / 360.0))
+
+
+def _nearest(phase: Sequence[float], first: Json) -> list[float]:
+    """The phase moved by whole turns to that of the first run."""
+    turns = 360.0 * round((first["phase"][0] - phase[0]) / 360.0) if first["phase"] else 0.0
+    return [p + turns for p in phase]
+
+
+def _phase_axis(ax: Any) -> None:
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = ax.get_ylim()
+    ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
+    for level in range(-900, 901, 360):
+        if low <= level - 180 <= high:
+            ax.axhline(level - 180, color=MUTED, linewidth=0.8, zorder=1)
+
+
+def _frequency_axis(ax: Any) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    from .numbers import write_number
+
+    low, high = ax.get_xlim()
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 300 else (1.0, 2.0, 5.0), numticks=12))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
+    ax.xaxis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,204 @@
+"""From the record of a power gyro stabilizer to its measures, beside the closed forms.
+
+[STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-5..5-23, corrected as in the spec]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gyrobench.reduction import margins
+from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops import Gate, Point, drift
+from gyrobench.reduction.result import Result
+
+Specification = Mapping[str, tuple[float | None, float | None]]
+DPH = math.pi / 648000.0
+EQUATION = (
+    "J_x alpha.dot.double + C_x alpha.dot + H beta.dot = -K_m beta + M_x \\ "
+    "J_y beta.dot.double + C_y beta.dot - H alpha.dot = M_y, quad K_m = i k_u k_i k_m"
+)
+CONVENTIONS = [
+    "α: platform, the outer gimbal with its load, about the stabilized axis x; β: precession about the inner axis y.",
+    "Loop gain L = −(signal that comes back) / (signal put in), opened at the potentiometer.",
+    "Drift: rate of α with the base at rest; a torque M_y on the precession axis turns the platform by −M_y/H.",
+]
+SOURCES = ["STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-1..5-23, errata of spec d4 item 3"]
+
+
+def k_m(parameters: Mapping[str, Any]) -> float:
+    """Stiffness of the correction, N.m/rad: ratio k_u k_i k_m, with the gyro's pickoff as potentiometer (5-5)."""
+    p = parameters
+    return float(p["stabilizer.ratio"] * p["gyro.K_sg_y"] * p["stabilizer.k_i"] * p["stabilizer.k_m"])
+
+
+def routh_limit(H: float, J_x: float, J_y: float, C_x: float, C_y: float) -> float:
+    """Largest stable K_m, N.m/rad: (C_x/J_x + C_y/J_y)(H + C_x C_y/H).
+
+    The source's (5-23) drops C_x C_y/H; exact by the Routh table of (5-20).
+    """
+    return (C_x / J_x + C_y / J_y) * (H + C_x * C_y / H)
+
+
+def nutation(H: float, J_x: float, J_y: float, C_x: float, C_y: float) -> float:
+    """Undamped nutation frequency, Hz: sqrt((H^2 + C_x C_y)/(J_x J_y)) / 2 pi."""
+    return math.sqrt((H * H + C_x * C_y) / (J_x * J_y)) / (2.0 * math.pi)
+
+
+def lean(t: Any, M: float, K_m: float, H: float) -> Any:
+    """Precession angle after a load step with the platform taken as held, rad: M/K_m (1 - exp(-K_m t/H))  (5-10)."""
+    return M / K_m * (1.0 - np.exp(-K_m * np.asarray(t) / H))
+
+
+def transient(H: float, K_m: float) -> float:
+    """t* = pi H / K_m, s: the lean is then within exp(-pi) = 4.3 % of its end (5-13)."""
+    return math.pi * H / K_m
+
+
+def steady(M: float, H: float, K_m: float, C_y: float) -> float:
+    """Platform angle that a constant load leaves, rad: C_y M / (H K_m), 0 only without damping of the precession.
+
+    The source says it is always 0.
+    """
+    return C_y * M / (H * K_m)
+
+
+def from_record(record: Any, specification: Specification | None = None) -> Result:
+    """The Result.  Raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    p = record.meta["parameters"]
+    gyro = {n: float(p[f"gyro.{n}"]) for n in ("H", "J_x", "J_y", "C_x", "C_y")}
+    K_m, H = k_m(p), gyro["H"]
+    for gate in found.of("torque", 1, "step"):
+        _load(found, gate, K_m, H, gyro["C_y"])
+    points = found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
+    if points:
+        _limits(found, points, K_m, gyro)
+    isolation = found.ratio(
+        "isolation", "motion", 1, "gyro.alpha", "motion.angle[1]", plus="motion.angle[1]",
+        caption="Isolation: inertial angle of the platform over that of the base. Points: measured; lines: linear.",
+    )  # fmt: skip
+    _friction(found, isolation)
+    for gate in found.of("torque", 2):
+        _servo(found, gate, H)
+    for gate in found.of("hold"):
+        _drift(found, gate)
+    result = found.result(
+        title="Power gyro stabilizer with a two-degree-of-freedom gyro",
+        method="Load step, sine sweeps of loop and base, servo torque and drift hold  [STAB-POWER-2DOF]",
+        sources=SOURCES,
+        equation=EQUATION,
+        conventions=CONVENTIONS,
+        specification=specification,
+    )
+    result.summary = _summary(result)
+    return result
+
+
+def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float) -> None:
+    M = gate.amplitude
+    b = found.step(gate, "gyro.beta", scale=ARCSEC, unit="″", y_name="precession β")
+    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α")
+    found.measure(
+        "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
+    )
+    t_star = transient(H, K_m)
+    left = 1.0 - float(np.interp(t_star, gate.t - gate.t[0], gate["gyro.beta"] - b.initial)) / b.change
+    residual = 100.0 * b.u_change / abs(b.change)
+    found.measure(
+        "β(t*)", "lean still missing at t* = πH/K_m", "%", 100.0 * left, residual, closed=100.0 * math.exp(-math.pi)
+    )
+    found.measure(
+        "t_5 β", "settling of the lean to 5 %", "s", b.settled_5, b.u_settled, closed=H / K_m * math.log(20.0)
+    )
+    closed = steady(M, H, K_m, C_y)
+    found.measure("α*", "steady platform angle", "″", a.change / ARCSEC, a.u_change / ARCSEC, closed=closed / ARCSEC)
+    if closed:
+        stiffness = _inverse(M, a.change, a.u_change)
+        found.measure("S", "stiffness of the platform, M / α*", "N·m/rad", *stiffness, closed=M / closed)
+    found.measure("overshoot α", "of the platform angle", "%", 100.0 * a.overshoot, residual)
+    found.measure("t_5 α", "settling of the platform to 5 %", "s", a.settled_5, a.u_settled)
+    found.measure("t_2 α", "settling of the platform to 2 %", "s", a.settled_2, a.u_settled)
+
+
+def _inverse(M: float, change: float, u: float) -> tuple[float | None, float]:
+    return (M / change, abs(M / change**2) * u) if change else (None, 0.0)
+
+
+def _limits(found: LoopFindings, points: list[Point], K_m: float, gyro: Mapping[str, float]) -> None:
+    """The phase of L passes -180 degrees at the undamped nutation frequency, where its gain tells the limit of K_m."""
+    shown = margins.measured_margins(points)
+    if shown.upper is None:
+        return
+    f = next(f for f, g in shown.gains if g == shown.upper)
+    u = max(q.u or 0.0 for q in sorted(points, key=lambda q: abs(q.f - f))[:2])
+    limit = routh_limit(**gyro)
+    found.measure(
+        "K_m limit",
+        "K_m at which the loop is at its limit",
+        "N·m/rad",
+        K_m * shown.upper,
+        K_m * shown.upper * u,
+        closed=limit,
+    )
+    near = np.array([0.99 * f, 1.01 * f])
+    turn = abs(float(np.angle(np.divide(*margins.between(points, near)[::-1])))) / 0.02  # rad per relative frequency
+    found.measure("f_n", "undamped nutation frequency", "Hz", f, f * u / turn if turn else 0.0, closed=nutation(**gyro))
+
+
+def _friction(found: LoopFindings, points: list[Point]) -> None:
+    """The base turns the platform through the damping of the axis."""
+    if points:
+        at = min(points, key=lambda q: abs(q.f - 1.0))
+        linear = found.excited("discrete", "motion", 1, "gyro.alpha", [at.f], plus="motion.angle[1]")
+        size = 20.0 * math.log10(abs(at.value))
+        closed = None if linear is None else 20.0 * math.log10(abs(linear[0]))
+        found.measure(
+            "isolation", f"platform over base at {at.f:g} Hz", "dB", size, 8.686 * (at.u or 0.0), closed=closed
+        )
+
+
+def _servo(found: LoopFindings, gate: Gate, H: float) -> None:
+    d = drift(gate.t, gate["gyro.alpha"])
+    own = float(np.mean(gate["gyro.drift_x"]))
+    closed = own - gate.amplitude / H
+    found.measure(
+        "servo rate",
+        "turned by M_y on the precession axis, −M_y/H",
+        "°/h",
+        d.rate / DPH,
+        d.u / DPH,
+        closed=closed / DPH,
+    )
+
+
+def _drift(found: LoopFindings, gate: Gate) -> None:
+    d = drift(gate.t, gate["gyro.alpha"])
+    truth = float(np.mean(gate["gyro.drift_x"])) / DPH
+    found.measure("drift", "of the platform at rest", "°/h", d.rate / DPH, d.u / DPH, truth=truth)
+    scale = {k: [v / DPH for v in d.allan[k]] for k in ("dev", "lo", "hi") if k in d.allan}
+    found.allan = {**d.allan, **scale, "unit": "°/h"} if d.allan else {}
+    if d.walk is not None:
+        found.measure("N", "angle random walk", "°/√h", math.degrees(d.walk) * 60.0)
+
+
+def _summary(result: Result) -> list[str]:
+    c = {c.name: c for c in result.coefficients}
+    said = []
+    if "α*" in c and "K_m" in c:
+        said.append(
+            f"A load leaves the platform {c['α*'].estimate:.4g}″ off; the gyro leans by M/K_m with K_m = "
+            f"{c['K_m'].estimate:.4g} N·m/rad."
+        )
+    if "PM" in c and "K_m limit" in c:
+        said.append(
+            f"The loop crosses over at {c['f_c'].estimate:.3g} Hz with a phase margin of {c['PM'].estimate:.3g}°; it "
+            f"is stable up to K_m = {c['K_m limit'].estimate:.4g} N·m/rad."
+        )
+    if "drift" in c:
+        said.append(f"The platform drifts by {c['drift'].estimate:.3g} °/h at rest.")
+    return said

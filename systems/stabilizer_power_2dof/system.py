@@ -1,0 +1,114 @@
+"""A platform axis stabilized by a power gyro: the gyro bears the load, a motor takes it over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.reduction.result import Result
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.record import Record
+from gyrobench.system.system import Option, Slot, System
+
+Specification = Mapping[str, tuple[float | None, float | None]]
+#: of the gyro where the user gives nothing else (spec d4, item 3), and what the stabilizer is told of it
+GYRO = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0, "K_sg_y": 10.0, "u_max": 5.0}
+TOLD = {"H": "H_g", "J_x": "J_x", "J_y": "J_y", "C_x": "C_x", "C_y": "C_y", "K_sg_y": "k_u"}
+K_I, RATIO = 10.0, 100.0  # amplifier and reducer; the motor's gain makes the K_m that is asked for
+TEST = (0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 4.0, 6.0, 9.0, 13.0, 17.0, 22.0, 30.0, 45.0)  # Hz
+MOTION = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # Hz
+
+
+class StabilizerPower2dof(System):
+    """Two-degree-of-freedom gyro as sensor and source of torque on one axis, with a correction motor.
+
+        J_x a'' + C_x a' + H b' = -K_m b + M_x        J_y b'' + C_y b' - H a' = M_y
+
+    a: platform (outer gimbal with the load), b: precession.  [STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-1..5-23]
+    """
+
+    title = "Power gyro stabilizer with a two-degree-of-freedom gyro"
+    spec = ("STAB-POWER-2DOF",)
+    slots = {
+        "exciter": Slot("Excitation", "exciter"),
+        "motion": Slot("Motion", "base_motion"),
+        "load": Slot("Load", "load_torque"),
+        "stabilizer": Slot("Stabilizer", "stabilizer_power"),
+        "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
+    }
+    wires = """
+        exciter.torque -> load.torque
+        exciter.motion_angle -> motion.motion_angle
+        exciter.motion_rate -> motion.motion_rate
+        exciter.motion_acceleration -> motion.motion_acceleration
+        motion.omega -> gyro.omega
+        motion.f -> gyro.f
+        gyro.u_y -> stabilizer.u
+        exciter.test[1] -> stabilizer.test
+        load.M[1] -> stabilizer.M_load
+        stabilizer.M -> gyro.M_x
+        load.M[2] -> gyro.M_y
+    """
+    factors = {"gyro.u_y -> stabilizer.u": -1.0}  # u_y is the case against the rotor, the potentiometer reads +k_u b
+    loops = {"stabilizer": "stabilizer.u"}
+    step = 1e-4
+    channel_period = 1e-3
+    done = "exciter.done"
+    channels = (
+        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.torque[2]", "exciter.test[1]",
+        "motion.angle[1]", "gyro.alpha", "gyro.beta", "stabilizer.e", "stabilizer.v", "gyro.drift_x",
+    )  # fmt: skip
+    noises = tuple(f"gyro.{n}_{c}" for n in ("turn_on", "markov", "white", "pickoff") for c in "xy")
+    options = {
+        "K_m": Option(100.0, "N.m/rad", "stiffness of the correction, ratio k_u k_i k_m", 0.0),
+        "load": Option(1.0, "N.m", "disturbance torque of the step on the platform axis"),
+        "servo": Option(0.02, "N.m", "torque on the precession axis that turns the platform"),
+        "base": Option("0.5deg", "rad", "amplitude of the base in the motion sweep"),
+        "test": Option(0.02, "V", "amplitude of the test voltage in the sweep of the loop"),
+        "hold": Option(30.0, "s", "length of the drift hold", 1.0),
+        "allow_unstable": Option(False, bool, "run with a K_m beyond the Routh limit"),
+    }
+
+    def plan(self) -> LoopPlan:
+        settle = 1.5  # s: the slowest pole of the default loop, -9.1 1/s, leaves exp(-7) in the second half
+        return LoopPlan(
+            [
+                LoopPhase("load step", "torque", "step", 1, self["load"], settle=0.5, dwell=1.5),
+                LoopPhase("servo torque", "torque", "constant", 2, self["servo"], settle=2 * settle, dwell=3.0),
+                *sweep("loop", "test", TEST, self["test"], settle=2 * settle),
+                *sweep("base", "motion", MOTION, lambda f: self["base"] / max(1.0, f), settle=2 * settle, periods=3),
+                LoopPhase("drift", "hold", settle=2 * settle, dwell=self["hold"]),
+            ]
+        )
+
+    def parameters(self) -> dict[str, Any]:
+        given = {n.partition(".")[2]: v for n, v in self.overrides.items() if n.startswith("gyro.")}
+        gyro = {**GYRO, **{k: v for k, v in given.items() if k in GYRO}}
+        k_u = float(gyro["K_sg_y"])
+        return {
+            **self.plan().parameters(),
+            **{f"gyro.{k}": v for k, v in gyro.items()},
+            **{f"stabilizer.{there}": gyro[here] for here, there in TOLD.items()},
+            "gyro.stop": math.radians(5.0),
+            "stabilizer.k_i": K_I,
+            "stabilizer.ratio": RATIO,
+            "stabilizer.k_m": self["K_m"] / (k_u * K_I * RATIO),
+            "stabilizer.allow_unstable": int(self["allow_unstable"]),
+        }
+
+    def check(self) -> list[str]:
+        """Refusals before the run; an unstable K_m is refused by the stabilizer."""
+        stop = math.radians(5.0)
+        lean = abs(self["load"]) / self["K_m"] if self["K_m"] > 0.0 else math.inf
+        if lean > 0.8 * stop:
+            return [
+                f"load = {self['load']:g} N.m leans the gyro by load / K_m = {math.degrees(lean):.3g} deg; its stop is "
+                "at 5 deg: take a smaller load or a larger K_m"
+            ]
+        return []
+
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+        from .reduction import from_record
+
+        return from_record(record, specification)
