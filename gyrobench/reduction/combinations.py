@@ -23,7 +23,8 @@ from gyrobench.reduction.result import Coefficient, Result
 
 Array = NDArray[np.float64]
 MODEL = {n for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
-CLOSE = 1e-9  # two combinations are one, and a quantity is seen, to this fraction
+SAME = 2e-5  # combinations closer than this are one: four seconds of arc in an attitude
+CLOSE = 1e-9  # a quantity is seen when it is put together to this fraction
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,11 @@ def _vector(made_of: Mapping[str, float], basis: Sequence[str]) -> Array:
 
 
 def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
-    """Whether two combinations differ by a factor at most."""
+    """Whether two combinations differ by a factor at most, to :data:`SAME`."""
     basis = sorted({*a, *b})
     x, y = _vector(a, basis), _vector(b, basis)
     x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
-    return bool(min(np.max(np.abs(x - y)), np.max(np.abs(x + y))) < CLOSE)
+    return bool(min(np.max(np.abs(x - y)), np.max(np.abs(x + y))) < SAME)
 
 
 def _shown(c: Coefficient) -> Compared:
@@ -90,9 +91,9 @@ def weights(quantity: Compared, result: Result) -> Array | None:
     made_of = [combination(c) for c in result.coefficients]
     for j, own in enumerate(made_of):
         if _same(own, quantity.combination):  # as it was reported, whatever else could be put together
-            name, factor = next(iter(own.items()))
+            name = max(own, key=lambda n: abs(own[n]))
             out = np.zeros(len(made_of))
-            out[j] = quantity.combination[name] / factor
+            out[j] = quantity.combination[name] / own[name]
             return out
     basis = sorted({n for m in (*made_of, quantity.combination) for n in m})
     A = np.array([_vector(m, basis) for m in made_of])

@@ -27,9 +27,10 @@ FAMILIES = {
     "two-degree-of-freedom gyro": sum(drift.NAMES_2DOF.values(), ()),
 }
 RULE = (
-    "Two methods agree about a quantity when their normalized error E_n is at most 1. All methods agree about it when "
-    f"the consistency test gives p ≥ {LEVEL:g}, p adjusted for the number of quantities (Holm). Where they do not, the "
-    "u of the combined value is enlarged by the Birge ratio and conformity is not stated (inconclusive)."
+    "Where the normalized error E_n of two methods exceeds 1 they differ by more than their expanded uncertainties; of "
+    "methods that agree 5 % of the pairs do. The methods agree about a quantity when the consistency test gives p ≥ "
+    f"{LEVEL:g}, p adjusted for the number of quantities (Holm). Where they do not, the u of the combined value is "
+    "enlarged by the Birge ratio and conformity is not stated (inconclusive)."
 )
 
 
@@ -68,19 +69,17 @@ class Compare:
         """Which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "no noise: nothing to weigh with"
+        far = [f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0]
         if not self.disagree:
-            return "agree"
+            return f"agree; E_n > 1: {', '.join(far)}" if far else "agree"
         off = agreement.outlier(self.values)
         if off is not None:
-            others = agreement.agree([v for v in self.values if v.label != off[0]]) if len(self.values) > 2 else None
+            others = agreement.agree([v for v in self.values if v.label != off[0]])
             mine = next(v for v in self.values if v.label == off[0])
-            apart = mine.estimate - others.mean if others else math.nan
+            apart = mine.estimate - others.mean
             return f"{off[0]} is off by {apart:+.2g} {self.quantity.unit}; the others agree (p = {off[1]:.2g})"
-        far = [
-            f"{p.a} and {p.b} (E_n = {p.E_n:.2g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1
-        ]
         which = "; which of them is off cannot be told" if len(self.values) < 3 or len(far) < 2 else ""
-        return f"disagree: {', '.join(far) or 'all of them a little'}{which}"
+        return f"disagree: {', '.join(f'E_n of {x}' for x in far) or 'all of them a little'}{which}"
 
 
 def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Compare]:

@@ -86,6 +86,7 @@ class Text:
     text: str
     kind: str = "text"
     quiet: bool = False
+    link: str = ""  # a file beside the report, for the page
 
 
 @dataclass

@@ -145,7 +145,10 @@ def _cross(doc: Json) -> list[Any]:
             pictures.append(_forest(q, f"forest-{k + 1}"))
     columns = [Column("method"), Column("estimate"), Column("u"), Column("U (95 %)"), Column("dof"), Column("weight")]
     columns.append(Column("how", wide=True))
-    caption = "The same quantity by every method that sees it. dof: of type A; weight: in the mean."
+    caption = (
+        "The same quantity by every method that sees it. dof: of type A, a dash where u is known well; weight: in the "
+        "mean."
+    )
     return [Pictures(pictures), Table(columns, rows, caption, small=True)] if rows else []
 
 
@@ -251,8 +254,9 @@ def _tests(doc: Json) -> list[Any]:
     caption = "The tests, each with a report of its own; residual: standard deviation of the windows about the model."
     blocks: list[Any] = [Table(columns, rows, caption, small=True)]
     for k, m in enumerate(members):
-        where = f" Run and report: {m['folder']}." if m["folder"] else ""
-        blocks.append(Text(f"{LETTERS[k % 26]}  {m['label']}, report {m['report_id']}. {m['method']}.{where}"))
+        where = f" Run and report in {m['folder']}." if m["folder"] else ""
+        text = f"{LETTERS[k % 26]}  {m['label']}, report {m['report_id']}. {m['method']}.{where}"
+        blocks.append(Text(text, link=f"{m['folder']}/report.html" if m["folder"] else ""))
         said = [*m["summary"]]
         if m.get("step_check") is not None:
             worst = write_number(m["step_check"], significant=2).text

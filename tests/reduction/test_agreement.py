@@ -179,6 +179,16 @@ def test_names_of_the_book_are_mapped_by_what_they_stand_for() -> None:
     assert len(found["k_x"].values) == 2
 
 
+def test_attitudes_some_arcseconds_apart_are_one() -> None:
+    """Two composite drifts, the second in an attitude turned by 1e-5 rad (2 arcsec), then by 1e-4 rad (21 arcsec)."""
+    first = result({"ω_d": (1.0, 0.1)}, made_of={"ω_d": {"D_F": 1.0, "D_I": 1.0}})
+    for turned, count in ((1e-5, 1), (1e-4, 2)):
+        second = result({"ω_d": (1.2, 0.1)}, made_of={"ω_d": {"D_F": 1.0, "D_I": 1.0, "D_S": turned}})
+        found = compare({"a": first, "b": second}, ())
+        assert len(found) == count
+        assert {c.quantity.name for c in found} == ({"ω_d"} if count == 1 else {"ω_d, a", "ω_d, b"})
+
+
 def test_what_the_rank_does_not_give_is_not_compared() -> None:
     """R + K_zx together do not give R."""
     a = result({"D_F + D_II": (1.0, 0.1)}, made_of={"D_F + D_II": {"D_F": 1.0, "D_II": 0.5}})

@@ -154,7 +154,7 @@ def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> N
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)
     found = report(results(sessions, chosen, 3), chosen)
     words = next(q["words"] for q in found.suite["quantities"] if q["name"] == "D_I")
-    assert "disagree: tumble_single_axis and servo_polar" in words and "cannot be told" in words
+    assert "disagree: E_n of tumble_single_axis and servo_polar" in words and "cannot be told" in words
     assert next(c for c in found.coefficients if c.name == "D_I").truth is None  # there are two
 
 
