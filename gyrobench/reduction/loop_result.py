@@ -204,12 +204,18 @@ class LoopFindings:
 
     # ------------------------------------------------------------------ steps
     def step(
-        self, gate: Gate, output: str, *, scale: float = 1.0, unit: str = "1", y_name: str = "", plus: str | None = None
-    ) -> Step:
-        """Measures of a step phase (SI) and its figure, with the response of the linear models over it."""
+        self, gate: Gate, output: str, *, scale: float = 1.0, unit: str = "1", y_name: str = "",
+        plus: str | None = None, drift: float = 0.0,
+    ) -> Step:  # fmt: skip
+        """Measures of a step phase (SI) and its figure, with the response of the linear model over it.
+
+        drift: rate (SI per s) with which the output moves without the step too; it is taken off.
+        """
         y, rest = gate[output], gate.rest(output)
         if plus:
             y, rest = y + gate[plus], rest + gate.rest(plus)
+        before = gate.channels["time"][gate.before]
+        y, rest = y - drift * (gate.t - gate.t[0]), rest - drift * (before - gate.t[0])
         found = step(gate.t, y, rest)
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))

@@ -226,13 +226,14 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
 class Drift:
     """Drift of an angle: mean rate with its standard uncertainty, Allan deviation of the rate, random walk.
 
-    walk: angle random walk, rad/sqrt(s), from where the Allan deviation falls with slope -1/2; None: not resolved.
+    walk: angle random walk and its standard uncertainty, rad/sqrt(s), at the end of the first stretch in which the Allan
+    deviation falls with slope -1/2 (to 0.1), where the loop that follows the noise has least share; None: no stretch.
     """
 
     rate: float
     u: float
     allan: dict[str, Any]
-    walk: float | None
+    walk: tuple[float, float] | None
 
 
 def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
@@ -248,14 +249,14 @@ def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
     mean = float((angle[-1] - angle[0]) / (t[-1] - t[0]))
     dt = float(t[1] - t[0])
     found = series.allan([(dt, np.diff(angle) / dt)])
-    flat = [
-        dev * math.sqrt(tau)
-        for tau, dev, s in zip(found.get("tau", []), found.get("dev", []), found.get("slopes", []), strict=False)
-        if abs(s["slope"] + 0.5) < 0.1
-    ]
-    return Drift(
-        mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), found, float(np.median(flat)) if flat else None
-    )
+    walk = None
+    falls = [abs(s["slope"] + 0.5) < 0.1 for s in found.get("slopes", [])]
+    if True in falls:
+        first = falls.index(True)
+        last = falls.index(False, first) if False in falls[first:] else len(falls)
+        tau, dev, low, high = (found[n][last] for n in ("tau", "dev", "lo", "hi"))
+        walk = (dev * math.sqrt(tau), (high - low) / (2.0 * series.NORMAL) * math.sqrt(tau))
+    return Drift(mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), found, walk)
 
 
 # ------------------------------------------------------------------------------------------- axes

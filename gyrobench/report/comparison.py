@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.reduction.result import Result
 
-from . import plots, ranking
+from . import plots, ranking, responses
 from .blocks import Cell, Column, Fold, Page, Picture, Pictures, Row, Section, Table, Text, number_cell, text_cell
 from .document import content_hash, document
 from .numbers import write_number
@@ -52,6 +52,10 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
         ],
         "measures": [
             _measure(docs, key, baseline) for key in dict.fromkeys(_key(c) for d in docs for c in d["coefficients"])
+        ],
+        "responses": [
+            {"name": name, "runs": [next((r for r in doc["responses"] if r["name"] == name), None) for doc in docs]}
+            for name in dict.fromkeys(r["name"] for doc in docs for r in doc["responses"])
         ],
     }
     return {"schema": SCHEMA, "report_id": content_hash(content), **content}
@@ -126,7 +130,7 @@ def page(doc: Json) -> Page:
             ranking.section(doc, [_letter(k) for k in range(len(runs))]),
             Section("What differs", "differs", [_runs(doc), *_differing(doc)]),
             Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
-            Section("Side by side", "figures", _figures(doc)),
+            Section("Side by side", "figures", [*responses.side_by_side(doc, _letter), *_figures(doc)]),
             Section("What is equal", "equal", _equal(doc)),
         ]
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()

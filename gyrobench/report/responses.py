@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .blocks import Picture, pictures
@@ -21,6 +21,19 @@ def blocks(doc: Json) -> list[Any]:
         key = f"response-{k + 1}"
         alt = f"{r['name']}: measured points and linear curves"
         found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
+    return found
+
+
+def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
+    """One figure for each response that two runs or more of a comparison document have, all runs in it."""
+    found: list[Any] = []
+    for k, r in enumerate(doc["responses"]):
+        named = [(f"{letter(i)} {doc['runs'][i]['name']}", run) for i, run in enumerate(r["runs"]) if run is not None]
+        alike = [n for n in named if (n[1]["kind"], n[1]["y_unit"]) == (named[0][1]["kind"], named[0][1]["y_unit"])]
+        if len(alike) > 1:
+            key = f"response-{k + 1}"
+            alt = f"{r['name']} of all runs in one figure"
+            found += pictures(Picture(key, draw(alike, key), f"{r['name']}: all runs in one figure.", alt))
     return found
 
 

@@ -73,8 +73,10 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     p = record.meta["parameters"]
     gyro = {n: float(p[f"gyro.{n}"]) for n in ("H", "J_x", "J_y", "C_x", "C_y")}
     K_m, H = k_m(p), gyro["H"]
+    holds = found.of("hold")
+    own = drift(holds[0].t, holds[0]["gyro.alpha"]).rate if holds else 0.0
     for gate in found.of("torque", 1, "step"):
-        _load(found, gate, K_m, H, gyro["C_y"])
+        _load(found, gate, K_m, H, gyro["C_y"], own)
     points = found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     if points:
         _limits(found, points, K_m, gyro)
@@ -84,8 +86,8 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     )  # fmt: skip
     _friction(found, isolation)
     for gate in found.of("torque", 2):
-        _servo(found, gate, H)
-    for gate in found.of("hold"):
+        _servo(found, gate, H, own)
+    for gate in holds:
         _drift(found, gate)
     result = found.result(
         title="Power gyro stabilizer with a two-degree-of-freedom gyro",
@@ -99,10 +101,10 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     return result
 
 
-def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float) -> None:
+def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float, own: float) -> None:
     M = gate.amplitude
     b = found.step(gate, "gyro.beta", scale=ARCSEC, unit="″", y_name="precession β")
-    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α")
+    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", drift=own)
     found.measure(
         "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
     )
@@ -162,28 +164,27 @@ def _friction(found: LoopFindings, points: list[Point]) -> None:
         )
 
 
-def _servo(found: LoopFindings, gate: Gate, H: float) -> None:
+def _servo(found: LoopFindings, gate: Gate, H: float, own: float) -> None:
+    """What the torque adds to the platform's own drift."""
     d = drift(gate.t, gate["gyro.alpha"])
-    own = float(np.mean(gate["gyro.drift_x"]))
-    closed = own - gate.amplitude / H
-    found.measure(
-        "servo rate",
-        "turned by M_y on the precession axis, −M_y/H",
-        "°/h",
-        d.rate / DPH,
-        d.u / DPH,
-        closed=closed / DPH,
-    )
+    rate, closed = (d.rate - own) / DPH, -gate.amplitude / H / DPH
+    found.measure("servo rate", "turned by M_y on the precession axis, −M_y/H", "°/h", rate, d.u / DPH, closed=closed)
 
 
 def _drift(found: LoopFindings, gate: Gate) -> None:
+    """Truth: the static drift of the gyro at rest, where f = (0, 0, g): X = Y = 0, Z = -1."""
     d = drift(gate.t, gate["gyro.alpha"])
-    truth = float(np.mean(gate["gyro.drift_x"])) / DPH
+    p = found.record.meta["parameters"]
+    truth = None
+    if "gyro.Dx_zz" in p and not p.get("motion.preset"):
+        truth = (float(p["gyro.Dx_0"]) - float(p["gyro.Dx_z"]) + float(p["gyro.Dx_zz"])) / DPH
     found.measure("drift", "of the platform at rest", "°/h", d.rate / DPH, d.u / DPH, truth=truth)
     scale = {k: [v / DPH for v in d.allan[k]] for k in ("dev", "lo", "hi") if k in d.allan}
     found.allan = {**d.allan, **scale, "unit": "°/h"} if d.allan else {}
     if d.walk is not None:
-        found.measure("N", "angle random walk", "°/√h", math.degrees(d.walk) * 60.0)
+        walk, u = (math.degrees(w) * 60.0 for w in d.walk)
+        white = math.degrees(float(p.get("gyro.white_x", 0.0))) * 60.0
+        found.measure("N", "angle random walk", "°/√h", walk, u, truth=white or None)
 
 
 def _summary(result: Result) -> list[str]:

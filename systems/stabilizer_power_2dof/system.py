@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.profile import read_profile
 from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
@@ -66,6 +68,7 @@ class StabilizerPower2dof(System):
         "servo": Option(0.02, "N.m", "torque on the precession axis that turns the platform"),
         "base": Option("0.5deg", "rad", "amplitude of the base in the motion sweep"),
         "test": Option(0.02, "V", "amplitude of the test voltage in the sweep of the loop"),
+        "profile": Option("", str, "CSV file with the recorded motion of the base (time, pitch, roll, heading)"),
         "hold": Option(30.0, "s", "length of the drift hold", 1.0),
         "allow_unstable": Option(False, bool, "run with a K_m beyond the Routh limit"),
     }
@@ -87,6 +90,7 @@ class StabilizerPower2dof(System):
         gyro = {**GYRO, **{k: v for k, v in given.items() if k in GYRO}}
         k_u = float(gyro["K_sg_y"])
         return {
+            **(read_profile(Path(self["profile"])) if self["profile"] else {}),
             **self.plan().parameters(),
             **{f"gyro.{k}": v for k, v in gyro.items()},
             **{f"stabilizer.{there}": gyro[here] for here, there in TOLD.items()},
