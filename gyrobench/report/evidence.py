@@ -95,7 +95,7 @@ def estimates(doc: Json) -> list[Any]:
     condition = number_cell(doc, ("condition",), significant=3).text
     blocks: list[Any] = (
         []
-        if not doc["series"]
+        if not doc["rank"]
         else [
             Text(
                 f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "

@@ -1,0 +1,130 @@
+"""Reduction of the estimator bench: the measures of gyrobench.reduction.estimates over the record, and its picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction import estimates, recorded, uncertainty
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.estimates import Measures, Signals
+from gyrobench.reduction.method import plus_minus
+from gyrobench.reduction.result import Result, Series
+
+from .benchmarks import BENCHMARKS
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+SHOWN = 400  # readings in the picture
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """The result of a record; raises ReductionError where it cannot be reduced."""
+    meta = record.meta
+    known = BENCHMARKS.get(str(meta.get("options", {}).get("benchmark")))
+    if known is None:
+        raise ReductionError(f"the record does not say which benchmark it is of: one of {', '.join(BENCHMARKS)}")
+    options, p = meta["options"], meta.get("parameters", {})
+    skip = int(options["skip"]) if options.get("skip", -1) >= 0 else known.skip
+    s = signals(record.channels, skip, known.Ts)
+    sine = float(p.get("source.amplitude", 0.0)) != 0.0
+    random = any(float(p.get(f"source.{n}", 0.0)) != 0.0 for n in ("p", "walk", "markov"))
+    frequency = float(p["source.frequency"]) if sine and not random else None
+    m = estimates.measure(s, frequency, true_variance(p, s.time))
+    return recorded.finish(_result(m, s, known.title, str(meta.get("parts", {}).get("estimator", {}).get("name", "")),
+                                   specification or {}), record)  # fmt: skip
+
+
+def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
+    """The channels without the row at t = 0 and the first ``skip`` readings.  Raises ReductionError."""
+    needed = ("time", "source.z", "source.truth", "estimator.estimate", "estimator.latency")
+    missing = [n for n in needed if n not in channels]
+    if missing:
+        raise ReductionError([f"channel {n} is missing" for n in missing])
+    rows = np.flatnonzero(np.asarray(channels["time"]) > 0.5 * Ts)[skip:]
+    if rows.size == 0:
+        raise ReductionError(f"the record ends before the {skip} readings that are left out at the start are over")
+
+    def of(name: str) -> Array | None:
+        return np.asarray(channels[name], dtype=float)[rows] if name in channels else None
+
+    found = {n: of(n) for n in needed}
+    return Signals(
+        found["time"], found["source.z"], found["estimator.estimate"], found["source.truth"],
+        float(found["estimator.latency"][-1]), of("estimator.variance"), of("estimator.innovation"),
+        of("estimator.nis"), of("estimator.R_hat"),
+    )  # fmt: skip
+
+
+def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
+    """Variance of a reading as the source had it; None where it changes inside the record or is not known."""
+    if "source.white" not in p:
+        return None
+    after = float(p.get("source.change_time", math.inf))
+    factor = float(p.get("source.change_factor", 1.0))
+    if factor != 1.0 and time[0] < after < time[-1]:
+        return None
+    return (float(p["source.white"]) * (factor if time[0] >= after else 1.0)) ** 2
+
+
+def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> Result:
+    for c in m.coefficients:
+        c.limit = limits.get(c.name)
+        c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
+    error, re_raw = m.named(estimates.RANKED), m.named("error re raw")
+    gain, noise, delay = (m.named(n) for n in ("gain", "noise re raw", "delay"))
+    return Result(
+        system="estimator_bench",
+        title="Bench of estimators",
+        method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
+        sources=[
+            "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; 001_5d74e91bb8fa76be.txt sections 3.4.5, 4.4.2",
+            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; 001_5d74e91bb8fa76be.txt sections 4.2, 4.3",
+        ],
+        equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
+        conventions=[
+            f"Truth and readings: {title}.",
+            "Error: estimate less the truth of the same instant. Late error: less the truth one latency ago.",
+            "dB: 20 log10 of the ratio of rms values; below 0 is better than the reading itself.",
+            "Noise reduction is what is left beside the truth as it comes through; it means nothing without the gain.",
+        ],
+        coefficients=m.coefficients,
+        series=[picture(s)],
+        correlation=[],
+        condition=1.0,
+        rank=0,
+        dof=float(s.time.size),
+        noise={},
+        tests=m.tests,
+        residual_std=float(np.sqrt(np.mean(m.error**2))),
+        residual_unit="1",
+        acf=m.acf,
+        warnings=m.warnings,
+        summary=[
+            f"{name or 'The estimator'}: rms error {plus_minus(error).replace(' 1 ', ' ')} against the truth of the "
+            f"same instant, {re_raw.estimate:+.1f} dB against the readings themselves.",
+            f"Noise {noise.estimate:+.1f} dB, and what that costs: gain {gain.estimate:.4g}"
+            + "".join(f", phase {c.estimate:.2f}°" for c in m.coefficients if c.name == "phase")
+            + f", delay {delay.estimate:.3g} {delay.unit}.",
+            " ".join(f"{t.name}: {t.finding}." for t in m.tests)
+            or "The estimator states no variance: it cannot be asked whether it is consistent.",
+        ],
+        decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.overall(c.verdict for c in m.coefficients),
+        instrument=name,
+        ranked_by=estimates.RANKED,
+    )
+
+
+def picture(s: Signals) -> Series:
+    """The last readings (points), the estimate (line), and its error beneath."""
+    last = slice(-SHOWN, None)
+    t, z, x = s.time[last], s.z[last], s.estimate[last]
+    return Series(
+        "readings, estimate, its error", t.tolist(), "time", "s", z.tolist(),
+        x.tolist(), (x - s.truth[last]).tolist(), "signal", "1", t.tolist(), t.tolist(), x.tolist(),
+    )  # fmt: skip

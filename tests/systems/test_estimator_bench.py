@@ -1,0 +1,219 @@
+"""The bench of estimators: spec figures through the co-simulation, consistency, ranking, refusals, commands."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.report.comparison import comparison
+from gyrobench.system.run import PartRefusal, Session, run
+from gyrobench.system.system import RefusedError, load_system
+from gyrobench.system.values import ValueProblem
+
+Command = Callable[..., tuple[int, str, str]]
+NAME = "estimator_bench"
+
+
+@cache
+def result(part: str, benchmark: str = "sine", seed: int = 1, **values: Any) -> Any:
+    system = load_system(NAME)
+    more = {f"estimator.{k}": v for k, v in values.items()}
+    record = run(system, {"estimator": f"estimator_{part}"}, values={"benchmark": benchmark, **more}, seed=seed)
+    return system.with_values({"benchmark": benchmark}).reduce(record)
+
+
+def named(r: Any) -> dict[str, Any]:
+    return {c.name: c for c in r.coefficients}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("part", "values", "dB", "gain"),
+    [
+        ("none", {}, 0.0, 1.0),
+        ("kalman_rate", {"q": 0.02}, -12.4, 1.015),
+        ("kalman_rate", {"q": 0.1}, -10.9, 1.007),
+        ("kalman_rate", {"q": 0.5}, -9.3, 1.004),
+        ("kalman_rate", {"q": 2.0}, -7.9, 1.002),
+        ("kalman_rate", {"q": 8.0}, -6.5, 1.002),
+        ("sage_husa", {"form": 1}, -7.8, 1.002),
+        ("kalman_ar", {"R": 3.3697e-6}, 8.6, 0.389),
+    ],
+)
+def test_sine(part: str, values: dict[str, float], dB: float, gain: float, seed: int) -> None:
+    """BENCH-DYN-SINE: error within 0.4 dB of the spec, gain within 0.5 %, phase within 0.4 degrees."""
+    c = named(result(part, seed=seed, **values))
+    assert c["error re raw"].estimate == pytest.approx(dB, abs=0.4)
+    assert c["gain"].estimate == pytest.approx(gain, abs=max(0.005, 4.0 * c["gain"].u))
+    assert abs(c["phase"].estimate) < 0.4
+    if part in ("none", "kalman_rate"):
+        assert c["noise re raw"].estimate == pytest.approx(c["error re raw"].estimate, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("moments", "J", "delay", "late", "now"),
+    [(4, 3, 49, -9.6, 2.7), (4, 5, 217, -15.8, 14.7), (1, 3, 7, -10.7, -9.1), (1, 5, 31, -16.9, -1.4)],
+)
+def test_sine_through_the_wavelet(moments: int, J: int, delay: int, late: float, now: float) -> None:
+    """EST-WAVELET-ONLINE: both error columns, and the delay as stated (the fit finds it within its uncertainty)."""
+    r = result("wavelet", moments=moments, J=J)
+    c = named(r)
+    assert c["late error re raw"].estimate == pytest.approx(late, abs=0.8)
+    assert c["error re raw"].estimate == pytest.approx(now, abs=0.8)
+    assert c["delay"].closed == pytest.approx(delay)
+    assert c["delay"].estimate == pytest.approx(delay, abs=4.0 * c["delay"].u)
+    assert any("phase margin" in w for w in r.warnings)
+
+
+def test_level() -> None:
+    """BENCH-DRIFT-LL: 15.1 dB by the Riccati equation; the filter is what it says; AR(3) over it is not."""
+    r = result("kalman_rate", "level")
+    c, tests = named(r), {t.name: t for t in r.tests}
+    assert c["error re raw"].estimate == pytest.approx(-15.07, abs=3.5 * c["error re raw"].u)
+    assert tests["NEES"].finding.startswith("consistent") and tests["NIS"].finding.startswith("consistent")
+    assert tests["Ljung-Box, innovations"].p > 0.001
+    assert not r.warnings
+    wrong = result("kalman_ar", "level")
+    assert named(wrong)["error re raw"].estimate > 0.0
+    assert any("too confident" in w for w in wrong.warnings) and any("not white" in w for w in wrong.warnings)
+
+
+def test_ar3() -> None:
+    """BENCH-DRIFT-AR3: error variance of the Riccati equation, 1.912e-6; consistent; nothing beats it."""
+    r = result("kalman_ar", "ar3")
+    c = named(r)
+    assert c["error"].estimate == pytest.approx(math.sqrt(1.912e-6), abs=3.5 * c["error"].u)
+    assert all(t.finding.startswith(("consistent", "white")) for t in r.tests)
+    for part in ("none", "moving_average", "alpha_beta_gamma", "sage_husa", "wavelet", "kalman_rate"):
+        assert named(result(part, "ar3"))["error"].estimate > c["error"].estimate
+
+
+@pytest.mark.parametrize("part", ["kalman_ar", "kalman_rate"])
+def test_consistency_counted(part: str) -> None:
+    """On their own model NEES and NIS stay within their 99.9 % bounds for ten seeds of twenty (mean: one in fifty)."""
+    benchmark = {"kalman_ar": "ar3", "kalman_rate": "level"}[part]
+    found = [t for seed in range(3, 13) for t in result(part, benchmark, seed).tests if t.name in ("NEES", "NIS")]
+    assert sum(not t.finding.startswith("consistent") for t in found) <= 1
+    assert len(found) == 20
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_noise_that_changes(seed: int) -> None:
+    """[E6] the adaptive filter follows within 10 % and beats the fixed one of the same q."""
+    own, fixed = named(result("sage_husa", "change", seed)), named(result("kalman_rate", "change", seed))
+    assert own["R̂/R"].estimate == pytest.approx(1.0, abs=0.1)
+    assert own["error"].estimate == pytest.approx(1.54e-3, rel=0.06)
+    assert fixed["error"].estimate == pytest.approx(1.99e-3, rel=0.05)
+
+
+def test_sage_husa_on_constant_noise_is_no_better() -> None:
+    own, plain = named(result("sage_husa", "level")), named(result("kalman_rate", "level"))
+    assert own["error"].estimate > plain["error"].estimate - own["error"].u
+    assert own["R̂/R"].estimate == pytest.approx(1.0, abs=0.05)
+
+
+def test_ranked_by_error_not_by_smoothness() -> None:
+    """The wavelet of six levels has the least noise by far, and the largest error: it comes last."""
+    runs = {
+        "wavelet": result("wavelet", moments=4, J=6),
+        "average": result("moving_average"),
+        "none": result("none"),
+        "rate": result("kalman_rate", q=0.02),
+    }
+    quiet = sorted(runs, key=lambda n: named(runs[n])["noise re raw"].estimate)
+    assert quiet[0] == "wavelet" and quiet[-1] == "none"
+    ranking = comparison(list(runs.items()))["ranking"]
+    assert ranking["name"] == "error"
+    assert [list(runs)[e["run"]] for e in ranking["order"]] == ["rate", "average", "none", "wavelet"]
+    assert ranking["order"][0]["over_best"] == 1.0 and ranking["order"][3]["over_best"] > 20.0
+    assert [e["apart"] for e in ranking["order"]] == [None, True, True, True]
+
+
+def test_both_engines_agree_bit_for_bit() -> None:
+    values = {"samples": 2500, "skip": 0}
+    records = [
+        run(load_system(NAME), {"estimator": "estimator_sage_husa"}, values=values, engine=e)
+        for e in ("native", "reference")
+    ]
+    assert records[0].same_data(records[1])
+
+
+def test_readings_reach_the_estimator_in_their_own_step() -> None:
+    """No estimator at all: the estimate is the reading of the same row."""
+    r = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 2500, "skip": 0})
+    assert (r.channels["estimator.estimate"] == r.channels["source.z"]).all()
+    assert r.meta["delays"] == {}
+
+
+# --------------------------------------------------------------------------------------- refusals
+def test_refusals() -> None:
+    system = load_system(NAME)
+    with pytest.raises(RefusedError, match="benchmark = sin: one of sine, change, level, ar3"):
+        system.with_values({"benchmark": "sin"}).refuse()
+    with pytest.raises(RefusedError, match="samples = 4000, of which 3000 are skipped: at least 2000 must be left"):
+        system.with_values({"samples": 4000}).refuse()
+    with Session(system) as session, pytest.raises(ValueProblem, match="runs at the sampling period of its benchmark"):
+        session.run(step=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("part", "values", "text"),
+    [
+        ("kalman_ar", {"phi[1]": 0.7466, "phi[2]": 0.5044, "phi[3]": 0.2538}, "arburg .* returns a = -phi"),
+        ("sage_husa", {"b": 1.0}, "b = 1 1 must be < 1"),
+        ("wavelet", {"J": 9}, "J = 9 1 must be <= 6"),
+        ("alpha_beta_gamma", {"alpha": 2.5}, "unstable"),
+    ],
+)
+def test_parts_refuse_before_the_first_step(part: str, values: dict[str, float], text: str) -> None:
+    more = {f"estimator.{k}": v for k, v in values.items()}
+    with pytest.raises(PartRefusal, match=text):
+        run(load_system(NAME), {"estimator": f"estimator_{part}"}, values=more)
+
+
+def test_sampling_period_that_does_not_fit_names_both(command: Command, tmp_path: Path) -> None:
+    code, _, err = command("run", NAME, "--set", "estimator.Ts=1.5ms", "--out", tmp_path / "r")
+    assert code == 3 and "Traceback" not in err
+    assert "Ts = 0.0015 s must be a whole multiple of the communication step, 0.001 s" in err
+
+
+def test_records_that_cannot_be_reduced() -> None:
+    system = load_system(NAME).with_values({"samples": 2600, "skip": 100})
+    record = run(system)
+    short = {k: v[:301] for k, v in record.channels.items()}
+    whole, record.channels = record.channels, short
+    with pytest.raises(ReductionError, match="200 samples: at least 400 are needed"):
+        system.reduce(record)
+    record.channels = {k: v for k, v in whole.items() if k != "source.truth"}
+    with pytest.raises(ReductionError, match=r"channel source\.truth is missing"):
+        system.reduce(record)
+    record.channels = {**whole, "estimator.estimate": whole["estimator.estimate"] * math.nan}
+    with pytest.raises(ReductionError, match="estimate is not finite at 2500 samples"):
+        system.reduce(record)
+
+
+# --------------------------------------------------------------------------------------- commands
+def test_swap_and_compare(command: Command, tmp_path: Path) -> None:
+    for part in ("none", "kalman_rate", "wavelet"):
+        words = ["--part", f"estimator=estimator_{part}", "--out", tmp_path / part, "--json"]
+        code, out, err = command("run", NAME, *words)
+        assert code == 0, err
+        doc = json.loads(out)
+        assert doc["ranked_by"] == "error" and "note: " not in err
+    code, _, err = command("compare", *(tmp_path / p for p in ("none", "kalman_rate", "wavelet")), "--out", tmp_path)
+    assert code == 0, err
+    doc = json.loads((tmp_path / "comparison.json").read_text())
+    assert [doc["runs"][e["run"]]["instrument"] for e in doc["ranking"]["order"]] == [
+        "EstimatorKalmanRate",
+        "EstimatorWavelet",
+        "EstimatorNone",
+    ]
+    html = (tmp_path / "comparison.html").read_text()
+    assert html.index("Ranking by error") < html.index("Parts, parameters and settings that differ")
