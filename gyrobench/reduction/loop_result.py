@@ -228,16 +228,18 @@ class LoopFindings:
         if simulated is not None:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
             curves.append({**curve, "y": ((found.initial + simulated[pick]) / scale).tolist()})
+        what = y_name or output
+        cause = f"{gate.amplitude:g} {gate.row['unit']} on axis {gate.axis} from t = 0 on"
         self.responses.append(
             Response(
-                name=gate.label,
+                name=f"{gate.label}, {what}",
                 kind="step",
-                caption=f"{gate.label}: {gate.amplitude:g} {gate.row['unit']} on axis {gate.axis} from t = 0 on.",
+                caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear.",
                 x=t[pick].tolist(),
                 x_name="time",
                 x_unit="s",
                 y=(y[pick] / scale).tolist(),
-                y_name=y_name or output,
+                y_name=what,
                 y_unit=unit,
                 curves=curves,
             )

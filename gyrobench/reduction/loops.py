@@ -226,8 +226,8 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
 class Drift:
     """Drift of an angle: mean rate with its standard uncertainty, Allan deviation of the rate, random walk.
 
-    walk: angle random walk and its standard uncertainty, rad/sqrt(s), at the end of the first stretch in which the Allan
-    deviation falls with slope -1/2 (to 0.1), where the loop that follows the noise has least share; None: no stretch.
+    walk: angle random walk and its standard uncertainty, rad/sqrt(s), at the end of the first stretch in which the
+    Allan deviation falls with slope -1/2 (to 0.1): there the loop's own lag matters least.  None: no such stretch.
     """
 
     rate: float

@@ -33,7 +33,9 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
         if len(alike) > 1:
             key = f"response-{k + 1}"
             alt = f"{r['name']} of all runs in one figure"
-            found += pictures(Picture(key, draw(alike, key), f"{r['name']}: all runs in one figure.", alt))
+            found += pictures(
+                Picture(key, draw(alike, key), f"{r['name'][:1].upper()}{r['name'][1:]}: all runs in one figure.", alt)
+            )
     return found
 
 

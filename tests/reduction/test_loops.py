@@ -1,0 +1,167 @@
+"""Measures of loops against signals whose answers are known by hand."""
+
+from __future__ import annotations
+
+import math
+import types
+
+import numpy as np
+import pytest
+
+from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.loops import cross_axis, drift, gates, phasor, response, step
+
+DT = 1e-3
+
+
+def times(length: float, start: float = 0.0) -> np.ndarray:
+    return start + DT * np.arange(round(length / DT))
+
+
+# ------------------------------------------------------------------------------------------- sines
+def test_phasor_of_a_sine_beside_a_mean_and_a_slope() -> None:
+    """3 cos(wt + 0.7) = Re(3 e^(j 0.7) e^(j w t)); a mean and a drift do not touch it."""
+    t = times(2.0, 5.0)
+    y = 3.0 * np.cos(2 * np.pi * 4.0 * t + 0.7) + 0.2 - 0.5 * t
+    assert phasor(t, y, 4.0) == pytest.approx(3.0 * np.exp(0.7j), abs=1e-12)
+
+
+def test_response_of_a_first_order_lag() -> None:
+    """1/(1 + j w T), T = 0.05 s, at 3 Hz: the steady sine through the lag, written by hand."""
+    t, w, lag = times(4.0), 2 * np.pi * 3.0, 0.05
+    x = np.sin(w * t)
+    y = np.sin(w * t - math.atan(w * lag)) / math.hypot(1.0, w * lag)
+    p = response(t, x, y, 3.0)
+    assert p.value == pytest.approx(1.0 / (1.0 + 1j * w * lag), abs=1e-12)
+    assert p.coherence == pytest.approx(1.0, abs=1e-12)
+    assert p.u is not None and p.u < 1e-9
+
+
+def test_uncertainty_covers_and_coherence_falls_with_noise() -> None:
+    """White noise of sigma s on y: a phasor of N samples has variance 2 s2/N in each part, so u = s sqrt(2/N) / |Y|
+    = 0.3 sqrt(2/8000) / 0.5 = 9.5e-3; over 200 draws the mean of u meets it to 5 %, and 95 % of the phases lie inside
+    the t interval of 7 degrees of freedom (2.36 u; 200 draws: 0.90 to 0.99)."""
+    rng = np.random.default_rng(11)
+    t = times(8.0)
+    x = np.sin(2 * np.pi * 2.0 * t)
+    found = [response(t, x, 0.5 * x + 0.3 * rng.standard_normal(t.size), 2.0) for _ in range(200)]
+    assert np.mean([p.u for p in found]) == pytest.approx(0.3 * math.sqrt(2 / 8000) / 0.5, rel=0.05)
+    inside = [abs(np.angle(p.value)) < 2.36 * p.u for p in found]
+    assert 0.90 <= np.mean(inside) <= 0.99
+    assert 0.99 < np.mean([p.coherence for p in found]) < 1.0
+    noise = [response(t, x, rng.standard_normal(t.size), 2.0).coherence for _ in range(50)]
+    assert np.mean(noise) == pytest.approx(1 / 8, abs=0.08)  # nothing but noise: 1 / segments
+
+
+def test_response_refuses() -> None:
+    t = times(0.4)
+    with pytest.raises(ReductionError, match="shorter than one period"):
+        response(t, np.sin(t), np.sin(t), 2.0)
+    with pytest.raises(ReductionError, match="too coarse"):
+        response(t, np.sin(t), np.sin(t), 300.0)
+    with pytest.raises(ReductionError, match="no such sine"):
+        response(times(1.0), np.zeros(1000), np.ones(1000), 5.0)
+
+
+# ------------------------------------------------------------------------------------------- steps
+def test_step_of_a_second_order_system() -> None:
+    """1 - e^(-z w t)(cos wd t + z w/wd sin wd t), z = 0.4, w = 20: overshoot e^(-pi z / sqrt(1 - z2)) = 25.38 %;
+    settling times from the same formula on a fine grid."""
+    z, w = 0.4, 20.0
+    wd = w * math.sqrt(1 - z * z)
+
+    def y(t: np.ndarray) -> np.ndarray:
+        return 1 - np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t))
+
+    t = times(3.0, 7.0)
+    found = step(t, 2.0 + 0.5 * y(t - 7.0), np.full(100, 2.0))
+    assert found.initial == 2.0
+    assert found.change == pytest.approx(0.5, abs=1e-9)
+    assert found.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), rel=1e-4)
+    fine = np.linspace(0, 2, 2_000_001)
+    for band, got in ((0.05, found.settled_5), (0.02, found.settled_2)):
+        assert got == pytest.approx(fine[np.flatnonzero(np.abs(y(fine) - 1) > band)[-1]], abs=2e-5)
+
+
+def test_step_that_goes_down_and_one_that_never_settles() -> None:
+    t = times(1.0)
+    down = step(t, -np.exp(-0.0 * t) + np.exp(-20 * t), np.zeros(10))
+    assert down.change == pytest.approx(-1.0, abs=1e-7) and down.overshoot == pytest.approx(0.0, abs=1e-6)
+    assert down.settled_5 == pytest.approx(math.log(20.0) / 20.0, abs=1e-5)
+    ramp = step(t, t, np.zeros(0))
+    assert ramp.settled_5 is None and ramp.slope == pytest.approx(1.0, rel=1e-9)
+    still = step(t, np.zeros(t.size), np.zeros(0))
+    assert still.change == 0.0 and still.settled_5 is None
+
+
+def test_uncertainty_of_a_change() -> None:
+    """Means of 100 (last tenth) and 400 samples of sigma 0.1: u = 0.1 sqrt(1/100 + 1/400) = 1.118e-2; scatter of 400
+    draws agrees to 10 %."""
+    rng = np.random.default_rng(3)
+    t = times(1.0)
+    found = [step(t, 1 + 0.1 * rng.standard_normal(1000), 0.1 * rng.standard_normal(400)) for _ in range(400)]
+    assert np.std([s.change for s in found]) == pytest.approx(0.1 * math.sqrt(1 / 100 + 1 / 400), rel=0.1)
+    assert np.mean([s.u_change for s in found]) == pytest.approx(0.1 * math.sqrt(1 / 100 + 1 / 400), rel=0.03)
+
+
+# ------------------------------------------------------------------------------------------- drift
+def test_drift_and_random_walk() -> None:
+    """White rate of density N: the angle is a random walk N sqrt(t); rate over T has u = N/sqrt(T) = 1e-3/10 = 1e-4.
+    100 draws: |error| < 3 u in all but a few, mean u to 10 %, walk N to 10 %."""
+    rng = np.random.default_rng(5)
+    dt, n, density = 0.01, 10000, 1e-3
+    t = dt * np.arange(n + 1)
+    found = []
+    for _ in range(60):
+        rate = 2e-3 + density / math.sqrt(dt) * rng.standard_normal(n)
+        found.append(drift(t, np.concatenate([[0.0], np.cumsum(rate) * dt])))
+    assert np.std([d.rate for d in found]) == pytest.approx(1e-4, rel=0.25)
+    assert np.mean([d.rate for d in found]) == pytest.approx(2e-3, abs=4e-5)
+    assert np.mean([d.u for d in found]) == pytest.approx(1e-4, rel=0.1)
+    walks = [d.walk for d in found if d.walk is not None]
+    assert len(walks) > 50
+    assert np.median([w for w, _ in walks]) == pytest.approx(density, rel=0.15)
+    with pytest.raises(ReductionError, match="needs 40 samples"):
+        drift(t[:20], t[:20])
+
+
+# ------------------------------------------------------------------------------------------- records
+def record(stop: float | None = None) -> types.SimpleNamespace:
+    """Two phases: settle 1 s and 2 s open; settle 0.5 s and 1 s open."""
+    time = 0.1 * np.arange(1, 46)
+    phase = np.where(time < 3.05, 1.0, 2.0)
+    gate = ((time > 1.05) & (time < 3.05)) | (time > 3.55)
+    channels = {"time": time, "exciter.phase": phase, "exciter.gate": gate.astype(float), "y": time**2}
+    if stop is not None:
+        channels = {k: v[time < stop] for k, v in channels.items()}
+    rows = [
+        {"phase": 1, "label": "a", "mode": "torque", "shape": "step", "axis": 1, "dwell": 2.0},
+        {"phase": 2, "label": "b", "mode": "hold", "shape": "constant", "axis": 1, "dwell": 1.0},
+    ]
+    return types.SimpleNamespace(channels=channels, meta={"plan": rows})
+
+
+def test_gates_of_a_record() -> None:
+    first, second = gates(record())
+    assert first.kind == "torque" and second.label == "b"
+    assert first.t[0] == pytest.approx(1.1) and first.t[-1] == pytest.approx(3.0)
+    np.testing.assert_allclose(first["y"], first.t**2)
+    np.testing.assert_allclose(first.rest("y"), (0.1 * np.arange(6, 11)) ** 2)  # the second half of the settling
+    assert [g.label for g in gates(record(stop=3.8))] == ["a"]  # the second phase was not run to its end
+
+
+def test_gates_that_cannot_be() -> None:
+    empty = record()
+    del empty.channels["exciter.gate"]
+    with pytest.raises(ReductionError, match=r"no channel exciter\.gate"):
+        gates(empty)
+    with pytest.raises(ReductionError, match="no phase of the plan is whole"):
+        gates(record(stop=2.0))
+    with pytest.raises(ReductionError, match="no channel z; it has"):
+        gates(record())[0]["z"]
+
+
+def test_cross_axis_table() -> None:
+    table = cross_axis({(1, 1): 2.0, (1, 2): 0.1j, (2, 2): -4.0, (2, 1): 1.0}, ["pitch", "roll"], "1 Hz")
+    assert table["columns"] == ["excited axis", "pitch / %", "roll / %"]
+    assert table["rows"] == [["pitch", 100.0, 5.0], ["roll", 25.0, 100.0]]

@@ -1,0 +1,112 @@
+"""Margins against closed forms and against python-control on transfer functions; models of run.json."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+
+from gyrobench.reduction.loops import Point
+from gyrobench.reduction.margins import between, deviation, excited, grid, margins, measured_margins, model_response
+
+
+def test_integrator_with_a_lag() -> None:
+    """L = k/(s (1 + s T)), k = 5, T = 0.1: |L| = 1 where w2 (1 + w2 T2) = k2, phase margin 90 - atan(w T)."""
+    k, lag = 5.0, 0.1
+    w2 = (-1 + math.sqrt(1 + 4 * k * k * lag * lag)) / (2 * lag * lag)
+    f = grid(0.01, 100.0)
+    s = 2j * np.pi * f
+    found = margins(f, k / (s * (1 + lag * s)))
+    assert found.crossover == pytest.approx(math.sqrt(w2) / (2 * math.pi), rel=1e-5)
+    assert found.phase == pytest.approx(90 - math.degrees(math.atan(math.sqrt(w2) * lag)), abs=1e-3)
+    assert found.upper is None and found.lower is None
+
+
+def test_gain_margin_of_three_lags() -> None:
+    """L = k/(1 + s)^3: -180 degrees at w = sqrt 3, |1 + j sqrt 3|^3 = 8, so the limit is 8 / k."""
+    f = grid(0.01, 10.0)
+    found = margins(f, 2.0 / (1 + 2j * np.pi * f) ** 3)
+    assert found.upper == pytest.approx(4.0, rel=1e-5)
+    assert next(f for f, g in found.gains) == pytest.approx(math.sqrt(3) / (2 * math.pi), rel=1e-5)
+
+
+def leadlag() -> control.TransferFunction:
+    """Spec d4 item 4: K_G (1 + t1 s)(1 + t2 s)/((1 + T1 s)(1 + T2 s)) K / (J s^2), conditionally stable."""
+    s = control.tf("s")
+    g = 2.0 * (1 + 0.2 * s) * (1 + 0.03 * s) / ((1 + 2.0 * s) * (1 + 0.003 * s))
+    return 8250.0 * g / (0.5 * s * s)
+
+
+def test_conditional_stability_shows_its_lower_limit() -> None:
+    """[B11, B11c]: crossover 100 rad/s, phase margin 52.3 deg, lower limit 0.044; python-control on the same L."""
+    loop = leadlag()
+    f = grid(0.02, 300.0)
+    found = margins(f, np.array([complex(loop(2j * np.pi * x)) for x in f]))
+    gm, pm, _, _, wc, _ = control.stability_margins(loop, returnall=True)
+    assert found.crossover == pytest.approx(float(wc[0]) / (2 * math.pi), rel=1e-4)
+    assert found.crossover == pytest.approx(100.0 / (2 * math.pi), rel=0.01)
+    assert found.phase == pytest.approx(float(pm[0]), abs=2e-3)
+    assert found.phase == pytest.approx(52.3, abs=0.2)
+    assert found.lower == pytest.approx(float(gm[0]), rel=1e-3)
+    assert found.lower == pytest.approx(0.044, abs=0.001)
+    row = found.row("x")
+    assert row[5] == pytest.approx(20 * math.log10(found.lower or 1.0))
+
+
+def test_margins_from_sparse_points() -> None:
+    """16 points over two decades, interpolated, meet the dense margins: crossover 1 %, phase 1 degree, limit 3 %."""
+    loop = leadlag()
+    points = [Point(x, complex(loop(2j * np.pi * x)), 1e-3, 1.0) for x in np.geomspace(0.3, 60.0, 16)]
+    found = measured_margins(points)
+    assert found.crossover == pytest.approx(15.92, rel=0.01)
+    assert found.phase == pytest.approx(52.3, abs=1.0)
+    assert found.lower == pytest.approx(0.044, rel=0.03)
+    assert measured_margins(points[:3]).crossovers == []
+    at = np.array([p.f for p in points])
+    np.testing.assert_allclose(between(points, at), [p.value for p in points], rtol=1e-9)
+
+
+def test_deviation() -> None:
+    """A factor 1.1 is 0.8279 dB; j^(1/45) is 2 degrees; beyond the limit nothing counts."""
+    points = [
+        Point(1.0, 1.1 + 0j, None, 1.0),
+        Point(2.0, np.exp(1j * math.radians(2.0)), None, 1.0),
+        Point(9.0, 5j, None, 1.0),
+    ]
+    db, degrees = deviation(points, np.ones(3, complex), 2.0)
+    assert db == pytest.approx(20 * math.log10(1.1)) and degrees == pytest.approx(2.0)
+    assert deviation(points, np.ones(3, complex), 0.5) == (0.0, 0.0)
+
+
+def model(step: float = 0.0) -> dict:
+    """x' = -2 x + 3 torque + acceleration of the base; y = x + angle."""
+    names = ["exciter.torque[1]", "exciter.motion_angle[2]", "exciter.motion_acceleration[2]"]
+    return {
+        "A": [[-2.0]], "B": [[3.0, 0.0, 1.0]], "C": [[1.0]], "D": [[0.0, 1.0, 0.0]],
+        "inputs": names, "outputs": ["p.y"], "states": ["p.x"], "step": step,
+    }  # fmt: skip
+
+
+def test_model_response_and_excitations() -> None:
+    f = np.array([0.5, 3.0])
+    s = 2j * np.pi * f
+    np.testing.assert_allclose(model_response(model(), f)[:, 0, 0], 3.0 / (s + 2.0), rtol=1e-14)
+    np.testing.assert_allclose(excited(model(), "motion", 2, "p.y", f), 1.0 + s * s / (s + 2.0), rtol=1e-14)
+    with pytest.raises(KeyError, match="goes nowhere"):
+        excited(model(), "command", 1, "p.y", f)
+    with pytest.raises(KeyError, match="no channel"):
+        excited(model(), "torque", 1, "p.z", f)
+
+
+def test_discrete_model_is_evaluated_on_the_circle() -> None:
+    """x+ = 0.9 x + u: 1/(z - 0.9) at z = e^(j w h)."""
+    m = {**model(0.01), "A": [[0.9]], "B": [[1.0]], "D": [[0.0]], "inputs": ["exciter.torque[1]"]}
+    z = np.exp(2j * np.pi * 3.0 * 0.01)
+    assert model_response(m, [3.0])[0, 0, 0] == pytest.approx(1.0 / (z - 0.9), rel=1e-14)
+
+
+def test_model_without_states() -> None:
+    m = {**model(), "A": [], "B": [], "C": [[]], "states": []}
+    assert model_response(m, [1.0])[0, 0].tolist() == [0.0, 1.0, 0.0]
