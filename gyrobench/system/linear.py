@@ -11,13 +11,17 @@ wires; excitations come in from outside.  Two models are made:
 
 Opened at an input, the loop is L = -(what comes back there) / (what is put in there), other loops closed.
 
-Not modelled: sampled methods (an estimator, a drive that switches), limits, anything of a foreign FMU; the first is
-said when such a part stands in a loop, the last leaves the system without a linear model, which is said too.
+A sampled method that passes an input on has no continuous model; the discrete one takes the part's own step, where one
+step is like the next (gyrobench.system.linear_sampled).
+
+Not modelled: limits; sampled methods whose steps differ (a moving average) and foreign FMUs leave the system without a
+linear model, which is said.
 """
 
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +31,7 @@ from numpy.typing import NDArray
 
 from gyrobench.component import Component
 from gyrobench.linearize import jacobians
+from gyrobench.system.linear_sampled import Step, sampled_step
 from gyrobench.system.sockets import socket
 from gyrobench.system.values import flatten
 from gyrobench.system.wiring import Assembly, Connection
@@ -110,7 +115,17 @@ class Linear:
         channels = [n for n in system.channels if n.partition(".")[0] not in sources]
         self.shown = [n for n in channels if self._has(parts, n)]
         self.order = [s for s in assembly.order.order if s not in sources]
+        for part in parts.values():  # outputs may look ahead within the internal step
+            part.h = step / max(1, math.ceil(step / getattr(part, "step", step) - 1e-9))
         self.blocks = {s: self._block(s, parts[s]) for s in self.order}
+        self.sampled: dict[str, Step] = {}
+        for s in self.order:
+            try:
+                found = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+            except ValueError as error:
+                raise NotLinear(f"{s} works in samples, and {error}") from error
+            if found is not None:
+                self.sampled[s] = found
         self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
         self.outputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].outputs]
         self.states = [f"{s}.{v}" for s in self.order for v in self.blocks[s].states]
@@ -171,7 +186,9 @@ class Linear:
 
     def discrete(self, break_at: str | None = None) -> dict[str, Any]:
         """The same for the macro step of the co-simulation; states: those of the parts and the values over cuts."""
-        nx, nc = len(self.states), len(self.cut)
+        names_of = {s: self.sampled[s].names if s in self.sampled else self.blocks[s].states for s in self.order}
+        all_states = [f"{s}.{v}" for s in self.order for v in names_of[s]]
+        nx, nc = len(all_states), len(self.cut)
         n_in = 1 if break_at is not None else len(self.outside)
         width = nx + nc + n_in
         x = np.eye(nx, width)
@@ -186,21 +203,23 @@ class Linear:
         for slot in self.order:
             p = self.blocks[slot]
             u_at = slice(first_u, first_u + len(p.inputs))
-            x_at = slice(first_x, first_x + len(p.states))
+            x_at = slice(first_x, first_x + len(names_of[slot]))
             y_at = slice(first_y, first_y + len(p.outputs))
             u = self.k[u_at] @ y + (self.w[u_at] @ put if break_at is None else 0.0)
             if u_at.start <= broken < u_at.stop:
                 came = u[broken - u_at.start : broken - u_at.start + 1].copy()
                 u[broken - u_at.start] = put[0]
-            ad, bd = p.held(self.step)
+            own = self.sampled.get(slot)
+            ad, bd = (own.a, own.b) if own else p.held(self.step)
+            c, d = (own.c, own.d) if own else (p.c, p.d)
             x[x_at] = ad @ x[x_at] + bd @ u
-            y[y_at] = p.c @ x[x_at] + p.d @ u
+            y[y_at] = c @ x[x_at] + d @ u
             first_u, first_x, first_y = u_at.stop, x_at.stop, y_at.stop
         after = np.vstack([x, y[[self.outputs.index(n) for n in self.cut]]])
         shown = -came if break_at is not None else y[[self.outputs.index(n) for n in self.shown]]
         n = nx + nc
         names = ([break_at], ["L"]) if break_at is not None else (self.outside, self.shown)
-        states = [*self.states, *(f"{c} (step before)" for c in self.cut)]
+        states = [*all_states, *(f"{c} (step before)" for c in self.cut)]
         return _model(after[:, :n], after[:, n:], shown[:, :n], shown[:, n:], *names, states, self.step)
 
 
@@ -241,10 +260,13 @@ def loops(
     try:
         parts = operating_point(assembly, parameters, part_of)
         linear = Linear(assembly, parts, step)
-        found = {
-            "closed": {"continuous": linear.continuous(), "discrete": linear.discrete()},
+        kinds: list[tuple[str, Callable[..., dict[str, Any]]]] = [("discrete", linear.discrete)]
+        if not linear.sampled:
+            kinds.insert(0, ("continuous", linear.continuous))
+        found: dict[str, Any] = {
+            "closed": {kind: model() for kind, model in kinds},
             "loops": {
-                name: {"break": at, "continuous": linear.continuous(at), "discrete": linear.discrete(at)}
+                name: {"break": at, **{kind: model(at) for kind, model in kinds}}
                 for name, at in assembly.system.loops.items()
             },
         }
@@ -253,38 +275,13 @@ def loops(
     except NotLinear as error:
         return {"missing": str(error)}, [f"no margins from linearized parts: {error}"]
     said = []
-    for slot in linear.order:
-        sampled = [name for name, _ in parts[slot].ticks]
-        if sampled and _passes_on(parts[slot], linear.blocks[slot]):
-            said.append(f"{slot}: what its sampled methods ({', '.join(sampled)}) do is not in the linear model")
     for kind, text in (("continuous", "the linear loop"), ("discrete", f"the loop with its step of {step:g} s")):
-        bad = unstable(found["closed"][kind])
+        bad = unstable(found["closed"][kind]) if kind in found["closed"] else []
         if bad:
             others = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
             said.append(f"{text} is unstable: pole {_written(bad[0])}{others}; the run will show it growing")
             break
     return found, said
-
-
-def _passes_on(part: Component, block: Block) -> bool:
-    """True when an input in a loop changes a discrete value of the part: its sampled methods are then part of it."""
-    from gyrobench.component import PartError
-
-    names = [s.name for s in part.layout if s.section == "discrete"]
-    if not names or not block.inputs:
-        return False
-    seen = []
-    for delta in (0.0, 1e-6):
-        twin = type(part)(part.instance)
-        twin.set_state(part.get_state())
-        for n in block.inputs:
-            twin.set(n, twin.get(n) + delta)
-        try:
-            twin.do_step(0.0, getattr(twin, "step", 1e-3) if getattr(twin, "step", 1.0) < 1.0 else 1e-3)
-        except PartError:
-            return True
-        seen.append([twin.get(n) for n in names])
-    return seen[0] != seen[1]
 
 
 def _written(p: complex) -> str:

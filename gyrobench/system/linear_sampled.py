@@ -1,0 +1,115 @@
+"""The linear model of one step of a part with sampled methods, by differences of its own steps.
+
+x+ = A x + B u,  y = C x+ + D u with x = states and discrete values.  Exact but for rounding where the step is linear.
+
+Not modelled: a part whose step is not the same one step later (a ring buffer, a sampling period of several steps).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.component import Component, PartError
+
+Array = NDArray[np.float64]
+DELTA = 1e-6  # of a value, or of 1 where it is smaller
+SETTLED = 1000  # steps after which a filter with a changing gain has its last one
+MOST = 60  # discrete values: more are a memory, whose step is not the same one step later
+
+
+@dataclass
+class Step:
+    """One step; names: of states and discrete values, in the order of the columns of A and C."""
+
+    names: list[str]
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+
+
+def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
+    """The step of ``part`` at its present point; None where no sampled method passes an input on to an output.
+
+    Raises ValueError (the text says why) for a part whose step is not the same one step later.
+    """
+    discrete = [s.name for s in part.layout if s.section == "discrete"]
+    if not part.ticks or not discrete or not inputs:
+        return None
+    twin = type(part)(part.instance)
+    twin.set_state(part.get_state())
+    if not _listens(twin, inputs, discrete, step):
+        return None
+    if len(discrete) > MOST:
+        raise ValueError(f"keeps {len(discrete)} values in memory")
+    first = _differences(twin, inputs, outputs, step, discrete)
+    n = len(part.states)
+    if not (np.any(first.a[:n, n:]) or np.any(first.c[:, n:])):
+        return None
+    try:
+        for k in range(SETTLED):
+            twin.do_step(k * step, step)
+        last = _differences(twin, inputs, outputs, step, discrete)
+        twin.do_step(SETTLED * step, step)
+        after = _differences(twin, inputs, outputs, step, discrete)
+    except PartError as error:
+        raise ValueError(str(error)) from error
+    for m in "abcd":
+        x, y = getattr(last, m), getattr(after, m)
+        if not np.allclose(x, y, rtol=1e-3, atol=1e-6 * (np.abs(x).max() if x.size else 0.0)):
+            raise ValueError("its one step is not like the next (a memory, or a sampling period of several steps)")
+    return last
+
+
+def _listens(part: Component, inputs: list[str], discrete: list[str], step: float) -> bool:
+    """Whether a discrete value after two steps depends on the inputs, or on the states before."""
+    seen = []
+    for size in (0.0, DELTA):
+        twin = type(part)(part.instance)
+        twin.set_state(part.get_state())
+        for n in [*inputs, *(s.name for s in part.states)]:
+            twin.set(n, twin.get(n) + size)
+        for k in range(2):
+            twin.do_step(k * step, step)
+        seen.append([twin.get(n) for n in discrete])
+    return seen[0] != seen[1]
+
+
+def _differences(part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]) -> Step:
+    names = [s.name for s in part.states] + discrete
+    kept: Any = part.get_state()
+
+    def column(name: str, after: Callable[[], list[float]], move: bool) -> Array:
+        found = []
+        for sign in (1.0, -1.0):
+            part.set_state(kept)
+            x = part.get(name)
+            size = DELTA * max(1.0, abs(x))
+            part.set(name, x + sign * size)
+            if move:
+                part.do_step(part.t, step)
+            found.append(np.array(after()))
+        part.set_state(kept)
+        return np.asarray((found[0] - found[1]) / (2.0 * size))
+
+    def state() -> list[float]:
+        return [part.get(n) for n in names]
+
+    def output() -> list[float]:
+        return [part.get(n) for n in outputs]
+
+    def matrix(columns: list[str], after: Callable[[], list[float]], move: bool, rows: int) -> Array:
+        return np.column_stack([column(n, after, move) for n in columns]) if columns else np.zeros((rows, 0))
+
+    return Step(
+        names,
+        matrix(names, state, True, len(names)),
+        matrix(inputs, state, True, len(names)),
+        matrix(names, output, False, len(outputs)),
+        matrix(inputs, output, False, len(outputs)),
+    )

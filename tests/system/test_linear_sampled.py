@@ -1,0 +1,46 @@
+"""The linear step of parts with sampled methods: by hand, against the Riccati equation, and where there is none."""
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+
+from gyrobench.packaging import load_part
+from gyrobench.system.linear_sampled import sampled_step
+
+H = 1e-3
+
+
+def started(name, **parameters):
+    part = load_part(name)(**parameters)
+    part.initialize()
+    return part
+
+
+def test_rebalance_by_hand():
+    """q+ = q + h u;  flowed+ = present;  present+ = K_p u + K_i q+;  i_read = flowed, i = K_p u + K_i q."""
+    found = sampled_step(started("rebalance_analog", K_p=2.0, K_i=30.0, i_max=1e3), ["u"], ["i", "i_read"], H)
+    assert found.names == ["q", "present", "flowed"]
+    np.testing.assert_allclose(found.a, [[1, 0, 0], [30, 0, 0], [0, 1, 0]], rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(found.b, [[H], [2 + 30 * H], [0]], rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(found.c, [[30, 0, 0], [0, 0, 1]], rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(found.d, [[2], [0]], rtol=1e-7, atol=1e-8)
+
+
+def test_kalman_filter_has_its_steady_gain():
+    """x+ = (I - K C) F x + K z with K of the Riccati equation."""
+    q, r = 0.5, 1e-4
+    found = sampled_step(started("estimator_kalman_rate", q=q, R=r, Ts=H), ["z"], ["estimate"], H)
+    f, c = np.array([[1.0, H], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    p = solve_discrete_are(f.T, c.T, q * np.array([[H**3 / 3, H**2 / 2], [H**2 / 2, H]]), [[r]])
+    k = p @ c.T / (p[0, 0] + r)
+    at = [found.names.index(n) for n in ("x", "v")]
+    np.testing.assert_allclose(found.a[np.ix_(at, at)], f - k @ c @ f, rtol=1e-6)
+    np.testing.assert_allclose(found.b[at], k, rtol=1e-6)
+
+
+def test_what_has_no_such_step():
+    assert sampled_step(started("platform_single_axis"), ["v"], ["theta"], H) is None  # its contact carries no torque
+    with pytest.raises(ValueError, match="memory"):
+        sampled_step(started("estimator_moving_average", Ts=H), ["z"], ["estimate"], H)
+    with pytest.raises(ValueError, match="one step is not like the next"):
+        sampled_step(started("estimator_kalman_rate", Ts=2 * H), ["z"], ["estimate"], H)
