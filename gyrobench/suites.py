@@ -257,6 +257,10 @@ def _finish(suite: Suite, folder: Path, meta: dict[str, Any], spec: Path | None,
     members = {n: _member(folder / t["folder"], t["folder"]) for n, t in meta["tests"].items()}
     for name, member in members.items():
         meta["tests"][name] = {"folder": member.folder, "report_id": member.report_id, **member.facts}
+    for name in suite.about:  # what the suite is not told the tests may say
+        said = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
+        if text := suite[name] or "; ".join(filter(None, said)):
+            meta[name] = text
     result = together(
         members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
         conventions=suite.conventions, shared=suite.shared, specification=limits_of(spec),

@@ -281,8 +281,7 @@ def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
 def measuring(name: str) -> Any:
     system = load(name)
     if isinstance(system, Suite):
-        hint = f"reduce each record by its own test, then gyrobench reduce {name} --data RUN --data RUN"
-        raise UsageError(f"{name} compares runs: {hint}")
+        raise UsageError(f"{name} compares runs: reduce each record by its own test, then give it their folders")
     if not hasattr(system, "measured"):
         raise UsageError(f"{system.name} has no reduction of measured data")
     return system
@@ -290,7 +289,9 @@ def measuring(name: str) -> Any:
 
 def template(name: str) -> str:
     """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
-    return str(measuring(name).template())
+    from gyrobench.system.laboratory import explained
+
+    return explained(str(measuring(name).template()))
 
 
 def reduce(

@@ -69,7 +69,7 @@ def test_listing_reads_what_each_part_says_of_itself() -> None:
     assert list(found) == ["parts", "systems", "sockets", "specifications"]
     assert all(r["what"] for rows in found.values() for r in rows)
     rows = {r["name"]: r for title in ("parts", "systems") for r in found[title]}
-    assert rows["floated_gyro"]["what"] == "Single-degree-of-freedom floated rate-integrating gyro"
+    assert rows["floated_gyro"]["what"] == "Single-degree-of-freedom floated gyro"
     assert "GYRO-DYN-1" in rows["floated_gyro"]["spec"]
     assert rows["tumble_single_axis"]["what"] == "Single-axis tumble test"
     assert "TEST-TUMBLE1-SDF" in rows["tumble_single_axis"]["spec"]

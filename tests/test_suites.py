@@ -255,3 +255,33 @@ def test_show_and_list(gyrobench: Call) -> None:
     assert all(t["duration"] > 0.0 and t["plan"] for t in found["tests"])
     assert "--seed" in gyrobench("show", NAME)[1]
     assert NAME in gyrobench("list")[1]
+
+
+# ------------------------------------------------------------------------------------- measured records
+def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
+    """The simulated windows as a laboratory would write them down: same numbers, no truth; what it does not state and a
+    signature wants is said.
+    """
+    w = Record.load(done / "fixed_position").windows
+    about = ["latitude = 45.75deg", "instrument = gyro 17", "operator = A. B.", "conditions = 22 °C, warm for 4 h"]
+    columns = (w["t_start"].tolist(), w["t_end"].tolist(), (w["mean"] * 1e3).tolist())
+    rows = [",".join(map(repr, row)) for row in zip(*columns, strict=True)]
+    runs = []
+    for k, number in enumerate((17, 17, 18)):
+        text = [f"# {x}".replace("gyro 17", f"gyro {number}") for x in (*about, "k = 17.2deg/h/mA", "attitude = E U")]
+        Path(f"{k}.csv").write_text("\n".join([*text, "t_start [s],t_end [s],mean [mA]", *rows]), encoding="utf-8")
+        assert gyrobench("reduce", "fixed_position", "--data", f"{k}.csv", "--out", f"run{k}")[0] == 0
+        runs.append(f"run{k}")
+    page = Path("run0/report.html").read_text(encoding="utf-8")
+    assert "22 °C, warm for 4 h" in page and "wanted before signing: laboratory, equipment" in page
+    code, out, _ = gyrobench("reduce", NAME, "--data", "run0", "--data", "run1", "--set", "laboratory=L", "--json")
+    found = json.loads(out)
+    assert code == 0 and found["instrument"] == "gyro 17" and not found["simulated"]
+    assert found["provenance"]["conditions"] == "22 °C, warm for 4 h" and found["provenance"]["laboratory"] == "L"
+    (q,) = found["suite"]["quantities"]
+    assert q["truth"] is None and [v["label"] for v in q["values"]] == ["fixed_position run0", "fixed_position run1"]
+    assert q["p"] == 1.0 and q["mean"]["estimate"] == pytest.approx(q["values"][0]["estimate"])
+    code, _, err = gyrobench("reduce", NAME, "--data", "run0", "--data", "run2")
+    assert code == 2 and "different instruments: gyro 17: fixed_position run0; gyro 18: fixed_position run2" in err
+    code, _, err = gyrobench("reduce", NAME, "--data", "run0", "--data", done / "tumble_single_axis")
+    assert code == 2 and "not of one gyro" in err

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from gyrobench.system.record import ABOUT
+
 from .blocks import Items, Signatures
 
 Json = dict[str, Any]
@@ -20,9 +22,10 @@ def signing(doc: Json) -> list[Any]:
         "Uncertainties are expanded to 95 % where U or an interval is given; u is a standard uncertainty [GUM].",
         "This report may be copied as a whole only.",
     ]
+    missing = [name for name in ("operator", *ABOUT) if name != "customer" and not run.get(name)]
     if doc["simulated"]:
         said.insert(0, "All data are simulated: no instrument was tested, and nothing here is traceable to a standard.")
-    elif not any("traceab" in str(n) for n in run.get("notes") or []):
-        said.append("Traceability of current meter, angle encoder and clock: by the laboratory's own certificates.")
+    elif missing:
+        said.append(f"Not stated, and wanted before signing: {', '.join(missing)}.")
     names = [str(run.get("operator") or ""), "", ""]
     return [Items(said), Signatures(list(zip(ROLES, names, strict=True)))]

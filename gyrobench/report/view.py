@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.system.record import ABOUT
+
 from . import evidence, method, plots, responses
 from .blocks import Answer, Cell, Column, Page, Picture, Row, Section, Table, number_cell, pictures, text_cell
 from .numbers import write_number
@@ -53,7 +55,7 @@ def head(doc: Json) -> list[tuple[str, str]]:
         ("Instrument", doc["instrument"] or "not named"),
         ("Site", site or "not stated"),
         ("Operator", str(run.get("operator") or "not recorded")),
-        *((name.capitalize(), str(run[name])) for name in ("laboratory", "customer") if run.get(name)),
+        *((name.capitalize(), str(run[name])) for name in ABOUT if run.get(name)),
         ("Method", doc["method"]),
         ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
     ]

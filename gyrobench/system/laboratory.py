@@ -17,12 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench.system.measured import WINDOW_COLUMNS, Column, DataError, read_measured
-from gyrobench.system.record import Record
+from gyrobench.system.record import ABOUT, Record
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
-TEXTS = ("instrument", "operator", "polarity", "date", "report")
+TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report")
+
+
+def explained(template: str) -> str:
+    """A template with a word, before its header, about what any record may say for its report."""
+    lines = template.splitlines()
+    head = next((k for k, line in enumerate(lines) if not line.startswith("#")), 0)
+    note = f"# {', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them."
+    return "\n".join([*lines[:head], note, *lines[head:]]) + "\n"
 
 
 def read_record(

@@ -23,6 +23,8 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray[Any, Any]
+#: what a record may say of its circumstances, beside instrument and operator, for a report that is signed
+ABOUT = ("laboratory", "customer", "conditions", "equipment")
 WHOLE = ("phase", "n", "flagged")  # integer columns
 
 

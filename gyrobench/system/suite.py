@@ -39,6 +39,8 @@ class Suite(System):
         "laboratory": Option("", str, "name and address of the laboratory, for the report"),
         "customer": Option("", str, "for whom the tests were made, for the report"),
         "operator": Option("", str, "who made the tests, for the report"),
+        "conditions": Option("", str, "temperature, warm-up and the like, for the report"),
+        "equipment": Option("", str, "current meter, encoder, clock and their calibration, for the report"),
     }
 
     def __init__(self) -> None:

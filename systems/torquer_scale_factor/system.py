@@ -13,7 +13,7 @@ from gyrobench import frames, units
 from gyrobench.reduction.result import Result
 from gyrobench.system.measured import Column, read_measured
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.record import Record
+from gyrobench.system.record import ABOUT, Record
 from gyrobench.system.sockets import SOCKETS, Connector, Socket
 from gyrobench.system.system import Option, Slot, System, Windows
 
@@ -33,7 +33,7 @@ COLUMNS = (
     Column("range_plus", "rad", "angle range with positive current", required=False),
     Column("range_minus", "rad", "angle range with negative current", required=False),
 )
-TEXTS = ("title", "source", "made", "note", "instrument", "operator", "date", "report")
+TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report")
 DEG = math.pi / 180.0
 FACE = "input axis on the table axis"
 #: rows I, O, S in table axes at angle 0: input axis on the table axis, output axis on the first
