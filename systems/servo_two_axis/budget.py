@@ -1,6 +1,7 @@
 """Type B lines of the two-axis servo test: what a wrong mount, table or clock does to each coefficient.
 
-Every source is put into angles, axes or times, the data are made again from it, and the change goes through the fit.
+Every source is put into angles, axes or times, the data are made again from it, and the change goes through the fit:
+with its sign where the readings are wrong, with the opposite one where the axes are not where the reduction has them.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ def effects(
         return found.change(dy, dX) / SMALL
 
     def mount(k: int) -> Array:
-        turned = replace(seen, base=frames.rotation(np.eye(3)[k], SMALL) @ seen.base)
-        return np.array([moved(turned, phase == p) for p in np.unique(phase)])
+        turned = replace(seen, base=_turned(k) @ seen.base)
+        return -np.array([moved(turned, phase == p) for p in np.unique(phase)])
 
     def read(axis: int, error: Callable[[Array], Array], slope: Callable[[Array], Array]) -> Array:
         angle, rate = seen.angle.copy(), seen.rate.copy()
@@ -58,10 +59,10 @@ def effects(
     each = "each mount set up by itself"
     out = [Effect(f"table set up, about {a}", sizes["u_axis"], "rad", mount(k), each) for k, a in enumerate("XYZ")]
     out += [
-        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", moved(replace(seen, body=_body(k))))
+        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(replace(seen, body=_turned(k))))
         for k, a in enumerate("xyz")
     ]
-    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", moved(replace(seen, square=SMALL))))
+    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(replace(seen, square=SMALL))))
     for n, often in ((1, "once"), (2, "twice")):
         out += [
             Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder")
@@ -71,6 +72,6 @@ def effects(
     return [*out, Effect("time base", sizes["u_time"], "1", moved(slow), "relative")]
 
 
-def _body(k: int) -> Array:
-    """The gyro turned by SMALL about an axis of the plate: rows are its axes."""
+def _turned(k: int) -> Array:
+    """Rows: axes turned by SMALL about the k-th of them, in what they were."""
     return frames.rotation(np.eye(3)[k], SMALL).T

@@ -49,7 +49,7 @@ def locked(mount: int, latitude: float, time: float, earth_rate: float, rates: R
     """Largest inner angle in ``time``, rad."""
     if rates is None and time * earth_rate >= 2.0 * math.pi:
         return geometry.swing(mount, latitude)
-    return float(np.max(np.abs(geometry.path(mount, latitude, time, 721, earth_rate, rates)[2])))
+    return float(np.max(np.abs(geometry.path(mount, latitude, time, 361, earth_rate, rates)[2])))
 
 
 def best_pairs(
@@ -168,20 +168,28 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
                 f"gyro.{square} = {value:g} °/h/g² ({c} channel): at constant |g| it cannot be told from the constant "
                 "and the other squares, and the book's model has no such term; set it to 0"
             )
-    if "gyro.mount" in parameters:
-        try:
-            M = frames.check_rotation(parameters["gyro.mount"], "gyro.mount")
-            if min(M[0, 0], M[1, 1]) < TILTED:
-                found.append(
-                    "gyro.mount: x and y of the gyro must lie along x and y of the inner plate to 30° (the x pickoff "
-                    "drives the outer axis, the y pickoff the inner one): turned further, the loops work against each "
-                    "other"
-                )
-        except ValueError as error:
-            found.append(str(error))
-    for slot in ("outer", "inner"):
+    for name in ("gyro.mount", "outer.base", "inner.base", "stand.base"):
+        if name in parameters:
+            try:
+                frames.check_rotation(parameters[name], name)
+            except ValueError as error:
+                found.append(str(error))
+    M = np.asarray(parameters.get("gyro.mount", np.eye(3)))
+    if not found and min(M[0, 0], M[1, 1]) < TILTED:
+        found.append(
+            "gyro.mount: x and y of the gyro must lie along x and y of the inner plate to 30° (the x pickoff drives "
+            "the outer axis, the y pickoff the inner one): turned further, the loops work against each other"
+        )
+    for slot, cage, torquer in (("outer", "cage_x", "k_y"), ("inner", "cage_y", "k_x")):
         if parameters.get(f"{slot}.polarity", 1) != 1:
             found.append(f"{slot}.polarity = -1: the gyro's axes lie along those of the plate; it must be 1")
+        reach = parameters.get(f"{cage}.i_max", math.inf) * parameters.get(f"gyro.{torquer}", math.inf)
+        rate = parameters.get(f"{slot}.index_rate", 0.0)
+        if rate > 0.9 * reach:
+            found.append(
+                f"{slot}.index_rate = {rate:g} rad/s: the cage holds the rotor up to {cage}.i_max gyro.{torquer} = "
+                f"{reach:.3g} rad/s; index more slowly"
+            )
     names = {c: drift.NAMES_2DOF[c] for c in "xy"}
     if found or not all(f"gyro.{n}" in parameters for c in "xy" for n in names[c]):
         return found

@@ -92,7 +92,7 @@ class ServoTwoAxis(System):
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         from .refusals import model_problems
 
-        return servo.problems(parameters, self.plan()) + model_problems(parameters, self.mounts(), self.values)
+        return model_problems(parameters, self.mounts(), self.values)
 
     def warnings(self) -> list[str]:
         from .refusals import cautions
