@@ -63,7 +63,7 @@ class PlatformSingleAxis(Component):
     alpha = Output("rad/s2", "its derivative at the end of the step, without that of h_gyro", shape=(3,))
     f = Output("m/s2", "specific force, platform axes", shape=(3,))
     attitude = Output("rad", "integral of omega[1]")
-    i_motor = Output("A", "motor current")
+    i_motor = Output("A", "motor current at the end of the step")
     M_motor = Output("N.m", "motor torque on the platform")
     saturated = Output("1", "1 while voltage or current is at its limit")
 
@@ -73,6 +73,7 @@ class PlatformSingleAxis(Component):
     i = State(0.0, "A", "motor current")
 
     inertia = Discrete(1.0, "kg.m2", "J and the reflected J_motor")
+    flowed = Discrete(0.0, "A", "current at the end of the step, for L = 0")
     spring = Discrete(0.0, "N.m/rad", "stiffness of the contact")
     rub = Discrete(0.0, "N.m.s/rad", "its damping")
     reach = Discrete([0.0, 0.0], "rad", "way at Coulomb friction and at break-away")
@@ -149,6 +150,8 @@ class PlatformSingleAxis(Component):
     @sampled(every=1)
     def tick(self) -> None:
         self.i = clip(self.i, -self.i_max, self.i_max)
+        if self.L == 0.0:
+            self.flowed = self.current(self.rate() - self.omega_b[0])
         if self.spring > 0.0:
             way = self.angle - self.anchor
             if self.slipping == 0.0:
@@ -180,7 +183,7 @@ class PlatformSingleAxis(Component):
         self.f[1] = c * self.f_b[1] + s * self.f_b[2]
         self.f[2] = c * self.f_b[2] - s * self.f_b[1]
         self.attitude = self.turned
-        amps = self.current(slip)
+        amps = self.i if self.L > 0.0 else self.flowed  # not of the present v: a current loop could not be ordered
         self.i_motor = amps
         self.M_motor = self.ratio * self.k_t * amps
         self.saturated = 1.0 if fabs(self.v) > self.v_max or fabs(amps) >= self.i_max else 0.0
