@@ -152,6 +152,16 @@ def test_readings_reach_the_estimator_in_their_own_step() -> None:
     assert r.meta["delays"] == {}
 
 
+def test_what_is_known_is_set_where_the_part_has_it() -> None:
+    values = {"benchmark": "level", "estimator.walk": 1e-9, "samples": 2500, "skip": 0}
+    known = run(load_system(NAME), values=values).meta
+    p = known["parameters"]
+    assert p["estimator.Ts"] == 5.0 and p["estimator.R"] == 2.70e-6 and p["estimator.q"] == 0.0
+    assert p["estimator.walk"] == 1e-9  # the user's word before the benchmark's
+    none = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 2500, "skip": 0}).meta
+    assert "estimator.Ts" not in none["parameters"] and none["notes"] == known["notes"] == []
+
+
 # --------------------------------------------------------------------------------------- refusals
 def test_refusals() -> None:
     system = load_system(NAME)
