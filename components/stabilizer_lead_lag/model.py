@@ -24,7 +24,7 @@ class StabilizerLeadLag(Component):
 
     version = "1.0.0"
 
-    K = Parameter(2.0, "1", "gain at rest, voltage per voltage", above=0.0)
+    K = Parameter(2.0, "1", "gain at rest, voltage per voltage; 0: the loop is open", min=0.0)
     tau1 = Parameter(0.2, "s", "lag: time constant of the numerator", min=0.0)
     T1 = Parameter(2.0, "s", "lag: time constant of the denominator", above=0.0)
     tau2 = Parameter(0.03, "s", "lead: time constant of the numerator", min=0.0)

@@ -101,7 +101,7 @@ def test_order_is_flagged(given, flag):
         ({"T1": 0.0}, "T1 = 0 s must be > 0"),
         ({"T2": -1.0}, "T2 = -1 s must be > 0"),
         ({"tau1": -0.1}, "tau1 = -0.1 s must be >= 0"),
-        ({"K": 0.0}, "K = 0 1 must be > 0"),
+        ({"K": -1.0}, "K = -1 1 must be >= 0"),
         ({"integral": -1.0}, "integral = -1 1/s must be >= 0"),
         ({"v_max": 0.0}, "v_max = 0 V must be > 0"),
     ],

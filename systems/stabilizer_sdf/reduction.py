@@ -1,0 +1,235 @@
+"""Reduction of stabilizer_sdf: what the axis did under the torque, beside the closed form of its kind of gyro."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.loop_result import LoopFindings
+from gyrobench.reduction.loops import Gate
+from gyrobench.reduction.method import ReductionError
+from gyrobench.reduction.result import Response, Result
+
+from . import closed
+from .closed import Axis
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+ARCMIN = math.pi / 10800.0
+SHOWN = 500  # points of a drawn curve
+EQUATIONS = {
+    "integrating": "J_0 dot.double(alpha) + H cos beta dot(beta) = M, quad "
+    "J dot.double(beta) - H cos beta dot(alpha) = 0",
+    "rate-integrating": "J_0 dot.double(alpha) + H cos beta dot(beta) = M, quad "
+    "J dot.double(beta) + C dot(beta) - H cos beta dot(alpha) = 0",
+    "rate": "J_0 dot.double(alpha) + H cos beta dot(beta) = M, quad "
+    "J dot.double(beta) + C dot(beta) + K beta - H cos beta dot(alpha) = 0",
+}
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """The result of a record.  Raises ReductionError where the load phase is not whole."""
+    meta = record.meta
+    kind = str(meta.get("options", {}).get("kind"))
+    if kind not in closed.FORMS:
+        raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
+    found = LoopFindings(record)
+    loads = found.of("torque", 1, "step")
+    if not loads:
+        raise ReductionError("the phase 'load' is not whole in this record: the run ended before (the float's stop?)")
+    gate = loads[0]
+    held = float(np.mean(np.cos(gate["gyro.b"])))
+    p = plant(meta, held)
+    t = gate.t - gate.t[0]
+    free = not meta["options"].get("offload") and not meta["options"].get("viscous")
+    found.tables.append(_derived(p, kind, held))
+    if free:
+        _closed_forms(found, p, kind, str(meta["options"].get("form")), gate, t, float(meta["step"]))
+    else:
+        found.step(gate, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
+        found.warnings.append("The closed forms know neither motor nor friction: the figures are of the run alone.")
+        end = coupling(p, t[-1], float(meta["step"])) / 3**0.5 / ARCMIN
+        found.measure("a(T)", "platform angle at the end of the load", "arcmin",
+                      gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
+    late = math.degrees(p.M * float(meta["step"]) / p.H) / 3**0.5
+    found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
+    found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
+    found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
+                caption="Angle of the platform over that of the base.")  # fmt: skip
+    ends = next((c for c in found.coefficients if c.name == "a(T)"), None)
+    result = found.result(
+        title=f"Stabilizer with a gyro of one degree of freedom: {kind} gyro",
+        method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against the "
+        "closed form",
+        sources=[
+            "STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; 004_a44a05c7e88249d1.txt 5.1.4, eq. 5-27..5-43",
+            "Corrected: J0 for J in 5-34 (third term of b) and 5-36; 5-38 two orders of derivatives higher",
+        ],
+        equation=EQUATIONS[kind],
+        conventions=[
+            "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive for a "
+            "positive torque.",
+            f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for H cos(beta).",
+            "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
+        ],
+        specification=specification,
+    )
+    if ends is not None:
+        beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
+        result.summary = [
+            f"After {t[-1]:.4g} s of {p.M:g} N.m the platform leans by {ends.estimate:.4g} arcmin{beside}.",
+            f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°.",
+            SAID[kind](p),
+        ]
+    return result
+
+
+SAID = {
+    "integrating": lambda p: f"The gyro holds the axis like a spring of {p.stiffness:.4g} N.m/rad.",
+    "rate-integrating": lambda p: f"The axis creeps with M C/H² = {p.M * p.C / p.H**2 / ARCMIN:.4g} arcmin/s.",
+    "rate": lambda p: f"The axis feels like an inertia of {p.inertia:.5g} kg.m2 instead of {p.J0:.5g}.",
+}
+
+
+def plant(meta: Mapping[str, Any], held: float = 1.0) -> Axis:
+    """The axis as the parts had it, with H times the cos(b) that the closed forms hold."""
+    q = meta.get("parameters", {})
+    names = ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K")
+    missing = [n for n in names if n not in q]
+    if missing:
+        raise ReductionError([f"the record does not say {n}" for n in missing])
+    j0, j, spin, c, k = (float(q[n]) for n in names)
+    return Axis(j0, j, spin * held, c, k, float(meta["options"]["M"]))
+
+
+def coupling(p: Axis, t: Array | float, step: float) -> Any:
+    """What the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
+    return p.M * step * np.asarray(t) / p.J0
+
+
+def _closed_forms(found: LoopFindings, p: Axis, kind: str, form: str, gate: Gate, t: Array, step: float) -> None:
+    """Coefficients of the kind, the two curves, and how far they are apart."""
+    a, b = gate["platform.attitude"] - gate["platform.attitude"][0], gate["gyro.b"] - gate["gyro.b"][0]
+    wanted_a, wanted_b = closed.light(p, t) if form == "light" else closed.FORMS[kind](p, t)
+    end = float(coupling(p, t[-1], step))
+    found.measure("a(T)", "platform angle at the end of the load", "arcmin", a[-1] / ARCMIN, end / 3**0.5 / ARCMIN,
+                  closed=wanted_a[-1] / ARCMIN)  # fmt: skip
+    found.measure("b(T)", "float angle at the end of the load", "°", math.degrees(b[-1]),
+                  math.degrees(p.M * step / p.H) / 3**0.5, closed=math.degrees(wanted_b[-1]))  # fmt: skip
+    {"integrating": _integrating, "rate-integrating": _rate_integrating, "rate": _rate}[kind](found, p, t, a, b, step)
+    apart = float(np.abs(a - wanted_a).max()), float(np.abs(b - wanted_b).max())
+    found.tables.append(
+        {
+            "title": "Co-simulation against the closed form",
+            "caption": f"Over the whole load. The exchange once a step of {step:g} s may shift platform and float by "
+            "M h t/J0 and M h/H; both shrink with the step. The rest is cos(b) and, with form=light, that form.",
+            "columns": ["angle", "largest difference", "expected of the exchange", "largest value", "unit"],
+            "rows": [
+                ["platform", apart[0] / ARCMIN, end / ARCMIN, float(np.abs(a).max()) / ARCMIN, "arcmin"],
+                ["float", math.degrees(apart[1]), math.degrees(p.M * step / p.H), math.degrees(np.abs(b).max()), "°"],
+            ],
+        }
+    )
+    label = "closed form, light damping" if form == "light" else "closed form"
+    _figure(found, "load", "platform angle", "arcmin", t, a / ARCMIN, wanted_a / ARCMIN, label)
+    _figure(found, "load, float", "float angle", "°", t, np.degrees(b), np.degrees(wanted_b), label)
+
+
+def _figure(
+    found: LoopFindings, name: str, what: str, unit: str, t: Array, y: Array, wanted: Array, label: str
+) -> None:
+    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
+    curve = {"label": label, "x": t[pick].tolist(), "y": wanted[pick].tolist(), "phase": []}
+    caption = f"The {what} from the beginning of the load on: co-simulation, and the {label}."
+    found.responses.append(
+        Response(name, "step", caption, t[pick].tolist(), "time", "s", y[pick].tolist(), what, unit, curves=[curve])
+    )
+
+
+def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
+    """Coefficients and their standard uncertainties by ordinary least squares."""
+    size = np.abs(columns).max(axis=0)
+    x, *_ = np.linalg.lstsq(columns / size, y, rcond=None)
+    rest = y - columns / size @ x
+    inverse = np.linalg.inv((columns / size).T @ (columns / size))
+    u = np.sqrt(np.diag(inverse) * (rest @ rest) / max(1, y.size - x.size))
+    return x / size, u / size
+
+
+def _integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+    """a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
+    from scipy.optimize import minimize_scalar
+
+    def columns(n: float) -> Array:
+        return np.column_stack([1.0 - np.cos(n * t), np.sin(n * t), t])
+
+    def misfit(n: float) -> float:
+        x, *_ = np.linalg.lstsq(columns(n), a, rcond=None)
+        return float(np.sum((a - columns(n) @ x) ** 2))
+
+    width = min(0.2 * p.n, math.pi / t[-1])
+    n = float(minimize_scalar(misfit, bounds=(p.n - width, p.n + width), method="bounded", options={"xatol": 1e-9}).x)
+    x, u = least_squares(columns(n), a)
+    stiff = p.M / x[0]
+    found.measure("S", "stiffness of the axis", "N.m/rad", stiff, stiff * u[0] / abs(x[0]), closed=p.stiffness)
+    # the held exchange shifts the frequency by its second order, n2 h2/24 and less
+    found.measure("n", "nutation frequency", "rad/s", n, n * (n * step) ** 2 / 12.0 + 1e-9 * n, closed=p.n)
+    y, v = least_squares(np.column_stack([t, np.sin(n * t), 1.0 - np.cos(n * t)]), b)
+    found.measure("db/dt", "runaway of the float", "°/s", math.degrees(y[0]), math.degrees(v[0]),
+                  closed=math.degrees(p.M / p.H))  # fmt: skip
+
+
+def _rate_integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+    """a = o + r t and the transient, b = line and transient."""
+    columns = np.column_stack([np.ones(t.size), t, p.transient(t)])
+    x, u = least_squares(columns, a)
+    o, r = closed.line(p)
+    slide = p.M * step / p.J0 / 3**0.5
+    found.measure("da/dt", "creep of the platform", "arcmin/s", x[1] / ARCMIN, math.hypot(u[1], slide) / ARCMIN,
+                  closed=r / ARCMIN)  # fmt: skip
+    found.measure("o", "offset of the platform's line", "arcmin", x[0] / ARCMIN,
+                  math.hypot(u[0], r * step / 3**0.5) / ARCMIN, closed=o / ARCMIN)  # fmt: skip
+    found.measure("H²/C", "damping that the axis feels", "N.m.s/rad", p.M / x[1],
+                  p.M / x[1] * math.hypot(u[1], slide) / abs(x[1]), closed=p.H**2 / p.C)  # fmt: skip
+    y, v = least_squares(columns, b)
+    late = p.M * step / p.H / 3**0.5
+    found.measure("b_o", "offset of the float's line, -J0 C M/H³", "arcmin", y[0] / ARCMIN,
+                  math.hypot(v[0], late) / ARCMIN, closed=-p.J0 * p.C * p.M / p.H**3 / ARCMIN)  # fmt: skip
+
+
+def _rate(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+    """a = parabola and the transient."""
+    x, u = least_squares(np.column_stack([0.5 * t**2, t, np.ones(t.size), p.transient(t)]), a)
+    inertia = p.M / x[0]
+    found.measure("J0 + H²/K", "apparent inertia of the axis", "kg.m2", inertia, inertia * u[0] / abs(x[0]),
+                  closed=p.inertia)  # fmt: skip
+    slide = p.M * step / p.J0 / 3**0.5
+    total = p.K * p.J0 + p.H**2
+    found.measure("slope", "line beside the parabola, C H² M/(K J0 + H²)²", "arcmin/s", x[1] / ARCMIN,
+                  math.hypot(u[1], slide) / ARCMIN, closed=p.C * p.H**2 * p.M / total**2 / ARCMIN)  # fmt: skip
+
+
+def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
+    rows: list[list[Any]] = [
+        ["cos(b) held by the closed forms, mean over the load", held, "1"],
+        ["nutation without damping, √(H²/(J J0) + K/J)", p.n, "rad/s"],
+        ["damping of the nutation", p.zeta, "1"],
+    ]
+    if kind == "integrating":
+        rows.append(["quasi-spring H²/J", p.stiffness, "N.m/rad"])
+    elif kind == "rate-integrating":
+        rows.append(["H/C", p.H / p.C, "1"])
+        rows.append(["aperiodic limit of C, 2 √(J/J0) H", 2.0 * math.sqrt(p.J / p.J0) * p.H, "N.m.s/rad"])
+    else:
+        rows.append(["apparent inertia J0 + H²/K", p.inertia, "kg.m2"])
+    columns = ["of the closed form", "value", "unit"]
+    return {
+        "title": "Sizes of the axis",
+        "caption": "From the parameters of the run.",
+        "columns": columns,
+        "rows": rows,
+    }

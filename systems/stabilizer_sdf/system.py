@@ -1,0 +1,178 @@
+"""Axis stabilized by a gyro of one degree of freedom: integrating, rate-integrating or rate gyro, strongly coupled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.reduction.result import Result
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.record import Record
+from gyrobench.system.system import Option, Slot, System
+
+from .closed import Axis
+
+Specification = Mapping[str, tuple[float | None, float | None]]
+KINDS = ("integrating", "rate-integrating", "rate")
+LIGHT = 0.3  # damping up to which 5-34 may be taken
+SWEEP = (0.05, 0.1, 0.2, 0.5, 1.0)  # Hz
+
+
+class StabilizerSdf(System):
+    """The gyro itself resists a torque about the axis: its float yields by b, and H b' holds the axis.  Without spring
+    and damper the axis leans like a spring H2/J, with a damper it creeps by M C/H2, with a spring it feels like an
+    inertia J0 + H2/K.
+
+    [STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; 004_a44a05c7e88249d1.txt 5.1.4, eq. 5-27..5-43]
+    """
+
+    title = "Stabilizer with a gyro of one degree of freedom"
+    spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
+    slots = {
+        "exciter": Slot("Excitation", "exciter"),
+        "motion": Slot("Motion", "base_motion"),
+        "load": Slot("Load", "load_torque"),
+        "platform": Slot("PlatformAxis", "platform_single_axis"),
+        "gyro": Slot("SdfGyro", "floated_gyro"),
+        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
+    }
+    wires = """
+        exciter.motion_angle -> motion.motion_angle
+        exciter.motion_rate -> motion.motion_rate
+        exciter.motion_acceleration -> motion.motion_acceleration
+        exciter.torque -> load.torque
+        exciter.test[1] -> stabilizer.test
+        motion.omega -> platform.omega_b
+        motion.alpha -> platform.alpha_b
+        motion.f -> platform.f_b
+        load.M[1] -> platform.M_load
+        platform.omega -> gyro.omega
+        platform.alpha -> gyro.alpha
+        platform.f -> gyro.f
+        gyro.h_I -> platform.h_gyro
+        gyro.M_I -> platform.M_gyro
+        gyro.u -> stabilizer.u
+        stabilizer.v -> platform.v
+    """
+    loops = {"stabilizer": "stabilizer.u"}
+    options = {
+        "kind": Option("rate-integrating", str, f"kind of gyro: {', '.join(KINDS)}"),
+        "M": Option(10.0, "N.m", "disturbance torque"),
+        "time": Option(100.0, "s", "how long it acts"),
+        "J0": Option(1e6, "kg.m2", "inertia of the axis without the gyro"),
+        "J": Option(10.0, "kg.m2", "inertia of the gyro's float about its output axis"),
+        "H": Option(1e4, "N.m.s", "spin angular momentum"),
+        "C": Option(62.5, "N.m.s/rad", "damping of the float (rate-integrating and rate gyro)"),
+        "K": Option(100.0, "N.m/rad", "spring of the float (rate gyro)"),
+        "float_stop": Option("30deg", "rad", "stop of the float: the run ends there"),
+        "form": Option("exact", str, "closed form of the rate-integrating gyro: exact, or light (5-34, light damping)"),
+        "offload": Option(0.0, "N.m/rad", "torque of the motor for the float angle; 0: no motor"),
+        "viscous": Option(0.0, "N.m.s/rad", "viscous friction of the axis against the base"),
+    }
+    done = "exciter.done"
+    step = 1e-3
+    channels = (
+        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.test[1]", "exciter.motion_angle[1]",
+        "platform.attitude", "platform.omega[1]", "gyro.b", "stabilizer.e",
+    )  # fmt: skip
+    channel_period = 1e-2
+
+    def axis(self) -> Axis:
+        """The plant of these options: C and K are those of the kind."""
+        kind = self["kind"]
+        c = 0.0 if kind == "integrating" else self["C"]
+        k = self["K"] if kind == "rate" else 0.0
+        return Axis(self["J0"], self["J"], self["H"], c, k, self["M"])
+
+    def plan(self) -> LoopPlan:
+        """The torque and the time after it; base motion where there is friction, test sines where there is a motor."""
+        phases = [
+            LoopPhase("load", "torque", "step", amplitude=self["M"], settle=0.1, dwell=self["time"]),
+            LoopPhase("after the load", dwell=0.2 * self["time"]),
+        ]
+        if self["viscous"] > 0.0:
+            phases += sweep("base", "motion", SWEEP, 0.02, periods=4)
+        if self["offload"] > 0.0:
+            phases += sweep("loop", "test", SWEEP, 1e-3, periods=4)
+        return LoopPlan(phases)
+
+    def parameters(self) -> dict[str, Any]:
+        p = self.axis()
+        drifts = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "markov", "white", "pickoff")
+        return {
+            **self.plan().parameters(),
+            "platform.J": p.J0,
+            "platform.viscous": self["viscous"],
+            **{f"platform.{k}?": v for k, v in {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0, "v_max": 1e9}.items()},
+            "platform.i_max?": 1e9,
+            "platform.step?": 1.0,
+            "gyro.H": p.H,
+            "gyro.J": p.J,
+            "gyro.C": p.C,
+            "gyro.K": p.K,
+            "gyro.stop": self["float_stop"],
+            "gyro.reaction": True,
+            "gyro.K_sg": 1.0,
+            "gyro.u_max": 1e3,
+            "gyro.step?": 1.0,
+            **{f"gyro.{n}?": 0.0 for n in drifts},
+            "stabilizer.K": self["offload"],
+            **{f"stabilizer.{n}?": 1.0 for n in ("tau1", "T1")},
+            **{f"stabilizer.{n}?": 0.01 for n in ("tau2", "T2")},
+            "stabilizer.v_max": 1e9,
+        }
+
+    def check(self) -> list[str]:
+        problems = []
+        if self["kind"] not in KINDS:
+            return [f"kind = {self['kind']}: must be one of {', '.join(KINDS)}"]
+        for name in ("J0", "J", "H", "M", "time", "float_stop"):
+            if not self[name] > 0.0:
+                problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be > 0")
+        for name in ("C", "K", "offload", "viscous"):
+            if not self[name] >= 0.0:
+                problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be >= 0")
+        if self["kind"] == "rate-integrating" and self["C"] == 0.0:
+            problems.append("C = 0 N.m.s/rad: a rate-integrating gyro has damping (kind=integrating has none)")
+        if self["kind"] == "rate" and self["K"] == 0.0:
+            problems.append("K = 0 N.m/rad: a rate gyro has a spring (kind=rate-integrating has none)")
+        if self["form"] not in ("exact", "light"):
+            problems.append(f"form = {self['form']}: must be exact or light")
+        if problems:
+            return problems
+        zeta = self.axis().zeta
+        if self["form"] == "light" and self["kind"] != "rate-integrating":
+            problems.append("form = light is 5-34, of the rate-integrating gyro")
+        elif self["form"] == "light" and zeta > LIGHT:
+            problems.append(
+                f"form = light with a damping of {zeta:.3g}: 5-34 holds for light damping, up to {LIGHT:g} "
+                "(its error is 4 zeta2 J M/H2 and more); take form=exact"
+            )
+        slow = 0.1 / self.axis().n
+        if self.step > slow:
+            problems.append(
+                f"step = {self.step:g} s: the nutation of {self.axis().n:.4g} rad/s wants {slow:.2g} s or less"
+            )
+        return problems
+
+    def warnings(self) -> list[str]:
+        p = self.axis()
+        found = []
+        runs = p.M * self["time"] / p.H
+        if self["kind"] != "rate" and self["offload"] == 0.0:
+            if runs >= self["float_stop"]:
+                found.append(
+                    f"the float runs away with M/H: it will reach its stop of {math.degrees(self['float_stop']):.3g}° "
+                    f"after about {self['float_stop'] * p.H / p.M:.3g} s, and the run will end there"
+                )
+            elif runs > 0.1:
+                found.append(
+                    f"the float will turn to {math.degrees(runs):.3g}°: the closed forms hold cos(b) at its mean"
+                )
+        return found
+
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+        from .reduction import from_record
+
+        return from_record(record, specification)
