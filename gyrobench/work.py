@@ -251,11 +251,18 @@ def step_check(session: Any, system: System, result: Result, seed: int, step: fl
     for h in (step, step / 2.0):
         with Meter(f"step check, {h:g} s") as meter:
             found.append(system.reduce(session.run(quiet, seed, h, None, meter), None))  # type: ignore[call-arg]
-    rows = []
-    for c, x, y in zip(result.coefficients, found[0].coefficients, found[1].coefficients, strict=True):
-        change = y.estimate - x.estimate
-        rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": abs(change) / c.u})
-    return {"step": step, "rows": rows, "worst": max(r["ratio"] for r in rows)}
+    rows: list[dict[str, Any]] = []
+    whole, half = ({c.name: c.estimate for c in r.coefficients} for r in found)
+    for c in result.coefficients:
+        if c.name in whole and c.name in half:  # one that only noise makes is not there without
+            change = half[c.name] - whole[c.name]
+            ratio = abs(change) / c.u if c.u > 0.0 else None
+            rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": ratio})
+    return {
+        "step": step,
+        "rows": rows,
+        "worst": max((r["ratio"] for r in rows if r["ratio"] is not None), default=None),
+    }
 
 
 def publish(result: Result, folder: Path, record: Record | None, spec: Path | None) -> dict[str, Path]:
