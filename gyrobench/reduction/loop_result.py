@@ -168,8 +168,9 @@ class LoopFindings:
     ) -> list[Point]:  # fmt: skip
         """Gain of ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
 
-        plus: a second channel added to the output (both "slot.variable").  scale, unit: SI of the ratio per printed
-        unit.  Returns the points, SI; adds one response of kind "ratio".
+        reference: a channel of the exciter, or another one (then the linear curve is the ratio of two).  plus: a second
+        channel added to the output (all "slot.variable").  scale, unit: SI of the ratio per printed unit.  Returns the
+        points, SI; adds one response of kind "ratio".
         """
 
         def signal(g: Gate) -> Array:
@@ -183,6 +184,9 @@ class LoopFindings:
         curves = []
         for model, label in NAMES.items():
             found = self.excited(model, kind, axis, output, span, plus)
+            if found is not None and reference.partition(".")[0] != self.slot:
+                base = self.excited(model, kind, axis, reference, span)
+                found = None if base is None else found / base
             if found is not None:
                 curves.append(_curve(label, span, found / scale))
         shown = [Point(p.f, p.value / scale, p.u, p.coherence) for p in points]
@@ -256,6 +260,7 @@ class LoopFindings:
         conventions: Sequence[str],
         summary: Sequence[str] = (),
         instrument: str = "",
+        ranked_by: str = "",
         specification: Mapping[str, tuple[float | None, float | None]] | None = None,
     ) -> Result:
         """The Result with all that was collected; limits of the specification are applied by coefficient name."""
@@ -263,7 +268,6 @@ class LoopFindings:
             c.limit = (specification or {}).get(c.name, c.limit)
             c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
         meta = self.record.meta
-        n = len(self.coefficients)
         result = Result(
             system=meta.get("system", ""),
             title=title,
@@ -273,9 +277,9 @@ class LoopFindings:
             conventions=list(conventions),
             coefficients=self.coefficients,
             series=[],
-            correlation=np.eye(n).tolist(),
-            condition=1.0,
-            rank=n,
+            correlation=[],  # measures of their own, no common regression
+            condition=0.0,
+            rank=0,
             dof=0.0,
             noise={},
             tests=[],
@@ -289,6 +293,7 @@ class LoopFindings:
             verdict=uncertainty.overall(c.verdict for c in self.coefficients),
             instrument=instrument or meta.get("instrument", ""),
             simulated=not meta.get("measured", False),
+            ranked_by=ranked_by,
             responses=self.responses,
         )
         result.warnings += [n for n in meta.get("notes", []) if "unstable" in n or "linear model" in n]
