@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,8 +14,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from gyrobench import cli, suites
+from gyrobench import cli, progress
 from gyrobench.bench import standard_folder
+from gyrobench.system.loop import Status
 from gyrobench.system.record import Record
 from gyrobench.system.run import run
 from gyrobench.system.suite import Suite
@@ -185,29 +187,28 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------ stopped and failed
-def test_a_stopped_suite_goes_on(gyrobench: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second test is stopped; --resume runs it and leaves the first as it is."""
-    perform, ran = suites.perform, []
+def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
+    run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
-    def stopping(job: Any, *more: Any) -> Any:
-        ran.append(job.system)
-        if job.system == "fixed_position":
-            raise suites.Interrupted("stopped at t = 1 s by the user")
-        return perform(job, *more)
+    def interrupt(self: progress.Meter, status: Status) -> None:
+        if self.label == "tumble_single_axis" and status.windows >= 2:
+            signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(suites, "perform", stopping)
-    code, _, err = gyrobench("run", NAME, *TWO, "--out", "s")
+    with monkeypatch.context() as patch:
+        patch.setattr(progress.Meter, "__call__", interrupt)
+        code, _, err = gyrobench(*run)
     assert code == 130 and "the suite goes on with the same command and --resume" in err
-    assert not (Path("s") / "result.json").exists()
+    assert not Path("s/result.json").exists() and not Record.load(Path("s/tumble_single_axis")).complete
     code, _, err = gyrobench("report", "s")
     assert code == 2 and "did not end" in err
-    first = (Path("s/tumble_single_axis/run.json")).stat().st_mtime_ns
-    monkeypatch.setattr(suites, "perform", lambda job, *more: ran.append(job.system) or perform(job, *more))
-    code, _, err = gyrobench("run", NAME, *TWO, "--out", "s", "--resume")
-    assert code == 0 and "tumble_single_axis (1 of 2): kept" in err
-    assert ran == ["tumble_single_axis", "fixed_position", "fixed_position"]
-    assert (Path("s/tumble_single_axis/run.json")).stat().st_mtime_ns == first
-    assert gyrobench("run", NAME, *TWO, "--seed", "2", "--out", "s")[2].count("holds another run") == 1
+    first = Path("s/fixed_position/run.json").stat().st_mtime_ns
+    code, _, err = gyrobench(*run, "--resume")
+    assert code == 0 and "fixed_position (1 of 2): kept" in err and "tumble_single_axis (2 of 2): goes on" in err
+    assert Path("s/fixed_position/run.json").stat().st_mtime_ns == first
+    whole, stopped = (Record.load(f / "tumble_single_axis").windows for f in (done, Path("s")))
+    assert all(whole[n].tolist() == stopped[n].tolist() for n in whole)
+    assert gyrobench(*run, "--seed", "2")[2].count("holds another run") == 1
 
 
 def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:

@@ -266,11 +266,11 @@ def _summary(r: Result, compared: Sequence[Compare]) -> list[str]:
     s, many = r.suite, len(r.suite["pairs"])
     if s["consistency"] == "not tested":
         return ["No quantity is seen by two methods with a noise of their own: nothing was compared."]
-    agreed = f"The methods agree about all {s['tested']} quantities that two or more see"
+    agreed = f"The methods agree wherever two or more see the same ({s['tested']} of {len(compared)} quantities)"
     apart = f"The methods do not agree about {', '.join(s['disagreeing'])}"
     first = agreed if s["consistency"] == "consistent" else apart
     return [
-        f"{first} (smallest adjusted p = {s['p']:.2g}).",
+        f"{first}; smallest adjusted p = {s['p']:.2g}.",
         *(f"{c.quantity.name}: {c.words()}." for c in compared if c.disagree),
         f"E_n > 1 in {s['pairs_apart']} of {many} pairs; about {0.05 * many:.2g} would be by chance.",
     ]
@@ -282,8 +282,8 @@ def _warnings(results: Mapping[str, Result], compared: Sequence[Compare], failed
     sites = {label: str(r.site) for label, r in results.items()}
     if len(set(sites.values())) > 1:
         out.append(
-            "The tests were not made under the same site values (see the tests); where gravity differs, what is folded "
-            "in from D_OO differs too."
+            "The site values of the tests differ, as each test says below; where gravity differs, what is folded in "
+            "from D_OO differs too."
         )
     lonely = [c.quantity.name for c in compared if len(c.values) == 1]
     if lonely:

@@ -257,7 +257,7 @@ def _tests(doc: Json) -> list[Any]:
         where = f" Run and report in {m['folder']}." if m["folder"] else ""
         text = f"{LETTERS[k % 26]}  {m['label']}, report {m['report_id']}. {m['method']}.{where}"
         blocks.append(Text(text, link=f"{m['folder']}/report.html" if m["folder"] else ""))
-        said = [*m["summary"]]
+        said = [*m["summary"]] if doc["site"] else [f"Site: {view.place(m['site'])}.", *m["summary"]]
         if m.get("step_check") is not None:
             worst = write_number(m["step_check"], significant=2).text
             said.append(f"Halving the step changes no coefficient by more than {worst} u.")

@@ -48,7 +48,7 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
 
 def head(doc: Json) -> list[tuple[str, str]]:
     run = doc["provenance"]
-    site = ", ".join(f"{words(k)[0]} {_plain(v)}{_unit(k)}" for k, v in doc["site"].items() if v is not None)
+    site = place(doc["site"])
     rows = [
         ("Report", doc["report_id"]),
         ("Date", date(str(run.get("date") or "not recorded"))),
@@ -60,6 +60,11 @@ def head(doc: Json) -> list[tuple[str, str]]:
         ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
     ]
     return rows
+
+
+def place(site: Mapping[str, Any]) -> str:
+    """ "latitude 45.75°, gravity 9.8069 m/s²" """
+    return ", ".join(f"{words(k)[0]} {_plain(v)}{_unit(k)}" for k, v in site.items() if v is not None)
 
 
 def date(text: str) -> str:

@@ -6,7 +6,7 @@ from gyrobench.system.suite import Suite
 from gyrobench.system.system import Option
 
 FLOATED = "tumble_single_axis tumble_two_axis fixed_position open_loop_drift servo_vertical_level servo_polar"
-TWO_AXIS = "tumble_two_channel eight_position"
+TWO_AXIS = "tumble_two_channel eight_position servo_two_axis"
 
 
 class DriftTestSuite(Suite):

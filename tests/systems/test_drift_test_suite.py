@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import servoing_two_axes
 import tumbling
 import two_channels
 from servoing import DAY50, DPH, W50
@@ -28,6 +29,7 @@ SHORT: dict[str, dict[str, Any]] = {
     "servo_vertical_level": {"dwell": 60.0, "cycles": 1, "windows": 10},
     "fixed_position": {"dwell": 120.0, "readings": 24, "settle": 3.0},
     "tumble_two_channel": two_channels.SHORT,
+    "servo_two_axis": servoing_two_axes.day(200.0),
     "eight_position": {"cycles": 3, "readings": 2, "dwell": 10.0, "settle": 3.0},
 }
 
@@ -133,6 +135,18 @@ def test_both_channels_by_tumble_and_eight_positions(sessions: dict[str, Session
     for name in both:
         a, b = (v.estimate for v in compared[name].values)
         assert a == pytest.approx(b, abs=1e-5), name
+
+
+def test_both_channels_by_tumble_and_two_axis_servo(sessions: dict[str, Session]) -> None:
+    """Eighteen coefficients, noise on: one table turning under two rebalance loops, two tables held by the gyro."""
+    true = two_channels.gyro(np.random.default_rng(6))
+    chosen = suite("tumble_two_channel servo_two_axis", **true, **{"gyro.markov_tau": 3.0})
+    found = report(results(sessions, chosen, 6), chosen)
+    assert found.suite["consistency"] == "consistent"
+    assert len(found.suite["pairs"]) == 18 and sum(p["E_n"] > 1.0 for p in found.suite["pairs"]) <= 3
+    for c in found.coefficients:
+        assert c.truth == pytest.approx(true[f"gyro.{c.name}"] / DPH, rel=1e-9, abs=1e-15)
+        assert abs(c.estimate - c.truth) < 4.0 * c.u
 
 
 # ------------------------------------------------------------------------------------ a gyro that changed
