@@ -73,7 +73,6 @@ class Measures:
     acf: dict[str, list[float]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     error: Array = field(default_factory=lambda: np.zeros(0))
-    late_error: Array = field(default_factory=lambda: np.zeros(0))
 
     def named(self, name: str) -> Coefficient:
         return next(c for c in self.coefficients if c.name == name)
@@ -100,15 +99,9 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     known = slice(math.ceil(s.latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
     if s.time[known].size < 400:
         raise ReductionError(f"the record is hardly longer than the latency of {s.latency:g} s")
-    raw = s.z - s.truth
-    m = Measures(error=s.estimate - s.truth, late_error=(s.estimate - behind)[known])
-    m.add(RANKED, "rms error against the truth of the same instant", unit, estimation.rms(m.error))
-    m.add("error re raw", "the same over the rms error of the readings", "dB", estimation.decibels(m.error, raw))
-    m.add(
-        "late error re raw", "the same against the truth of one latency ago", "dB",
-        estimation.decibels(m.late_error, raw),
-    )  # fmt: skip
+    m = Measures()
     try:
+        _errors(m, s, behind, known, frequency, unit)
         _distortion(m, s, behind, known, frequency)
         most = max(3.0 * s.latency, 50.0 * step)
         found = estimation.delay(s.time, s.estimate, s.truth, most)
@@ -127,6 +120,20 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     return m
 
 
+def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str) -> None:
+    """Errors against the truth of the same instant and of one latency ago."""
+
+    def size(time: Array, x: Array) -> Value:
+        return estimation.rms_of_sine(time, x, frequency) if frequency else estimation.rms(x)
+
+    raw, m.error = estimation.rms(s.z - s.truth), s.estimate - s.truth
+    now, late = size(s.time, m.error), size(s.time[known], (s.estimate - behind)[known])
+    m.add(RANKED, "rms error against the truth of the same instant", unit, now)
+    m.add("error re raw", "the same over the rms error of the readings", "dB", estimation.decibels(now, raw))
+    against = "the same against the truth of one latency ago"
+    m.add("late error re raw", against, "dB", estimation.decibels(late, raw))
+
+
 def _times(v: Value, factor: float) -> Value:
     return Value(v.value * factor, v.u * factor, v.dof)
 
@@ -139,8 +146,8 @@ def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency:
     else:
         r = estimation.response_to_truth(s.estimate[known], behind[known])
         gain = "gain on the truth of one latency ago (regression)"
-    m.add("noise re raw", "what is not the truth as it comes through, over the readings", "dB",
-          estimation.decibels(r.rest, s.z - s.truth))  # fmt: skip
+    noise = estimation.decibels(estimation.rms(r.rest), estimation.rms(s.z - s.truth))
+    m.add("noise re raw", "what is not the truth as it comes through, over the readings", "dB", noise)
     m.add("gain", gain, "1", r.gain)
     if r.phase is not None:
         m.add("phase", f"phase at {frequency:g} Hz, negative: late", "°", _times(r.phase, 180.0 / math.pi))

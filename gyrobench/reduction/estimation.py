@@ -95,9 +95,8 @@ def rms(x: Array) -> Value:
     return Value(found, found / math.sqrt(2.0 * independent_squares(x)))
 
 
-def decibels(x: Array, reference: Array) -> Value:
-    """20 log10 of the rms of x over that of the reference; u as if the two were independent (that is the larger)."""
-    a, b = rms(x), rms(reference)
+def decibels(a: Value, b: Value) -> Value:
+    """20 log10 of a over b; u as if the two were independent (too large for an error and the noise behind it)."""
     if a.value == 0.0 or b.value == 0.0:
         return Value(-math.inf if b.value > 0.0 else math.nan, math.nan)
     return Value(DECIBEL * math.log(a.value / b.value), DECIBEL * math.hypot(a.u / a.value, b.u / b.value))
@@ -148,33 +147,65 @@ class Response:
     rest: Array  # estimate less the signal as it came through
 
 
-def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
-    """Gain and phase at ``frequency`` (Hz): sines and a constant fitted to estimate and truth by least squares.
-
-    Over whole periods; u from ten stretches of whole periods.  Raises ValueError below ten periods.
+@dataclass(frozen=True)
+class Sine:
+    """A sine and a constant fitted by least squares over whole periods: sine part + j cosine part, in all of the record
+    and in ten stretches of it, and what is left.
     """
+
+    whole: complex
+    parts: Array
+    rest: Array
+
+    @property
+    def u(self) -> float:
+        """Standard uncertainty of either part."""
+        return float(np.sqrt(np.mean(np.abs(self.parts - self.whole) ** 2) / 2.0 / (STRETCHES - 1)))
+
+
+def sine(time: Array, x: Array, frequency: float) -> Sine:
+    """Fits a sine of ``frequency`` Hz.  Raises ValueError below ten periods."""
     step = float(time[1] - time[0])
     periods = math.floor((time.size * step) * frequency + 1e-9)
     if periods < STRETCHES:
         raise ValueError(f"{periods} periods of {frequency:g} Hz are recorded: {STRETCHES} are needed")
-    used = round(periods / frequency / step)
-    t, e, x = time[:used], estimate[:used], truth[:used]
-    w = 2.0 * math.pi * frequency
-    basis = np.column_stack([np.sin(w * t), np.cos(w * t), np.ones(used)])
+    phase = 2.0 * math.pi * frequency * time
+    basis = np.column_stack([np.sin(phase), np.cos(phase), np.ones(time.size)])
 
-    def ratio(rows: slice) -> complex:
-        a = np.linalg.lstsq(basis[rows], e[rows], rcond=None)[0]
-        b = np.linalg.lstsq(basis[rows], x[rows], rcond=None)[0]
-        return complex(a[0], a[1]) / complex(b[0], b[1])
+    def fit(rows: slice) -> Array:
+        out: Array = np.linalg.lstsq(basis[rows], x[rows], rcond=None)[0]
+        return out
 
-    whole = ratio(slice(None))
+    whole = fit(slice(round(periods / frequency / step)))
     each = periods // STRETCHES / frequency / step
-    parts = [ratio(slice(round(k * each), round((k + 1) * each))) / whole for k in range(STRETCHES)]
-    gain = Value(abs(whole), abs(whole) * _scatter([abs(r) for r in parts]), STRETCHES - 1)
-    angle = math.atan2(whole.imag, whole.real)
-    phase = Value(angle, _scatter([math.atan2(r.imag, r.real) for r in parts]), STRETCHES - 1)
-    a = np.linalg.lstsq(basis, e, rcond=None)[0]
-    return Response(gain, phase, e - basis @ a)
+    parts = [fit(slice(round(k * each), round((k + 1) * each))) for k in range(STRETCHES)]
+    return Sine(complex(whole[0], whole[1]), np.array([complex(p[0], p[1]) for p in parts]), x - basis @ whole)
+
+
+def rms_of_sine(time: Array, x: Array, frequency: float) -> Value:
+    """Root mean square of a sine under noise, such as the error of an estimate that is late.
+
+    u^2(mean square) = (A u(A))^2 + (2 rest u(rest))^2: the sine, always there, scatters by its amplitude A only.
+    """
+    s = sine(time, x, frequency)
+    found = math.sqrt(float(np.mean(x * x)))
+    left = rms(s.rest)
+    if found == 0.0:
+        return Value(0.0, 0.0)
+    return Value(found, math.hypot(abs(s.whole) * s.u, 2.0 * left.value * left.u) / (2.0 * found))
+
+
+def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
+    """Gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
+
+    u from the scatter of ten stretches.  Raises ValueError below ten periods.
+    """
+    e, x = sine(time, estimate, frequency), sine(time, truth, frequency)
+    whole = e.whole / x.whole
+    parts = e.parts / x.parts / whole
+    gain = Value(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
+    phase = Value(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
+    return Response(gain, phase, e.rest)
 
 
 def response_to_truth(estimate: Array, truth: Array) -> Response:

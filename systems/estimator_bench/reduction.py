@@ -13,13 +13,13 @@ from gyrobench.reduction import estimates, recorded, uncertainty
 from gyrobench.reduction.checks import ReductionError
 from gyrobench.reduction.estimates import Measures, Signals
 from gyrobench.reduction.method import plus_minus
-from gyrobench.reduction.result import Result, Series
+from gyrobench.reduction.result import Response, Result, Series
 
 from .benchmarks import BENCHMARKS
 
 Array = NDArray[np.float64]
 Limits = Mapping[str, tuple[float | None, float | None]]
-SHOWN = 400  # readings in the picture
+SHOWN, COMPARED = 400, 1000  # readings in the pictures
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
@@ -107,9 +107,9 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
         summary=[
             f"{name or 'The estimator'}: rms error {plus_minus(error).replace(' 1 ', ' ')} against the truth of the "
             f"same instant, {re_raw.estimate:+.1f} dB against the readings themselves.",
-            f"Noise {noise.estimate:+.1f} dB, and what that costs: gain {gain.estimate:.4g}"
-            + "".join(f", phase {c.estimate:.2f}°" for c in m.coefficients if c.name == "phase")
-            + f", delay {delay.estimate:.3g} {delay.unit}.",
+            f"Noise {noise.estimate:+.1f} dB, and what that costs: gain {plus_minus(gain).replace(' 1 ', ' ')}"
+            + "".join(f", phase {plus_minus(c)}" for c in m.coefficients if c.name == "phase")
+            + f", delay {plus_minus(delay)}.",
             " ".join(f"{t.name}: {t.finding}." for t in m.tests)
             or "The estimator states no variance: it cannot be asked whether it is consistent.",
         ],
@@ -117,6 +117,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
         verdict=uncertainty.overall(c.verdict for c in m.coefficients),
         instrument=name,
         ranked_by=estimates.RANKED,
+        responses=[last_second(s)],
     )
 
 
@@ -127,4 +128,15 @@ def picture(s: Signals) -> Series:
     return Series(
         "readings, estimate, its error", t.tolist(), "time", "s", z.tolist(),
         x.tolist(), (x - s.truth[last]).tolist(), "signal", "1", t.tolist(), t.tolist(), x.tolist(),
+    )  # fmt: skip
+
+
+def last_second(s: Signals) -> Response:
+    """The estimate over the last readings with the truth; a comparison draws those of all runs in one figure."""
+    last = slice(-COMPARED, None)
+    t, truth = s.time[last].tolist(), s.truth[last].tolist()
+    return Response(
+        "estimate", "step", "The last 1000 readings: estimate (points) and truth (line). What lies between them is the "
+        "error that ranks; a shift along the time axis is the delay.", t, "time", "s", s.estimate[last].tolist(),
+        "estimate", "1", curves=[{"label": "truth", "x": t, "y": truth, "phase": []}],
     )  # fmt: skip

@@ -38,10 +38,25 @@ def test_interval_of_an_rms_holds_the_truth(a):
 
 def test_decibels():
     x = np.random.default_rng(3).normal(size=5000)
-    found = estimation.decibels(x / 10.0, x)
+    found = estimation.decibels(estimation.rms(x / 10.0), estimation.rms(x))
     assert found.value == pytest.approx(-20.0, abs=1e-12)
     # each rms is known to 1/sqrt(2 n) = 1 %: 8.686 dB times sqrt(2) percent
     assert found.u == pytest.approx(8.686 * 0.01 * math.sqrt(2.0), rel=0.05)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.3, 3.0])
+def test_interval_of_an_rms_with_a_sine_holds_the_truth(amplitude):
+    """Noise of variance 1 under a sine: rms = sqrt(1 + A^2/2), intervals hold it, and the sine adds no scatter."""
+    rng, t = np.random.default_rng(13), np.arange(6000) * T
+    wave = amplitude * np.sin(2.0 * math.pi * 5.0 * t + 0.4)
+    true = math.sqrt(1.0 + amplitude**2 / 2.0)
+    found = [estimation.rms_of_sine(t, wave + markov(rng, t.size, 0.8), 5.0) for _ in range(400)]
+    covered = np.mean([v.interval[0] <= true <= v.interval[1] for v in found])
+    assert abs(covered - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / 400) + 0.01
+    scatter = np.std([v.value for v in found])
+    assert np.mean([v.u for v in found]) == pytest.approx(scatter, rel=0.2)
+    if amplitude == 3.0:  # taken as noise, the sine would be known to a few periods only
+        assert estimation.rms(wave + markov(rng, t.size, 0.8)).u > 3.0 * scatter
 
 
 @pytest.mark.parametrize("true", [0.0, 3.0, 7.5, 20.25])
