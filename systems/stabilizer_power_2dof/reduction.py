@@ -19,8 +19,8 @@ from gyrobench.reduction.result import Result
 Specification = Mapping[str, tuple[float | None, float | None]]
 DPH = math.pi / 648000.0
 EQUATION = (
-    "J_x alpha.dot.double + C_x alpha.dot + H beta.dot = -K_m beta + M_x \\ "
-    "J_y beta.dot.double + C_y beta.dot - H alpha.dot = M_y, quad K_m = i k_u k_i k_m"
+    "J_x dot.double(alpha) + C_x dot(alpha) + H dot(beta) = -K_m beta + M_x, quad "
+    "J_y dot.double(beta) + C_y dot(beta) - H dot(alpha) = M_y, quad K_m = i k_u k_i k_m"
 )
 CONVENTIONS = [
     "α: platform, the outer gimbal with its load, about the stabilized axis x; β: precession about the inner axis y.",
@@ -109,8 +109,9 @@ def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float, own
         "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
     )
     t_star = transient(H, K_m)
-    left = 1.0 - float(np.interp(t_star, gate.t - gate.t[0], gate["gyro.beta"] - b.initial)) / b.change
-    residual = 100.0 * b.u_change / abs(b.change)
+    near = np.interp([t_star, t_star + b.u_settled], gate.t - gate.t[0], gate["gyro.beta"] - b.initial)
+    left = 1.0 - float(near[0]) / b.change
+    residual = 100.0 * math.hypot(b.u_change, near[1] - near[0]) / abs(b.change)
     found.measure(
         "β(t*)", "lean still missing at t* = πH/K_m", "%", 100.0 * left, residual, closed=100.0 * math.exp(-math.pi)
     )
@@ -122,7 +123,7 @@ def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float, own
     if closed:
         stiffness = _inverse(M, a.change, a.u_change)
         found.measure("S", "stiffness of the platform, M / α*", "N·m/rad", *stiffness, closed=M / closed)
-    found.measure("overshoot α", "of the platform angle", "%", 100.0 * a.overshoot, residual)
+    found.measure("overshoot α", "of the platform angle", "%", 100.0 * a.overshoot, 100.0 * a.u_change / abs(a.change))
     found.measure("t_5 α", "settling of the platform to 5 %", "s", a.settled_5, a.u_settled)
     found.measure("t_2 α", "settling of the platform to 2 %", "s", a.settled_2, a.u_settled)
 
