@@ -1,23 +1,24 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Input, Output, Parameter, State, sampled
-from gyrobench.math import asin, atan2, clip, cos, index, sin, sqrt
+from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.math import asin, atan2, clip, cos, index, pi, sin, sqrt
 
 NONE = [0.0] * 99
 
 
 class Manoeuvre(Component):
-    """Motion of a vehicle as a list of manoeuvres, one for each phase of a plan.  [VERTICAL-GYRO]
+    """Motion of a vehicle as a list of manoeuvres, one for each phase of a plan.  [VERTICAL-GYRO, PLATFORM-4GIMBAL]
 
     Axes x right, y forward, z up.  While the gate is open the row of the phase acts; else the vehicle rests as it is:
 
         forward, right   accelerations along the heading and across it, level (m/s2)
         turn             rate about the vertical, counter-clockwise from above; brings speed * turn towards the left
-        pitch, roll      rates about the vehicle's x and y axis
+        pitch, roll, yaw rates about the vehicle's x, y and z axis
+        frequency        0: all of it as given; else times sin(2 pi frequency s), s since the gate opened (a wobble)
 
     The attitude is the quaternion of the rotation from vehicle to ENU axes; with C its inverse as a matrix:
 
-        omega = C (0, w cos(lat), w sin(lat) + turn) + (pitch, roll, 0)          f = C (a + (0, 0, gravity))
+        omega = C (0, w cos(lat), w sin(lat) + turn) + (pitch, roll, yaw)        f = C (a + (0, 0, gravity))
 
     angle is (pitch, roll, heading) in the order heading, pitch, roll of spec d3: v = R2(roll) R1(pitch) R3(heading)
     v_ENU, pitch within +-90 deg.  Rates begin and end at once; alpha is 0 (between the jumps it is small).
@@ -26,7 +27,7 @@ class Manoeuvre(Component):
     Source: our own.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -40,6 +41,8 @@ class Manoeuvre(Component):
     turn = Parameter(NONE, "rad/s", "of each phase: rate about the vertical")
     pitch = Parameter(NONE, "rad/s", "of each phase: rate about x")
     roll = Parameter(NONE, "rad/s", "of each phase: rate about y")
+    yaw = Parameter(NONE, "rad/s", "of each phase: rate about z")
+    frequency = Parameter(NONE, "Hz", "of each phase: of a wobble; 0: none", min=0.0)
 
     phase = Input(1.0, "1", "number of the running phase, from 1")
     gate = Input(0.0, "1", "1 while the manoeuvre acts")
@@ -50,6 +53,8 @@ class Manoeuvre(Component):
     f = Output("m/s2", "specific force, vehicle axes", shape=(3,))
 
     q = State([1.0, 0.0, 0.0, 0.0], "1", "rotation from vehicle to ENU axes")
+
+    opened = Discrete(0.0, "s", "when the gate opened")
 
     def start(self) -> None:
         # q = q_z(heading) q_x(pitch) q_y(roll), half angles
@@ -65,19 +70,23 @@ class Manoeuvre(Component):
         self.q[3] = ch * sp * sr + sh * cp * cr
 
     def open(self):
-        return 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
+        """How much of the row acts."""
+        on = 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
+        f = self.frequency[index(clip(self.phase - 1.0, 0.0, 98.0))]
+        return on * sin(2.0 * pi * f * (self.t - self.opened)) if f > 0.0 else on
 
     def flow(self) -> None:
         k = clip(self.phase - 1.0, 0.0, 98.0)
         on = self.open()
         z = on * self.turn[index(k)]
+        own = on * self.yaw[index(k)]
         x = on * self.pitch[index(k)]
         y = on * self.roll[index(k)]
-        # q' = (turn in ENU axes, from the left, and pitch and roll in vehicle axes, from the right) / 2
-        self.der.q[0] = 0.5 * (-z * self.q[3] - x * self.q[1] - y * self.q[2])
-        self.der.q[1] = 0.5 * (-z * self.q[2] + x * self.q[0] - y * self.q[3])
-        self.der.q[2] = 0.5 * (z * self.q[1] + x * self.q[3] + y * self.q[0])
-        self.der.q[3] = 0.5 * (z * self.q[0] - x * self.q[2] + y * self.q[1])
+        # q' = (turn in ENU axes, from the left, and pitch, roll, yaw in vehicle axes, from the right) / 2
+        self.der.q[0] = 0.5 * (-(z + own) * self.q[3] - x * self.q[1] - y * self.q[2])
+        self.der.q[1] = 0.5 * ((own - z) * self.q[2] + x * self.q[0] - y * self.q[3])
+        self.der.q[2] = 0.5 * ((z - own) * self.q[1] + x * self.q[3] + y * self.q[0])
+        self.der.q[3] = 0.5 * ((z + own) * self.q[0] - x * self.q[2] + y * self.q[1])
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -87,6 +96,8 @@ class Manoeuvre(Component):
         size = sqrt(size)
         for k in range(4):
             self.q[k] = self.q[k] / size
+        if self.gate <= 0.5:
+            self.opened = self.t
 
     def outputs(self) -> None:
         k = clip(self.phase - 1.0, 0.0, 98.0)
@@ -122,3 +133,4 @@ class Manoeuvre(Component):
             self.alpha[j] = 0.0
         self.omega[0] = self.omega[0] + on * self.pitch[index(k)]
         self.omega[1] = self.omega[1] + on * self.roll[index(k)]
+        self.omega[2] = self.omega[2] + on * self.yaw[index(k)]

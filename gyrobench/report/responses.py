@@ -19,7 +19,7 @@ def blocks(doc: Json) -> list[Any]:
     found: list[Any] = []
     for k, r in enumerate(doc.get("responses") or []):
         key = f"response-{k + 1}"
-        alt = f"{r['name']}: measured points and linear curves"
+        alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
         found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
     return found
 
@@ -42,6 +42,8 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
 def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = ()) -> str:
     """The same response of one or several runs in one figure; gain in dB over phase, or values over time."""
     first = named[0][1]
+    if first["kind"] == "time":
+        return _steps([(c["label"], {**first, **c}) for c in curves] or named, key, ())
     if first["kind"] == "step":
         return _steps(named, key, curves)
     phases = first["kind"] == "loop"
@@ -88,8 +90,9 @@ def _steps(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json]) 
     for i, (label, r) in enumerate(named):
         x, y = finite(r["x"], r["y"])
         colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
-        marks = {"marker": "o", "linestyle": "", "markersize": 2.4} if len(named) == 1 else {"linestyle": "-"}
-        every = max(1, len(x) // 120) if len(named) == 1 else 1
+        points = len(named) == 1 and r["kind"] == "step"
+        marks = {"marker": "o", "linestyle": "", "markersize": 2.4} if points else {"linestyle": "-"}
+        every = max(1, len(x) // 120) if points else 1
         ax.plot(x[::every], y[::every], color=colour, markeredgewidth=0, label=short(label), zorder=3, **marks)
     for (colour, dashes), curve in zip(LINES, curves, strict=False):
         ax.plot(curve["x"], curve["y"], dashes, color=colour, linewidth=1.0, label=curve["label"])

@@ -216,25 +216,37 @@ def test_measured_angles_are_those_of_the_vehicle(ring):
 
 
 def test_manoeuvre_is_the_rotation_of_its_rates():
-    """Turn in ENU axes, pitch and roll in vehicle axes, for 2 s: against scipy's rotations; f and omega with it."""
-    given = {**row(turn=0.3, pitch=-0.5, roll=0.8, forward=1.0, right=2.0), "speed": 10.0, "earth_rate": 0.01}
+    """Turn in ENU axes, pitch, roll and yaw in vehicle axes, for 2 s: against scipy's rotations; f and omega with it."""
+    given = {**row(turn=0.3, pitch=-0.5, roll=0.8, yaw=0.4, forward=1.0, right=2.0), "speed": 10.0, "earth_rate": 0.01}
     part = Manoeuvre(**given, start_angle=[0.2, -0.4, 1.1], latitude=0.5)
     part.gate = 1.0
     part.initialize()
     for k in range(2000):
         part.do_step(1e-3 * k, 1e-3)
-    # R = exp(turn z t) R0 exp((pitch, roll, 0) t), R from vehicle to ENU axes
+    # R = exp(turn z t) R0 exp((pitch, roll, yaw) t), R from vehicle to ENU axes
     start = Rotation.from_euler("ZXY", [1.1, 0.2, -0.4])
-    r = Rotation.from_rotvec([0, 0, 0.6]) * start * Rotation.from_rotvec([-1.0, 1.6, 0.0])
+    r = Rotation.from_rotvec([0, 0, 0.6]) * start * Rotation.from_rotvec([-1.0, 1.6, 0.8])
     heading, pitch, roll = r.as_euler("ZXY")
     assert part.angle == pytest.approx([pitch, roll, heading], abs=1e-9)
     ahead = Rotation.from_euler("Z", heading).apply([2.0 - 10.0 * 0.3, 1.0, 0.0])
     assert part.f == pytest.approx(r.inv().apply(ahead + np.array([0, 0, G0])), abs=1e-9)
-    rate = r.inv().apply([0.0, 0.01 * math.cos(0.5), 0.01 * math.sin(0.5) + 0.3]) + np.array([-0.5, 0.8, 0.0])
+    rate = r.inv().apply([0.0, 0.01 * math.cos(0.5), 0.01 * math.sin(0.5) + 0.3]) + np.array([-0.5, 0.8, 0.4])
     assert part.omega == pytest.approx(rate, abs=1e-9)
     part.gate = 0.0
     part._dirty = True
     assert part.get("omega[2]") == pytest.approx(r.inv().apply([0, 0.01 * math.cos(0.5), 0.01 * math.sin(0.5)])[1])
+
+
+def test_wobble_begins_with_the_gate():
+    """A roll rate of 0.5 sin(2 pi 2 s), s since the gate opened at 0.3 s: the roll is 0.5 (1 - cos) / (4 pi)."""
+    part = Manoeuvre(**row(roll=0.5, frequency=2.0), earth_rate=0.0)
+    part.initialize()
+    for k in range(800):
+        part.gate = float(k >= 300)
+        part.do_step(1e-3 * k, 1e-3)
+        s = max(0.0, 1e-3 * (k - 299))
+        assert part.omega[1] == pytest.approx(0.5 * math.sin(4.0 * math.pi * s), abs=1e-9)
+        assert part.angle[1] == pytest.approx(0.5 * (1.0 - math.cos(4.0 * math.pi * s)) / (4.0 * math.pi), abs=3e-4)
 
 
 # ------------------------------------------------------------------------------------------------ refusals
