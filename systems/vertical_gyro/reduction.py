@@ -1,0 +1,241 @@
+"""Reduction of vertical_gyro: the vertical that the gyro shows against the true one, phase by phase."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.loop_result import LoopFindings
+from gyrobench.reduction.loops import Gate
+from gyrobench.reduction.result import Response, Result
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+ARCMIN, DEG = math.pi / 10800.0, math.pi / 180.0
+G0 = 9.80665
+SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks
+
+
+def up(pitch: Array, roll: Array) -> Array:
+    """The vertical in vehicle axes (n, 3) for a pitch and a roll: third column of R2(roll) R1(pitch)."""
+    c = np.cos(pitch)
+    return np.column_stack([-np.sin(roll) * c, np.sin(pitch), np.cos(roll) * c])
+
+
+def lean(pitch: Array, roll: Array, shown_pitch: Array, shown_roll: Array, inner: Array | float = 0.0) -> Array:
+    """Lean of the shown vertical to the right and forward (n, 2), rad, level axes along the heading.
+
+    The shown angles say where the vertical is; it is turned back by the true roll and pitch.  With the angle ``inner``
+    that the servo has left between ring and rotor it is the lean of the rotor axis.
+    """
+    n = up(shown_pitch, shown_roll) * np.cos(inner)[..., None] if np.ndim(inner) else up(shown_pitch, shown_roll)
+    if np.ndim(inner):
+        n += np.sin(inner)[:, None] * np.column_stack([np.cos(shown_roll), 0.0 * shown_roll, np.sin(shown_roll)])
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    x, z = cr * n[:, 0] + sr * n[:, 2], -sr * n[:, 0] + cr * n[:, 2]  # R2(roll) transposed
+    y, z = cp * n[:, 1] - sp * z, sp * n[:, 1] + cp * z  # R1(pitch) transposed
+    return np.column_stack([np.arctan2(x, z), np.arctan2(y, z)])
+
+
+def erection_time(tilt: float, zone: float, law: str, rate: float, gain: float) -> float | None:
+    """s from ``tilt`` to ``zone`` without drift; linear: with ``rate`` down to rate/gain, from there exponentially."""
+    if tilt <= zone or zone <= 0.0:
+        return None
+    if law == "switches":
+        return (tilt - zone) / rate
+    bend = max(zone, min(tilt, rate / gain))
+    return (tilt - bend) / rate + math.log(bend / zone) / gain
+
+
+def from_record(record: Any, specification: Limits | None = None) -> Result:
+    """The result of a record; raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    found.warnings.clear()  # there is no loop to be linearized here
+    o = record.meta["options"]
+    for gate in found.gates:
+        {
+            "erection": _erection,
+            "rest": _rest,
+            "acceleration": _acceleration,
+            "turn": _turn,
+            "loop": _loop,
+            "roll": _roll,
+        }[gate.label](found, gate, o)
+    whole = record.channels
+    tilt = np.hypot(*_lean(whole).T)
+    found.measure("max", "largest tilt of the rotor after the erection", "arcmin", _after(found, tilt) / ARCMIN,
+                  chatter(record.meta) / ARCMIN)  # fmt: skip
+    _figure(found, "tilt", "tilt", "arcmin", whole["time"], tilt / ARCMIN,
+            "Angle between the rotor axis and the true vertical, over the whole run.")  # fmt: skip
+    shown = np.hypot(*_lean(whole, shown=True).T)
+    _figure(found, "error", "error of the shown vertical", "arcmin", whole["time"], shown / ARCMIN,
+            "Angle between the vertical that pitch and roll show and the true one: the tilt, and the lag of the ring.",
+            )  # fmt: skip
+    found.tables.append(_phases(found, o))
+    result = found.result(
+        title="Vertical gyro",
+        method="Pitch and roll of the gyro against those of the vehicle, in erection, rest and manoeuvre",
+        sources=["VERTICAL-GYRO; 004_a44a05c7e88249d1.txt 5.3.1 (text; the equations are the spec's)"],
+        equation="dot(bold(n)) = bold(T)\\/H + bold(d) - bold(omega) times bold(n), quad "
+        "T_x = -f(e_y), quad T_y = f(e_x)",
+        conventions=[
+            "Tilt: angle between the rotor axis and the true vertical. Lean: its components to the right and forward.",
+            "The closed figures are those without Earth rate and drift, but where they say so.",
+            "u: what the period of the record leaves of a time, and a step of the erection of an angle.",
+        ],
+        specification=specification,
+    )
+    result.ranked_by = "max"
+    result.summary = _summary(found)
+    return result
+
+
+ANGLES = ("motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll")
+
+
+def _lean(channels: Mapping[str, Array], shown: bool = False) -> Array:
+    """Of the rotor, or of the vertical that is shown."""
+    return lean(*(channels[n] for n in ANGLES), 0.0 if shown else channels["gyro.inner"])
+
+
+def _of(gate: Gate, shown: bool = False) -> Array:
+    return _lean({n: gate[n] for n in (*ANGLES, "gyro.inner")}, shown)
+
+
+def _after(found: LoopFindings, tilt: Array) -> float:
+    first = [g for g in found.gates if g.label == "erection"]
+    return float(tilt[first[-1].inside.stop if first else 0 :].max(initial=0.0))
+
+
+def chatter(meta: Mapping[str, Any]) -> float:
+    """Standard uncertainty of an angle, rad: what the erection moves the rotor in one step, rectangular."""
+    return float(meta["options"]["rate"]) * float(meta["step"]) / math.sqrt(3.0)
+
+
+def _u_time(gate: Gate) -> float:
+    return float(gate.t[1] - gate.t[0]) / math.sqrt(12.0)
+
+
+def _erection(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    tilt = np.maximum(np.abs(gate["gyro.e_x"]), np.abs(gate["gyro.e_y"]))
+    zone = float(o["dead_zone"])
+    outside = np.flatnonzero(tilt > 1.02 * zone)  # the switches chatter at the edge of their zone
+    t = gate.t - gate.t[0]
+    k = int(outside[-1]) if outside.size else -1
+    inside = None if k == t.size - 1 else (0.0 if k < 0 else float(t[k + 1]))
+    rate = float(o["rate"])
+    closed = None
+    if not o["fast_time"]:
+        closed = erection_time(float(o["tilt"]), 1.02 * zone, str(o["law"]), rate, float(o["gain"]))
+    found.measure(
+        "t_zone",
+        "time from the tilt at the start to the dead zone, both axes",
+        "s",
+        inside,
+        _u_time(gate),
+        closed=closed,
+    )
+    if inside is None:
+        found.warnings.append(
+            f"The rotor did not reach the dead zone in {t[-1]:.4g} s: at its end it leans by "
+            f"{tilt[-1] / ARCMIN:.4g} arcmin."
+        )
+
+
+def _rest(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    tilt = np.hypot(*_of(gate).T)
+    half = tilt[tilt.size // 2 :]
+    closed = None
+    if o["law"] == "linear":
+        closed = float(o["earth_rate"]) * math.cos(float(o["latitude"])) / float(o["gain"]) / ARCMIN
+    u = float(np.std(half)) / math.sqrt(8.0) / ARCMIN
+    found.measure("hang-off", "mean tilt at rest, second half", "arcmin", float(half.mean()) / ARCMIN, u, closed=closed)
+
+
+def _acceleration(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    forward = _of(gate)[:, 1]
+    change = float(forward[-1] - forward[0])
+    time = float(gate.t[-1] - gate.t[0])
+    closed = 0.0
+    if not o["cut_off"] and o["law"] == "switches":
+        closed = min(float(o["rate"]) * time, math.atan(float(o["acceleration"]) / G0) - float(o["dead_zone"]))
+    elif not o["cut_off"]:
+        a, k = math.atan(float(o["acceleration"]) / G0), float(o["gain"])
+        closed = min(float(o["rate"]) * time, a * (1.0 - math.exp(-k * time)))
+    u = float(o["rate"]) * _u_time(gate) / DEG
+    found.measure("lean", "lean forward through the acceleration (closed: without Earth rate)", "°", change / DEG, u,
+                  closed=closed / DEG)  # fmt: skip
+
+
+def _turn(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    tilt = np.hypot(*_of(gate).T)
+    u = chatter(found.record.meta) / ARCMIN
+    found.measure("turn", "largest tilt in the turn", "arcmin", float(tilt.max()) / ARCMIN, u)
+
+
+def _loop(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    tilt, pitch = np.hypot(*_of(gate, shown=True).T), np.unwrap(gate["gyro.pitch"])
+    found.measure("loop", "largest error of the shown vertical in the loop", "arcmin", float(tilt.max()) / ARCMIN,
+                  chatter(found.record.meta) / ARCMIN)  # fmt: skip
+    step = float(found.record.meta["step"]) / math.sqrt(12.0)
+    found.measure("pitch", "pitch shown through the loop", "°", float(pitch[-1] - pitch[0]) / DEG,
+                  36.0 * step, closed=36.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
+    ring = np.unwrap(gate["gyro.ring_angle"])
+    found.measure("ring", "travel of the ring in the loop", "°", float(np.ptp(ring)) / DEG,
+                  chatter(found.record.meta) / DEG)  # fmt: skip
+
+
+def _roll(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
+    roll = np.unwrap(gate["gyro.roll"])
+    step = float(found.record.meta["step"]) / math.sqrt(12.0)
+    found.measure("roll", "roll shown through the roll", "°", float(roll[-1] - roll[0]) / DEG, 60.0 * step,
+                  closed=60.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
+    lag = 60.0 / float(found.record.meta.get("parameters", {}).get("gyro.k_ring", math.inf))
+    found.measure("g2", "largest angle left to the ring's servo in the roll", "°",
+                  float(np.abs(gate["gyro.inner"]).max()) / DEG, chatter(found.record.meta) / DEG,
+                  closed=lag)  # fmt: skip
+
+
+def _phases(found: LoopFindings, o: Mapping[str, Any]) -> dict[str, Any]:
+    rows: list[list[Any]] = []
+    for gate in found.gates:
+        tilt = np.hypot(*_of(gate).T) / ARCMIN
+        cut = float(np.mean(gate["erection.cut"] > 0.0)) if "erection.cut" in gate.channels else None
+        rows.append([gate.label, float(gate.t[-1] - gate.t[0]), tilt[0], tilt[-1], tilt.max(), cut])
+    return {
+        "title": "Tilt by phase",
+        "caption": "Cut off: share of the phase in which a channel of the erection was open.",
+        "columns": [
+            "phase",
+            "length / s",
+            "tilt at its start / arcmin",
+            "at its end / arcmin",
+            "largest / arcmin",
+            "cut off",
+        ],
+        "rows": rows,
+    }
+
+
+def _figure(found: LoopFindings, name: str, what: str, unit: str, t: Array, y: Array, caption: str) -> None:
+    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
+    few = np.unique(np.linspace(0, t.size - 1, min(MARKED, t.size)).astype(int))
+    line = {"label": "as recorded", "x": t[pick].tolist(), "y": y[pick].tolist(), "phase": []}
+    found.responses.append(
+        Response(name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), what, unit, curves=[line])
+    )
+
+
+def _summary(found: LoopFindings) -> list[str]:
+    known = {c.name: c for c in found.coefficients}
+    said = []
+    if "t_zone" in known:
+        said.append(f"Erected to the dead zone in {known['t_zone'].estimate:.3g} s.")
+    if "lean" in known:
+        said.append(f"The acceleration leaned it by {known['lean'].estimate:.3g}°.")
+    said.append(f"After the erection it was never more than {known['max'].estimate:.3g} arcmin from the vertical.")
+    return said

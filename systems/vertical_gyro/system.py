@@ -1,0 +1,145 @@
+"""Vertical gyro with its erection, through erection, rest, acceleration, turn, loop and roll."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.reduction.result import Result
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.record import Record
+from gyrobench.system.system import Option, Slot, System
+
+Specification = Mapping[str, tuple[float | None, float | None]]
+DEG = math.pi / 180.0
+G0 = 9.80665
+PHASES = ("erection", "rest", "acceleration", "turn", "loop", "roll")
+LAWS = ("switches", "linear")
+LIMIT = 99  # phases of a plan
+PITCH_RATE, ROLL_RATE = 36.0 * DEG, 60.0 * DEG  # of the loop and the roll
+
+
+class VerticalGyroBench(System):
+    """A vertical gyro is erected from a tilt, rests, and then flies an acceleration, a turn, a loop and a roll; what it
+    shows is compared with the vehicle's true pitch and roll.
+
+    [VERTICAL-GYRO; 004_a44a05c7e88249d1.txt 5.3.1]
+    """
+
+    title = "Vertical gyro"
+    spec = ("VERTICAL-GYRO",)
+    slots = {
+        "exciter": Slot("Excitation", "exciter"),
+        "motion": Slot("Motion", "manoeuvre"),
+        "gyro": Slot("VerticalGyro", "vertical_gyro"),
+        "erection": Slot("ErectionController", "erection_controller"),
+    }
+    wires = """
+        exciter.phase -> motion.phase
+        exciter.gate -> motion.gate
+        motion.omega -> gyro.omega
+        motion.f -> gyro.f
+        gyro.e_x -> erection.e_x
+        gyro.e_y -> erection.e_y
+        gyro.f_inner -> erection.f_inner
+        gyro.turn -> erection.turn
+        erection.T_x -> gyro.T_x
+        erection.T_y -> gyro.T_y
+    """
+    options = {
+        "phases": Option(" ".join(PHASES), str, f"what is flown, of: {' '.join(PHASES)}"),
+        "tilt": Option("2deg", "rad", "tilt of the rotor at the start, about x", 0.0),
+        "law": Option("switches", str, f"erection: {' or '.join(LAWS)}"),
+        "rate": Option(4.0 * DEG / 60.0, "rad/s", "erection rate (4 deg/min), largest rate of the linear law"),
+        "dead_zone": Option("10arcmin", "rad", "dead zone of the switches", 0.0),
+        "gain": Option(0.05, "1/s", "linear law: rate per tilt"),
+        "cut_off": Option(1, int, "1: the erection is cut off in manoeuvre", 0, 1),
+        "fast_time": Option(0.0, "s", "length of a fast start (ten times the rate, no cut-off); 0: none", 0.0),
+        "ring": Option(1, int, "1: with follow-up ring", 0, 1),
+        "acceleration": Option(0.2 * G0, "m/s2", "acceleration forward"),
+        "turn": Option("3deg/s", "rad/s", "rate of the turn"),
+        "speed": Option(50.0, "m/s", "speed in the turn", 0.0),
+        "time": Option(60.0, "s", "length of erection, rest, acceleration and turn, and of the wait before each"),
+        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG),
+        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0),
+    }
+    noises = ("gyro.white", "gyro.white_y")
+    done = "exciter.done"
+    step = 1e-2
+    channels = (
+        "exciter.phase", "exciter.gate", "motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll",
+        "gyro.e_x", "gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
+    )  # fmt: skip
+    channel_period = 0.1
+
+    def flown(self) -> list[str]:
+        return [str(p) for p in self["phases"].replace(",", " ").split()]
+
+    def plan(self) -> LoopPlan:
+        """The phases asked for; before each manoeuvre the vehicle rests for as long (the erection needs no wait)."""
+        wait = self["time"]
+        lengths = {"loop": 2.0 * math.pi / PITCH_RATE, "roll": 2.0 * math.pi / ROLL_RATE}
+        return LoopPlan(
+            [
+                LoopPhase(p, settle=0.0 if p in ("erection", "rest") else wait, dwell=lengths.get(p, wait))
+                for p in self.flown()
+            ]
+        )
+
+    def parameters(self) -> dict[str, Any]:
+        table: dict[str, list[float]] = {n: [0.0] * LIMIT for n in ("forward", "turn", "pitch", "roll")}
+        rows = {
+            "acceleration": ("forward", self["acceleration"]),
+            "turn": ("turn", self["turn"]),
+            "loop": ("pitch", PITCH_RATE),
+            "roll": ("roll", ROLL_RATE),
+        }
+        for k, p in enumerate(self.flown()):
+            if p in rows and k < LIMIT:
+                name, value = rows[p]
+                table[name][k] = value
+        return {
+            **self.plan().parameters(),
+            **{f"motion.{n}": x for n, x in table.items()},
+            "motion.speed": self["speed"],
+            "motion.latitude": self["latitude"],
+            "motion.earth_rate": self["earth_rate"],
+            "gyro.tilt": [self["tilt"], 0.0],
+            "gyro.ring": self["ring"],
+            "erection.law": LAWS.index(self["law"]) if self["law"] in LAWS else 0,
+            "erection.rate": self["rate"],
+            "erection.dead_zone": self["dead_zone"],
+            "erection.gain": self["gain"],
+            "erection.cut_off": self["cut_off"],
+            "erection.fast_time": self["fast_time"],
+        }
+
+    def check(self) -> list[str]:
+        problems = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.flown() if p not in PHASES]
+        if self["law"] not in LAWS:
+            problems.append(f"law = {self['law']}: must be {' or '.join(LAWS)}")
+        for name in ("rate", "gain", "time"):
+            if not self[name] > 0.0:
+                problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be > 0")
+        if self["tilt"] > 60.0 * DEG and self["fast_time"] == 0.0:
+            problems.append(
+                f"tilt = {self['tilt'] / DEG:.3g}°: beyond 60° the switches are of no use; give a fast start, fast_time"
+            )
+        if not self["ring"] and "loop" in self.flown():
+            problems.append(
+                "ring = 0: without the follow-up ring the gimbals lock in the loop, at 90° of pitch; take ring=1, or "
+                "phases without loop"
+            )
+        return problems
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        gyro, erection = parameters.get("gyro.H"), parameters.get("erection.H")
+        if gyro is not None and erection is not None and not math.isclose(gyro, erection, rel_tol=1e-6):
+            return [f"gyro.H = {gyro:g} and erection.H = {erection:g} N.m.s: the erection must know the gyro's H"]
+        return []
+
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+        from .reduction import from_record
+
+        return from_record(record, specification)

@@ -1,0 +1,136 @@
+"""The vertical gyro in the co-simulation: the spec's numbers, the reduction's geometry, refusals."""
+
+import importlib
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyrobench.system.run import PartRefusal, RunError, Session
+from gyrobench.system.system import RefusedError, load_system
+
+NAME = "vertical_gyro"
+SYSTEM = load_system(NAME)
+reduction = importlib.import_module(type(SYSTEM).__module__ + ".reduction")
+DEG, ARCMIN = math.pi / 180.0, math.pi / 10800.0
+STILL = {"earth_rate": 0.0}
+
+
+@pytest.fixture(scope="module")
+def session():
+    with Session(NAME) as s:
+        yield s
+
+
+def found(session, **values):
+    result = session.system.reduce(session.run(values, seed=1))
+    return {c.name: c for c in result.coefficients}, result
+
+
+# ------------------------------------------------------------------------------------------- reduction
+def test_lean_is_the_rotor_in_level_axes():
+    """Any attitude, rotor leaning by a small known vector: the reduction gives it back, with and without ring."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        pitch, roll = rng.uniform(-1.4, 1.4, 2)
+        right, forward = rng.uniform(-0.02, 0.02, 2)
+        n_level = np.array([math.tan(right), math.tan(forward), 1.0])
+        n_level /= np.linalg.norm(n_level)
+        # level axes along the heading -> vehicle axes: pitch, then roll, passive
+        n = Rotation.from_euler("XY", [pitch, roll]).inv().apply(n_level)
+        shown_roll = math.atan2(-n[0], n[2])
+        shown_pitch = math.asin(n[1])
+        args = [np.array([x]) for x in (pitch, roll, shown_pitch, shown_roll)]
+        assert reduction.lean(*args)[0] == pytest.approx([right, forward], abs=1e-12)
+        # the same rotor seen by a ring that lags by g2: n = R2(roll') R1(pitch') (sin g2, 0, cos g2)
+        g4 = -shown_roll + 0.05
+        v = Rotation.from_euler("Y", -g4).apply(n)  # ring axes
+        g2, g3 = math.asin(v[0]), math.atan2(-v[1], v[2])
+        args = [np.array([x]) for x in (pitch, roll, -g3, -g4, g2)]
+        assert reduction.lean(*args)[0] == pytest.approx([right, forward], abs=1e-12)
+
+
+def test_erection_time_by_law():
+    assert reduction.erection_time(2 * DEG, 10 * ARCMIN, "switches", 4 * DEG / 60, 0.05) == pytest.approx(27.5)
+    # linear: 4 deg/min down to 80 arcmin, then exp(-t/20 s) to 10: 10 s + 20 ln 8
+    linear = reduction.erection_time(2 * DEG, 10 * ARCMIN, "linear", 4 * DEG / 60, 0.05)
+    assert linear == pytest.approx(10.0 + 20.0 * math.log(8.0))
+    assert reduction.erection_time(5 * ARCMIN, 10 * ARCMIN, "switches", 1.0, 1.0) is None
+
+
+# ------------------------------------------------------------------------------------------- the spec's numbers
+def test_erection_from_two_degrees(session):
+    known, _ = found(session, phases="erection rest")
+    assert known["t_zone"].estimate == pytest.approx(27.5, abs=0.15)
+    assert known["t_zone"].estimate == pytest.approx(known["t_zone"].closed, abs=0.1)
+    assert known["hang-off"].estimate == pytest.approx(math.sqrt(2) * 10.0, abs=0.2)
+
+
+def test_hang_off_of_the_linear_law(session):
+    known, _ = found(session, phases="erection rest", law="linear", time=300.0)
+    assert known["hang-off"].estimate == pytest.approx(3.84, abs=0.01)
+    assert known["hang-off"].closed == pytest.approx(3.84, abs=0.01)
+
+
+def test_acceleration(session):
+    given = {"phases": "acceleration", "tilt": 0.0, **STILL}
+    assert found(session, **given, cut_off=0)[0]["lean"].estimate == pytest.approx(4.0, abs=0.02)
+    cut, result = found(session, **given)
+    assert abs(cut["lean"].estimate) < 1e-6
+    table = next(t for t in result.tables if t["title"] == "Tilt by phase")
+    assert table["rows"][0][-1] == 1.0
+
+
+def test_whole_flight(session):
+    """Nothing tilts the rotor but the Earth's rate while cut off: 15.04 deg/h cos(40 deg) for 60 s is 11.5 arcmin."""
+    known, result = found(session)
+    assert known["turn"].estimate < math.sqrt(2) * 10.0 + 11.6
+    assert known["loop"].estimate < math.sqrt(2) * 10.0 + 1.0
+    assert known["pitch"].estimate == pytest.approx(known["pitch"].closed, abs=0.1)
+    assert known["roll"].estimate == pytest.approx(known["roll"].closed - 0.1, abs=0.2)
+    assert known["g2"].estimate == pytest.approx(2.0, abs=0.01)
+    assert result.ranked_by == "max" and not result.warnings
+
+
+def test_fast_start(session):
+    known, _ = found(session, phases="erection", tilt=20.0 * DEG, fast_time=40.0, **STILL)
+    assert known["t_zone"].estimate == pytest.approx((20.0 - 1.0 / 6.0) / (40.0 / 60.0), abs=0.2)
+
+
+def test_same_axis_torque_does_not_erect(session):
+    given = {"erection.cross": 0, "phases": "erection", "law": "linear", "tilt": 0.5 * DEG, **STILL}
+    record = session.run(given, seed=1)
+    tilt = np.hypot(record.channels["gyro.e_x"], record.channels["gyro.e_y"])
+    assert tilt[-1] == pytest.approx(0.5 * DEG, rel=0.01)  # it cones
+    assert any("did not reach the dead zone" in w for w in session.system.reduce(record).warnings)
+
+
+# ------------------------------------------------------------------------------------------- refusals
+def test_lock_without_ring_ends_the_run(session):
+    """A pitch without the loop phase's guard: the part itself ends the run, with time."""
+    table = [36.0 * DEG] + [0.0] * 98
+    values = {"ring": 0, "phases": "erection", **{f"motion.pitch[{k + 1}]": x for k, x in enumerate(table[:1])}}
+    with pytest.raises((PartRefusal, RunError), match="the gimbals have locked"):
+        record = session.run(values, seed=1)
+        raise RunError("; ".join(map(str, record.meta.get("notes", []))) + str(record.meta.get("stopped", "")))
+
+
+@pytest.mark.parametrize(
+    "values, message",
+    [
+        ({"phases": "erection dive"}, "phases: 'dive' is none of erection, rest"),
+        ({"law": "on-off"}, "law = on-off: must be switches or linear"),
+        ({"rate": 0.0}, "rate = 0 rad/s: must be > 0"),
+        ({"tilt": "70deg"}, "tilt = 70°: beyond 60° the switches are of no use; give a fast start"),
+        ({"ring": 0}, "ring = 0: without the follow-up ring the gimbals lock in the loop"),
+    ],
+)
+def test_refuses(values, message):
+    with pytest.raises(RefusedError, match=message):
+        load_system(NAME).with_values(values).refuse()
+
+
+def test_gyro_and_erection_must_agree_on_H(session):
+    with pytest.raises(RefusedError, match=r"gyro.H = 0.7 and erection.H = 0.5 N.m.s"):
+        session.run({"gyro.H": 0.7}, seed=1)
