@@ -216,8 +216,9 @@ CASES = {
         latitude(0.0, 85.0), of_pickoff(0.1, 0.1 * DPH),
     ),
     "torquer_scale_factor": Case(
-        "torquer_scale_factor", {"currents": "5 10 20 40 70 100", "range": "0.5deg", "range_large": "5deg"}, torquer,
-        latitude(0.0, 85.0), of_encoder,
+        "torquer_scale_factor",
+        {"currents": "5 10 20 40 70 100", "range": "0.5deg", "range_large": "5deg", "windows": 10},
+        torquer, latitude(0.0, 85.0), of_encoder,
     ),
 }  # fmt: skip
 

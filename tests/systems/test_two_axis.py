@@ -1,4 +1,4 @@
-"""Two-axis tumble through the whole co-simulation: recovery, coverage, table errors, refusals, laboratory data."""
+"""Two-axis tumble through the whole co-simulation: recovery, table errors, refusals, laboratory data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from gyrobench import drift
 from gyrobench.bench import Bench
@@ -24,8 +23,6 @@ NAME = "tumble_two_axis"
 DPH = math.pi / 180.0 / 3600.0
 NAMES = drift.terms(9)
 LIMIT = 1e-6  # deg/h per g^n
-RUNS = 40
-RISK = 1e-4  # of a false alarm for each coefficient, were the coverage 0.93
 RANGES = {0: (0.05, 0.55), 1: (0.5, 1.3), 2: (0.01, 0.2)}  # deg/h per g^n, book ranges; signs are drawn
 
 #: 25 positions in 300 s: a stronger torquer lets the inner axis hurry.
@@ -100,22 +97,6 @@ def test_d_oo_folds(session: Session) -> None:
     result = reduced(session, values)
     assert {"D_F + γ² D_OO", "D_II − D_OO", "D_SS − D_OO"} <= {c.name for c in result.coefficients}
     assert all(abs(c.estimate - c.truth) < LIMIT for c in result.coefficients)
-
-
-def test_intervals_cover(session: Session) -> None:
-    """At least 30 of 40 for every coefficient (fewer: probability 1e-4 at a coverage of 0.93); all together sharper."""
-    least = int(stats.binom.ppf(RISK, RUNS, 0.93))
-    assert least == 30
-    values = {**SHORT, **gyro(np.random.default_rng(3)), "gyro.markov_tau": 5.0}
-    hits, squares = dict.fromkeys(NAMES, 0), dict.fromkeys(NAMES, 0.0)
-    for seed in range(RUNS):
-        for c in reduced(session, values, 100 + seed).coefficients:
-            hits[c.name] += c.interval[0] <= c.truth <= c.interval[1]
-            squares[c.name] += c.z**2
-    assert min(hits.values()) >= least, hits
-    assert sum(hits.values()) >= int(stats.binom.ppf(RISK, 9 * RUNS, 0.93)), hits
-    ratio = np.sqrt(np.array(list(squares.values())) / RUNS)
-    assert ratio.min() > 0.5 and ratio.max() < 1.5
 
 
 # ------------------------------------------------------------------------------------------ table errors

@@ -1,0 +1,128 @@
+"""Do the intervals of every test method hold the truth 95 times of a hundred?  Few runs, made quickly.
+
+tests/benchmarks/coverage.py counts on co-simulations with noise.  Here each system runs without noise for three random
+instruments; then noise of the population, drawn with its exact covariance, is added to what the windows read, and the
+same reducer reduces that, some hundred times.  counting.check demands that 0.95 is among the possible coverages and
+that intervals for 90 % or 99 % would have been found out.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import counting
+import numpy as np
+import pytest
+
+from gyrobench.reduction import noise
+from gyrobench.system.record import Record
+from gyrobench.system.run import Session
+from gyrobench.system.system import load_system
+
+_spec = importlib.util.spec_from_file_location(
+    "coverage_of_systems", Path(__file__).parents[1] / "benchmarks" / "coverage.py"
+)
+assert _spec is not None and _spec.loader is not None
+benchmark: Any = importlib.util.module_from_spec(_spec)
+sys.modules["coverage_of_systems"] = benchmark
+_spec.loader.exec_module(benchmark)
+
+Array = np.ndarray[Any, Any]
+SIZE = 1e-7  # rad/s, standard deviation of a window: 0.02 deg/h
+RATES = Callable[[Array, Array], Array]  # noise of means over windows [t0, t1]
+
+
+def sampler(rng: np.random.Generator, n: Any, size: float) -> RATES:
+    """Draws means of both noises: covariance N2/T of the white one plus sigma2 times that of the process."""
+
+    def draw(t0: Array, t1: Array) -> Array:
+        C = np.diag(n.white(size) ** 2 / (t1 - t0)) + n.markov(size) ** 2 * noise.process_covariance(t0, t1, n.tau)
+        out: Array = np.linalg.cholesky(C + 1e-12 * size**2 * np.eye(t0.size)) @ rng.standard_normal(t0.size)
+        return out
+
+    return draw
+
+
+# ---------------------------------------------------------------------------------- noise of what is read
+def current(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    return {"mean": w["mean"] + sampler(rng, n, SIZE)(w["t_start"], w["t_end"]) / p["gyro.k"]}
+
+
+def currents(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    draw = sampler(rng, n, SIZE)
+    return {f"mean_{c}": w[f"mean_{c}"] + draw(w["t_start"], w["t_end"]) / p[f"gyro.k_{c}"] for c in "xy"}
+
+
+def acceleration(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    return {"mean": w["mean"] + sampler(rng, n, 2e-4)(w["t_start"], w["t_end"]) / p["accelerometer.scale"]}
+
+
+def angle(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    """Rates add up to angles from stretch to stretch of the windows; neighbours share a reading and its error."""
+    t0, t1 = w["t_start"], w["t_end"]
+    way = sampler(rng, n, SIZE)(t0, t1) * (t1 - t0)
+    start, end, true = np.empty_like(t0), np.empty_like(t0), 0.0
+    for j in range(t0.size):
+        new = j == 0 or t0[j] - t1[j - 1] > 1e-6
+        start[j] = n.error(SIZE) * rng.standard_normal() if new else end[j - 1]
+        true = 0.0 if new else true + way[j - 1]
+        end[j] = true + way[j] + n.error(SIZE) * rng.standard_normal()
+    return {"angle_start": w["angle_start"] + start, "angle_end": w["angle_end"] + end}
+
+
+def voltage(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    """A free float adds the rates up between the middles of the readings."""
+    t = (w["t_start"] + w["t_end"]) / 2.0
+    way = np.concatenate([[0.0], np.cumsum(sampler(rng, n, SIZE)(t[:-1], t[1:]) * np.diff(t))])
+    gain = p["gyro.K_sg"] * p["gyro.H"] / p["gyro.C"]
+    return {"mean": w["mean"] + gain * (way + n.error(SIZE) * rng.standard_normal(t.size))}
+
+
+READ: dict[str, tuple[Any, int]] = {  # what is read, runs
+    "tumble_single_axis": (current, 120),
+    "tumble_two_channel, nine": (currents, 90),
+    "tumble_two_channel, simple": (currents, 130),
+    "tumble_two_axis": (current, 120),
+    "eight_position": (currents, 100),
+    "fixed_position": (current, 450),
+    "open_loop_drift": (voltage, 450),
+    "accelerometer_multipoint": (acceleration, 120),
+    "accelerometer_multipoint, 12": (acceleration, 200),
+    "servo_vertical_level": (angle, 140),
+    "servo_polar": (angle, 120),
+    "pickoff_scale_factor": (voltage, 350),
+    "torquer_scale_factor": (angle, 330),
+}
+
+
+def test_every_case_is_here() -> None:
+    assert set(READ) == set(benchmark.CASES)
+
+
+@pytest.mark.parametrize("name", list(READ))
+def test_intervals_cover(name: str) -> None:
+    case, (read, runs) = benchmark.CASES[name], READ[name]
+    system, rng = load_system(case.system), np.random.default_rng(7)
+    records = []
+    with Session(case.system) as session, benchmark.seen_windows() as seen:
+        for _ in range(3):
+            values = {**case.drawn(rng), **dict.fromkeys(system.noises, 0.0)}
+            records.append((system.with_values(values), session.run(values)))
+        records[0][0].reduce(records[0][1])
+    t0, t1, readings = seen[0]
+    window = float(np.median(t1 - t0))
+    ratio = []
+    for run in range(runs):
+        drawn, record = records[run % 3]
+        n = benchmark.Noise(*noise.draw(rng, t0, t1, readings), window)
+        read_so = read(record.windows, record.meta["parameters"], rng, n)
+        result = drawn.reduce(Record({**record.windows, **read_so}, {}, record.meta))
+        ratio.append(
+            [2.0 * (c.estimate - c.truth) / (c.interval[1] - c.interval[0]) for c in result.coefficients if c.truth]
+        )
+    most = max(len(r) for r in ratio)  # a curved torquer has no K_LS
+    counting.check(np.array([r + [np.nan] * (most - len(r)) for r in ratio]))
