@@ -46,7 +46,7 @@ class Value:
     dof: float = math.inf
     shared: Mapping[str, Array] = field(default_factory=dict)
     truth: float | None = None
-    direct: bool = True  # reported by the test, not put together from what it reports
+    reported: str = ""  # the test's own name of it; "" where it is put together from several of its estimates
 
     @property
     def own(self) -> float:
@@ -54,8 +54,12 @@ class Value:
         return self.u_a**2 + self.u_b**2
 
     @property
+    def u_shared(self) -> float:
+        return math.sqrt(sum(float(s @ s) for s in self.shared.values()))
+
+    @property
     def u(self) -> float:
-        return math.sqrt(self.own + sum(float(s @ s) for s in self.shared.values()))
+        return math.sqrt(self.own + self.u_shared**2)
 
     @property
     def k_a(self) -> float:

@@ -128,9 +128,9 @@ def value(label: str, quantity: Compared, result: Result, shared: Collection[str
     if all(t is not None for t in known):
         truth = sum(float(c[j]) * float(each[j].truth or 0.0) for j in used)
     dof = min((each[j].dof or math.inf for j in used), default=math.inf)
-    direct = used.size == 1
+    name = each[used[0]].name if used.size == 1 else ""
     estimate = float(c @ np.array([e.estimate for e in each]))
-    return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, direct)
+    return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
 
 
 def ideal(result: Result) -> bool:

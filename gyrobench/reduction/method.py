@@ -107,12 +107,12 @@ def linear_result(
 
 
 def plus_minus(c: Coefficient) -> str:
-    """ "-0.3001 ± 0.0023 °/h (95 %)": expanded uncertainty with two digits."""
+    """ "−0.3001 ± 0.0023 °/h (95 %)": expanded uncertainty with two digits."""
     U = c.k * c.u
     if not U > 0.0 or not math.isfinite(U):
-        return f"{c.estimate:.6g} {c.unit}"
+        return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
     digits = max(0, 1 - math.floor(math.log10(U)))
-    return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)"
+    return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
 
 
 def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Limits) -> Coefficient:

@@ -77,7 +77,8 @@ class Compare:
             others = agreement.agree([v for v in self.values if v.label != off[0]])
             mine = next(v for v in self.values if v.label == off[0])
             apart = mine.estimate - others.mean
-            return f"{off[0]} is off by {apart:+.2g} {self.quantity.unit}; the others agree (p = {off[1]:.2g})"
+            size = f"{apart:+.2g} {self.quantity.unit}".replace("-", "−")
+            return f"{off[0]} is off by {size}; the others agree (p = {off[1]:.2g})"
         which = "; which of them is off cannot be told" if len(self.values) < 3 or len(far) < 2 else ""
         return f"disagree: {', '.join(f'E_n of {x}' for x in far) or 'all of them a little'}{which}"
 
@@ -224,8 +225,8 @@ def _row(c: Compare) -> dict[str, Any]:
         "combination": dict(c.quantity.combination), "truth": c.truth,
         "values": [
             {"label": v.label, "estimate": v.estimate, "u": v.u, "U": v.U,
-             "dof": v.dof if math.isfinite(v.dof) else None, "weight": w, "truth": v.truth,
-             "how": "as reported" if v.direct else "from several of its estimates"}
+             "u_a": v.u_a, "u_b": v.u_b, "u_shared": v.u_shared, "dof": v.dof if math.isfinite(v.dof) else None,
+             "weight": w, "truth": v.truth, "how": _how(v.reported, c.quantity.name)}
             for v, w in zip(c.values, weights, strict=True)
         ],
         "mean": None if a is None else {"estimate": a.mean, "u": a.u, "U": a.U},
@@ -233,6 +234,12 @@ def _row(c: Compare) -> dict[str, Any]:
         "p": a.p if a else None, "p_adjusted": c.p, "largest E_n": max(p.E_n for p in a.pairs) if a else None,
         "verdict": "disagree" if c.disagree else "agree" if a else "–", "words": c.words(),
     }  # fmt: skip
+
+
+def _how(reported: str, name: str) -> str:
+    if not reported:
+        return "from several of its estimates"
+    return "as reported" if reported == name else f"reported as {reported}"
 
 
 def _member(label: str, m: Member) -> dict[str, Any]:
@@ -285,6 +292,9 @@ def _warnings(results: Mapping[str, Result], compared: Sequence[Compare], failed
             "The site values of the tests differ, as each test says below; where gravity differs, what is folded in "
             "from D_OO differs too."
         )
+    own = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
+    if own:
+        out.append(f"Tests with warnings of their own, which stand with each test: {', '.join(own)}.")
     lonely = [c.quantity.name for c in compared if len(c.values) == 1]
     if lonely:
         out.append(f"Seen by one method only, so confirmed by no other: {', '.join(lonely)}.")

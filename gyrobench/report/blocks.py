@@ -117,8 +117,9 @@ class Answer:
 
 @dataclass
 class Signatures:
-    """Lines to sign on: role and, where it is known, name."""
+    """Statements, and beneath on the same page lines to sign on: role and, where it is known, name."""
 
+    statements: list[str]
     items: list[tuple[str, str]]
     kind: str = "signatures"
 

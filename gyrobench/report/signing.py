@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench.system.record import ABOUT
 
-from .blocks import Items, Signatures
+from .blocks import Signatures
 
 Json = dict[str, Any]
 ROLES = ("Tested by", "Checked by", "Approved by")
@@ -28,4 +28,4 @@ def signing(doc: Json) -> list[Any]:
     elif missing:
         said.append(f"Not stated, and wanted before signing: {', '.join(missing)}.")
     names = [str(run.get("operator") or ""), "", ""]
-    return [Items(said), Signatures(list(zip(ROLES, names, strict=True)))]
+    return [Signatures(said, list(zip(ROLES, names, strict=True)))]

@@ -118,6 +118,8 @@ def _consistency(doc: Json) -> list[Any]:
 def _cross(doc: Json) -> list[Any]:
     rows: list[Row] = []
     pictures = []
+    some_b = any(v["u_b"] or v["u_shared"] for q in doc["suite"]["quantities"] for v in q["values"])
+    split = ("u_a", "u_b", "u_shared") if some_b else ()
     for k, q in enumerate(doc["suite"]["quantities"]):
         path: tuple[str | int, ...] = ("suite", "quantities", k)
         true = "" if q["truth"] is None else f"; truth {write_number(q['truth'], significant=6).text}"
@@ -129,6 +131,7 @@ def _cross(doc: Json) -> list[Any]:
                     [
                         text_cell(v["label"]),
                         *(number_cell(doc, (*own, n), v["u"]) for n in ("estimate", "u", "U")),
+                        *(number_cell(doc, (*own, n), v["u"]) for n in split),
                         number_cell(doc, (*own, "dof"), significant=3),
                         number_cell(doc, (*own, "weight"), significant=3),
                         text_cell(v["how"]),
@@ -139,16 +142,21 @@ def _cross(doc: Json) -> list[Any]:
             u = q["mean"]["u"]
             mean = [number_cell(doc, (*path, "mean", n), u) for n in ("estimate", "u", "U")]
             rows.append(
-                Row([text_cell("weighted mean", "strong"), *mean, *(text_cell("") for _ in range(3))], strong=True)
+                Row(
+                    [text_cell("weighted mean", "strong"), *mean, *(text_cell("") for _ in (*split, 1, 2, 3))],
+                    strong=True,
+                )
             )
         if len(q["values"]) > 1:
             pictures.append(_forest(q, f"forest-{k + 1}"))
-    columns = [Column("method"), Column("estimate"), Column("u"), Column("U (95 %)"), Column("dof"), Column("weight")]
-    columns.append(Column("how", wide=True))
+    heads = ["method", "estimate", "u", "U (95 %)", *("type A", "type B", "shared")[: len(split)], "dof", "weight"]
+    columns = [*map(Column, heads), Column("how", wide=True)]
     caption = (
         "The same quantity by every method that sees it. dof: of type A, a dash where u is known well; weight: in the "
         "mean."
     )
+    if split:
+        caption += " Type A, type B, shared: parts of u; shared by the tests, see How it was done."
     return [Pictures(pictures), Table(columns, rows, caption, small=True)] if rows else []
 
 

@@ -164,7 +164,7 @@ def test_a_quantity_from_several_estimates() -> None:
     found = {c.quantity.name: c for c in compare({"a": a, "b": b}, ("k",))}
     assert set(found) == {"D_F", "D_II", "ω_d"} and len(found["D_F"].values) == 1
     v = found["ω_d"].values[0]
-    assert v.estimate == pytest.approx(1.5) and not v.direct
+    assert v.estimate == pytest.approx(1.5) and not v.reported
     assert v.u_a**2 == pytest.approx(0.09 + 0.16 - 0.12)
     assert v.u_b == pytest.approx(0.4) and v.shared["k"] == pytest.approx([0.4])  # 0.1 - 0.1 and 0.2 + 0.2; 0.3 + 0.1
 
