@@ -1,0 +1,117 @@
+"""Reports of loop tests: responses as figures, plan, comparison; the published schema holds them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from reading import Written
+
+from gyrobench import report
+from gyrobench.reduction.result import Coefficient, Response, Result
+from gyrobench.report.comparison import comparison
+from gyrobench.report.content import read_content
+from gyrobench.report.document import document
+from gyrobench.report.responses import draw
+from gyrobench.report.style import styled
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+
+PLAN = LoopPlan(
+    [LoopPhase("load", "torque", "step", 1, 0.5, settle=1.0, dwell=2.0), *sweep("loop", "test", [1.0], 0.1)]
+)
+
+
+def responses(gain: float) -> list[Response]:
+    f = np.geomspace(0.1, 10.0, 7)
+    dense = np.geomspace(0.05, 20.0, 50)
+
+    def loop(x: np.ndarray) -> Any:
+        return gain / (1j * x * (1 + 0.2j * x))
+
+    def phase(x: np.ndarray) -> list[float]:
+        return np.degrees(np.unwrap(np.angle(loop(x)))).tolist()
+
+    curve = {
+        "label": "linear, continuous",
+        "x": dense.tolist(),
+        "y": np.abs(loop(dense)).tolist(),
+        "phase": phase(dense),
+    }
+    t = np.linspace(0, 1, 50)
+    axis = {"x_name": "frequency", "x_unit": "Hz"}
+    return [
+        Response("open loop", "loop", "Loop.", f.tolist(), **axis, y=np.abs(loop(f)).tolist(), y_name="gain",
+                 y_unit="1", phase=phase(f), u=[0.01] * 6 + [None], coherence=[1.0] * 7, curves=[curve]),
+        Response("isolation", "ratio", "Isolation.", f.tolist(), **axis, y=f.tolist(), y_name="isolation", y_unit="1",
+                 phase=[0.0] * 7, u=[None] * 7),
+        Response("load, angle", "step", "Step.", t.tolist(), "time", "s", y=(gain * (1 - np.exp(-5 * t))).tolist(),
+                 y_name="angle", y_unit="″"),
+    ]  # fmt: skip
+
+
+def result(gain: float = 2.0) -> Result:
+    found = Coefficient(
+        "f_c", "crossover frequency", "Hz", 0.3 * gain, 0.01, 1.96, (0.3 * gain - 0.02, 0.3 * gain + 0.02)
+    )
+    return Result(
+        system="loop", title="Loop test", method="by sines", sources=[], equation="L", conventions=[],
+        coefficients=[found], series=[], correlation=[], condition=0.0, rank=0, dof=0.0, noise={}, tests=[],
+        residual_std=0.0, residual_unit="1", responses=responses(gain),
+        provenance={"plan": PLAN.rows(), "order": ["exciter", "gyro"], "step": 1e-3},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    return Written(report.write(result(), tmp_path_factory.mktemp("loop")))
+
+
+def test_schema_holds_responses(written: Written) -> None:
+    schema = json.loads(read_content("result.schema.json"))
+    jsonschema.validate(written.json, schema)
+    assert {f.name for f in dataclasses.fields(Response)} == set(schema["$defs"]["response"]["properties"])
+
+
+def test_a_result_comes_back_from_its_dictionary() -> None:
+    assert Result.from_dict(result().as_dict()) == result()
+
+
+def test_each_response_has_its_figure(written: Written) -> None:
+    html = written.paths["html"].read_text(encoding="utf-8")
+    for k in (1, 2, 3):
+        assert f'id="figure-response-{k}"' in html
+    assert "The regression has rank" not in html and "Residual standard deviation" not in html
+
+
+def test_plan_of_a_loop_shows_its_excitations(written: Written) -> None:
+    rows = document(result())["derived"]["plan"]
+    assert rows[0]["shape"] == "step" and rows[0]["amplitude"] == 0.5 and rows[0]["unit"] == "N.m"
+    assert rows[1]["frequency_Hz"] == 1.0
+    html = written.paths["html"].read_text(encoding="utf-8")
+    assert "frequency" in html and "amplitude" in html and ">face<" not in html
+
+
+def test_comparison_lays_responses_over_each_other(tmp_path: Any) -> None:
+    runs = [("a", result(2.0)), ("b", result(4.0))]
+    doc = comparison(runs)
+    assert [r["name"] for r in doc["responses"]] == ["open loop", "isolation", "load, angle"]
+    assert all(len(r["runs"]) == 2 for r in doc["responses"])
+    html = Written(report.compare(runs, tmp_path)).paths["html"].read_text(encoding="utf-8")
+    assert html.count('id="figure-response-') == 3
+    runs[1][1].responses.pop()  # one that only one run has is no comparison
+    html = Written(report.compare(runs, tmp_path)).paths["html"].read_text(encoding="utf-8")
+    assert html.count('id="figure-response-') == 2
+
+
+def test_phases_a_turn_apart_are_drawn_together() -> None:
+    """The second run's phase is written 360 degrees lower: the figure is the same as with it at the same turn."""
+    a, b = responses(2.0)[0], responses(2.0)[0]
+    b.phase = [p - 360.0 for p in b.phase]
+    with styled():
+        one = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(a))], "k")
+        two = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(b))], "k")
+    assert one == two
