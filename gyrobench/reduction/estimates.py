@@ -53,6 +53,10 @@ class Signals:
                 found.append(f"{name} has {x.size} samples, time has {self.time.size}")
             elif not np.all(np.isfinite(x)):
                 found.append(f"{name} is not finite at {int(np.count_nonzero(~np.isfinite(x)))} samples")
+        if not found and not np.ptp(self.truth) > 0.0:
+            found.append("the truth does not move: an estimate that is always 0 would win, so nothing can be measured")
+        if not found and not np.any(self.z != self.truth):
+            found.append("the readings are the truth: there is no noise to be reduced")
         if self.time.size < 400:
             found.append(f"{self.time.size} samples: at least 400 are needed")
         else:

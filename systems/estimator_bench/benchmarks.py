@@ -18,12 +18,15 @@ AR3 = [-0.7466, -0.5044, -0.2538, 0.0, 0.0]
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Ts: sampling period, s.  skip: readings left out at the start.  source, estimator: parameters."""
+    """Ts: sampling period, s.  skip: readings left out at the start; least: that must be left (of a sine: ten periods).
+    source, estimator: parameters.
+    """
 
     title: str
     Ts: float
     samples: int
     skip: int
+    least: int
     source: Mapping[str, Any]
     estimator: Mapping[str, Any]
 
@@ -34,23 +37,24 @@ SINE = {**QUIET, "amplitude": 0.01, "frequency": 1.0, "white": SIGMA}
 BENCHMARKS = {
     "sine": Benchmark(
         "sine of 1 Hz and 0.01 under white noise of 1.643e-3, 1 kHz [BENCH-DYN-SINE]",
-        1e-3, 60000, 3000, SINE,
+        1e-3, 60000, 3000, 10000, SINE,
         {"R": SIGMA**2, "R0": SIGMA**2, "sigma": SIGMA},
     ),
     "change": Benchmark(
         "the same, the noise three times as large from 30 s on [EST-SAGE-HUSA]",
-        1e-3, 60000, 33000, {**SINE, "change_time": 30.0, "change_factor": 3.0},
+        1e-3, 60000, 33000, 10000, {**SINE, "change_time": 30.0, "change_factor": 3.0},
         {"R": SIGMA**2, "R0": SIGMA**2, "sigma": SIGMA, "q": 2.0},
     ),
     "level": Benchmark(
         "random walk under white noise, q/r = 1e-3, r = 2.70e-6 [BENCH-DRIFT-LL]",
-        5.0, 17158, 500, {**QUIET, "walk": math.sqrt(1e-3 * R_LEVEL), "white": math.sqrt(R_LEVEL)},
+        5.0, 17158, 500, 2000, {**QUIET, "walk": math.sqrt(1e-3 * R_LEVEL), "white": math.sqrt(R_LEVEL)},
         {"R": R_LEVEL, "R0": R_LEVEL, "sigma": math.sqrt(R_LEVEL), "q": 0.0, "P0_slope": 0.0,
          "walk": 1e-3 * R_LEVEL / 5.0},
     ),
     "ar3": Benchmark(
         "AR(3) of the thesis with its sign put right, readings of R = Q = 3.3697e-6 [BENCH-DRIFT-AR3]",
-        5.0, 17158, 500, {**QUIET, "p": 3, "phi": AR3, "w": math.sqrt(SIGMA2_AR3), "white": math.sqrt(SIGMA2_AR3)},
+        5.0, 17158, 500, 2000,
+        {**QUIET, "p": 3, "phi": AR3, "w": math.sqrt(SIGMA2_AR3), "white": math.sqrt(SIGMA2_AR3)},
         {"p": 3, "Q": SIGMA2_AR3, "R": SIGMA2_AR3, "R0": SIGMA2_AR3, "sigma": math.sqrt(SIGMA2_AR3)},
     ),
 }  # fmt: skip

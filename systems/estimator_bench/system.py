@@ -103,8 +103,9 @@ class EstimatorBench(System):
         if self["benchmark"] not in BENCHMARKS:
             return [f"benchmark = {self['benchmark']}: one of {', '.join(BENCHMARKS)}"]
         left = self.samples - self.skip
-        if left < 2000:
-            return [f"samples = {self.samples}, of which {self.skip} are skipped: at least 2000 must be left"]
+        least = self.benchmark.least
+        if left < least:
+            return [f"samples = {self.samples}, of which {self.skip} are skipped: at least {least} must be left"]
         return []
 
     def reduce(self, record: Record, specification: Specification | None = None) -> Result:

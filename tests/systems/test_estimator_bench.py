@@ -137,7 +137,7 @@ def test_ranked_by_error_not_by_smoothness() -> None:
 
 
 def test_both_engines_agree_bit_for_bit() -> None:
-    values = {"samples": 2500, "skip": 0}
+    values = {"benchmark": "level", "samples": 2500, "skip": 0}
     records = [
         run(load_system(NAME), {"estimator": "estimator_sage_husa"}, values=values, engine=e)
         for e in ("native", "reference")
@@ -147,7 +147,7 @@ def test_both_engines_agree_bit_for_bit() -> None:
 
 def test_readings_reach_the_estimator_in_their_own_step() -> None:
     """No estimator at all: the estimate is the reading of the same row."""
-    r = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 2500, "skip": 0})
+    r = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 10000, "skip": 0})
     assert (r.channels["estimator.estimate"] == r.channels["source.z"]).all()
     assert r.meta["delays"] == {}
 
@@ -158,7 +158,7 @@ def test_what_is_known_is_set_where_the_part_has_it() -> None:
     p = known["parameters"]
     assert p["estimator.Ts"] == 5.0 and p["estimator.R"] == 2.70e-6 and p["estimator.q"] == 0.0
     assert p["estimator.walk"] == 1e-9  # the user's word before the benchmark's
-    none = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 2500, "skip": 0}).meta
+    none = run(load_system(NAME), {"estimator": "estimator_none"}, values={"benchmark": "level"}).meta
     assert "estimator.Ts" not in none["parameters"] and none["notes"] == known["notes"] == []
 
 
@@ -167,8 +167,8 @@ def test_refusals() -> None:
     system = load_system(NAME)
     with pytest.raises(RefusedError, match="benchmark = sin: one of sine, change, level, ar3"):
         system.with_values({"benchmark": "sin"}).refuse()
-    with pytest.raises(RefusedError, match="samples = 4000, of which 3000 are skipped: at least 2000 must be left"):
-        system.with_values({"samples": 4000}).refuse()
+    with pytest.raises(RefusedError, match="samples = 9000, of which 3000 are skipped: at least 10000 must be left"):
+        system.with_values({"samples": 9000}).refuse()
     with Session(system) as session, pytest.raises(ValueProblem, match="runs at the sampling period of its benchmark"):
         session.run(step=5e-4)
 
@@ -195,7 +195,7 @@ def test_sampling_period_that_does_not_fit_names_both(command: Command, tmp_path
 
 
 def test_records_that_cannot_be_reduced() -> None:
-    system = load_system(NAME).with_values({"samples": 2600, "skip": 100})
+    system = load_system(NAME).with_values({"benchmark": "level", "samples": 2600, "skip": 100})
     record = run(system)
     short = {k: v[:301] for k, v in record.channels.items()}
     whole, record.channels = record.channels, short
@@ -203,6 +203,12 @@ def test_records_that_cannot_be_reduced() -> None:
         system.reduce(record)
     record.channels = {k: v for k, v in whole.items() if k != "source.truth"}
     with pytest.raises(ReductionError, match=r"channel source\.truth is missing"):
+        system.reduce(record)
+    record.channels = {**whole, "source.truth": whole["source.truth"] * 0.0}
+    with pytest.raises(ReductionError, match="the truth does not move: an estimate that is always 0 would win"):
+        system.reduce(record)
+    record.channels = {**whole, "source.z": whole["source.truth"]}
+    with pytest.raises(ReductionError, match="the readings are the truth: there is no noise to be reduced"):
         system.reduce(record)
     record.channels = {**whole, "estimator.estimate": whole["estimator.estimate"] * math.nan}
     with pytest.raises(ReductionError, match="estimate is not finite at 2500 samples"):
