@@ -163,6 +163,33 @@ def test_a_gyro_that_changed_in_one_test_is_found(sessions: dict[str, Session], 
     assert any(f"gyro.{name} = " in w and "Not the same in all tests" in w for w in found.warnings)
 
 
+def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str, Session]) -> None:
+    """k of the torquer taken 10 % too large in both tumbles; the servo does not use it.  The reduction reads all drift
+    that 10 % too large.  With a standard uncertainty of 10 % stated, the three agree and the mean follows the servo;
+    with none two wrong ones outvote the right one; were the two errors independent, they would still draw the mean.
+    """
+    right = 17.2e3 * DPH  # rad/s/A
+    tests = "tumble_single_axis tumble_two_axis servo_polar"
+    chosen, true = floated(3, tests, k=1.1 * right, u_scale_factor=0.1)
+    found = results(sessions, chosen, 3)
+    together = report(found, chosen)
+    assert together.suite["consistency"] == "consistent" and together.suite["shared"] == ["torquer scale factor"]
+    name = max(("D_I", "D_S"), key=lambda n: abs(true[n]))
+    row = next(q for q in together.suite["quantities"] if q["name"] == name)
+    for v in row["values"][:2]:
+        assert v["estimate"] == pytest.approx(1.1 * true[name] / DPH, rel=0.02)
+        assert v["u_shared"] == pytest.approx(0.1 * abs(v["estimate"]), rel=0.02)
+    assert row["values"][2]["weight"] > 0.95
+    mean = next(c for c in together.coefficients if c.name == name)
+    assert abs(mean.estimate - true[name] / DPH) < 3.0 * mean.u < 0.03 * abs(mean.estimate)
+
+    blind, _ = floated(3, tests, k=1.1 * right)
+    apart = report(results(sessions, blind, 3), blind)
+    assert name in apart.suite["disagreeing"]
+    words = next(q["words"] for q in apart.suite["quantities"] if q["name"] == name)
+    assert words.startswith("servo_polar is off by")  # what an unstated common error does
+
+
 def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> None:
     chosen, true = floated(3, "tumble_single_axis servo_polar")
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)
