@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import asin, atan2, clip, cos, fabs, sign, sin, sqrt
+from gyrobench.math import asin, atan2, clip, cos, fabs, maximum, sign, sin, sqrt
 
 
 class VerticalGyro(Component):
@@ -80,9 +80,6 @@ class VerticalGyro(Component):
         self.n[2] = z * cos(angle) + s * (a * y - b * x)
         self.g4 = atan2(self.n[0], self.n[2]) if self.ring else 0.0
 
-    def gain(self, g3):
-        return sign(cos(g3)) if self.reversal else 1.0
-
     def flow(self) -> None:
         # x_i, y_i in vehicle axes: of the gimbal beside the rotor
         c = 1.0
@@ -91,16 +88,17 @@ class VerticalGyro(Component):
         if self.ring:
             c = cos(self.g4)
             s = sin(self.g4)
-            v_x = c * self.n[0] - s * self.n[2]  # of n in axes of the ring: sin g2
-            v_z = s * self.n[0] + c * self.n[2]
-            g2 = asin(clip(v_x, -1.0, 1.0))
-            g3 = atan2(-self.n[1], v_z)
+            s2 = clip(c * self.n[0] - s * self.n[2], -1.0, 1.0)  # n in axes of the ring: sin g2 first
+            v_z = s * self.n[0] + c * self.n[2]  # cos g3 cos g2; n_y is -sin g3 cos g2
+            c2 = sqrt(1.0 - s2 * s2)
+            level = maximum(c2, 1e-9)
             # x_i = R2(g4)' R1(g3)' (cos g2, 0, -sin g2)
-            out = -sin(g2) * cos(g3)
-            x[0] = c * cos(g2) + s * out
-            x[1] = sin(g2) * sin(g3)
-            x[2] = -s * cos(g2) + c * out
-            self.der.g4 = clip(self.k_ring * self.gain(g3) * g2, -self.ring_rate, self.ring_rate)
+            out = -s2 * v_z / level
+            x[0] = c * c2 + s * out
+            x[1] = -s2 * self.n[1] / level
+            x[2] = -s * c2 + c * out
+            way = sign(v_z) if self.reversal else 1.0
+            self.der.g4 = clip(self.k_ring * way * asin(s2), -self.ring_rate, self.ring_rate)
         else:
             level = sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2])
             x[0] = self.n[2] / level
@@ -131,15 +129,17 @@ class VerticalGyro(Component):
         if self.ring:
             c = cos(self.g4)
             s = sin(self.g4)
-            g2 = asin(clip(c * self.n[0] - s * self.n[2], -1.0, 1.0))
-            g3 = atan2(-self.n[1], s * self.n[0] + c * self.n[2])
-            out = -sin(g2) * cos(g3)
-            x[0] = c * cos(g2) + s * out
-            x[1] = sin(g2) * sin(g3)
-            x[2] = -s * cos(g2) + c * out
-            self.pitch = -g3
+            s2 = clip(c * self.n[0] - s * self.n[2], -1.0, 1.0)
+            v_z = s * self.n[0] + c * self.n[2]
+            c2 = sqrt(1.0 - s2 * s2)
+            level = maximum(c2, 1e-9)
+            out = -s2 * v_z / level
+            x[0] = c * c2 + s * out
+            x[1] = -s2 * self.n[1] / level
+            x[2] = -s * c2 + c * out
+            self.pitch = atan2(self.n[1], v_z)
             self.roll = -self.g4
-            self.inner = g2
+            self.inner = asin(s2)
         else:
             level = sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2])
             x[0] = self.n[2] / level
