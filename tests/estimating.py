@@ -32,12 +32,16 @@ def play(
     *,
     T: float = 1e-3,
     valid: Array | None = None,
-    target: str = "native",
+    instance: Any = None,
     **parameters: Any,
 ) -> Array:
-    """Outputs after each reading: (n,) for one output, (n, m) for a list; T: communication step, s."""
+    """Outputs after each reading: (n,) for one output, (n, m) for a list; T: communication step, s.
+
+    instance: of the part, to be used again after a reset.
+    """
     names = [outputs] if isinstance(outputs, str) else list(outputs)
-    one = make(part, target)
+    one = instance or make(part, "native")
+    one.reset()
     try:
         one.set(arrays(parameters))
         one.initialize(0.0)
@@ -47,7 +51,8 @@ def play(
             one.step(k * T, T)
             found[k] = one.get(names)
     finally:
-        one.free()
+        if instance is None:
+            one.free()
     return found[:, 0] if isinstance(outputs, str) else found
 
 

@@ -11,6 +11,7 @@ from scipy import linalg, stats
 
 from gyrobench.component import PartError
 from gyrobench.packaging import load_part
+from gyrobench.packaging.instance import make
 
 SAMPLED = [
     "estimator_moving_average",
@@ -213,6 +214,7 @@ def test_nees_and_nis_are_consistent(part):
     """200 runs of the model itself: NEES at one instant and NIS of every reading within their chi-square bounds."""
     rng = np.random.default_rng(31)
     runs, n, T = 200, 120, 1e-3
+    one = make(f"estimator_kalman_{part}", "native")
     nees, nis = [], []
     for _ in range(runs):
         if part == "ar":
@@ -221,7 +223,7 @@ def test_nees_and_nis_are_consistent(part):
             x = autoregressive(rng, n, SIGMA2)
             z = x + rng.normal(size=n) * math.sqrt(SIGMA2)
             # diagonal of the stationary covariance as P0: its correlations are forgotten after some ten readings
-            found = play("estimator_kalman_ar", z, FULL, P0=P0[0, 0])[40:]
+            found = play("estimator_kalman_ar", z, FULL, P0=P0[0, 0], instance=one)[40:]
         else:
             F, G = rate_model(0.5, T)
             state = rng.normal(size=2)  # P0 = P0_slope = 1
@@ -230,9 +232,10 @@ def test_nees_and_nis_are_consistent(part):
                 state = F @ state + root @ rng.normal(size=2)
                 x[k] = state[0]
             z = x + rng.normal(size=n) * 1.643e-3
-            found = play("estimator_kalman_rate", z, FULL)[40:]
+            found = play("estimator_kalman_rate", z, FULL, instance=one)[40:]
         nees.append((found[-1, 0] - x[-1]) ** 2 / found[-1, 1])
         nis.append(found[:, 3])
+    one.free()
     low, high = chi_square_mean(runs)
     assert low < np.mean(nees) < high
     low, high = chi_square_mean(runs * 80)
