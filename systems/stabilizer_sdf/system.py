@@ -156,6 +156,15 @@ class StabilizerSdf(System):
             )
         return problems
 
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        missing = [n for n in ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K") if n not in parameters]
+        if missing:
+            return [
+                f"the parts have no {', '.join(missing)}: this system needs a gyro with spring and "
+                "damper that gives its momentum h_I (floated_gyro), and a platform with inertia J"
+            ]
+        return []
+
     def warnings(self) -> list[str]:
         p = self.axis()
         found = []

@@ -229,3 +229,9 @@ def test_the_stop_ends_the_run(session, tmp_path, command):
 def test_refuses(values, message):
     with pytest.raises(RefusedError, match=message):
         load_system(NAME).with_values(values).refuse()
+
+
+def test_a_gyro_without_spring_and_momentum_is_refused(tmp_path, command):
+    code, _, err = command("run", NAME, "--part", "gyro=compliant_gyro", "--out", tmp_path / "r")
+    assert code == 2
+    assert "this system needs a gyro with spring and damper" in err
