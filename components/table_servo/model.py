@@ -5,6 +5,7 @@ from gyrobench.math import clip, cos, fabs, floor, index, maximum, minimum, pi, 
 
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
+SIXTH = 1.0 / 6.0
 
 
 class TableServo(Component):
@@ -102,6 +103,13 @@ class TableServo(Component):
     gain = Discrete(0.0, "N.m/V", "static gain G of the loop")
     pole = Discrete([0.0, 0.0, 0.0], "rad/s", "pole of each network")
     ratio = Discrete([1.0, 1.0, 1.0], "1", "its gain at high frequency, pole / zero")
+    per_lag = Discrete(0.0, "1/s", "1 / lag")
+    per_J = Discrete(0.0, "1/(kg.m2)", "1 / J")
+    back = Discrete(0.0, "N.m.s/V", "H_g / K_g")
+    kick = Discrete(0.0, "N.m/(V.s)", "demand of the compensator by a step of u, per time")
+    wave_s = Discrete([0.0, 0.0], "rad", "encoder errors of order 1 and 2, sine part")
+    wave_c = Discrete([0.0, 0.0], "rad", "their cosine part")
+    reach = Discrete(1e-3, "rad", "largest angle from the mark")
     pull = Discrete(0.0, "N.m/V", "k_p while capturing")
     brake = Discrete(0.0, "N.m.s/rad", "k_d while capturing")
     near = Discrete(0.0, "V", "capture_angle as a pickoff voltage")
@@ -114,6 +122,13 @@ class TableServo(Component):
     drag = Discrete(0.0, "N.m", "tachometer torque while capturing")
     push = Discrete(0.0, "N.m", "motor torque at the end of the step")
     acc = Discrete(0.0, "rad/s2", "acceleration about the axis")
+
+    # a table turns little in a step: its sine and cosine go on from those at a mark that seldom moves
+    mark = Discrete(0.0, "rad", "angle of the mark")
+    mark_s = Discrete(0.0, "1", "sine there")
+    mark_c = Discrete(1.0, "1", "cosine there")
+    fine_s = Discrete(0.0, "rad", "fine encoder error there")
+    fine_c = Discrete(0.0, "rad", "its derivative there, per cycle angle")
 
     x = Discrete(0.0, "rad", "angle at the end of the last step")
     v = Discrete(0.0, "rad/s", "rate there")
@@ -191,6 +206,10 @@ class TableServo(Component):
         self.gain = w * sqrt(square) / top
         if self.stiffness > 0.0:
             self.gain = self.stiffness * self.C_g / top
+        self.per_lag = 1.0 / self.lag
+        self.per_J = 1.0 / self.J
+        self.back = self.H_g / self.K_g
+        self.kick = self.gain * self.ratio[0] * self.ratio[1] * self.ratio[2] / self.lag
         n = [self.gain * top, 0.0, 0.0, 0.0]
         for j in range(6):
             d[6 - j] = d[6 - j] + d[5 - j] * self.lag
@@ -221,6 +240,15 @@ class TableServo(Component):
         self.near = self.capture_angle * sensitivity
         wide = self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max
         self.refuse(wide, "capture_angle = {capture_angle} rad is beyond the linear range, torque_max / K_T")
+        for k in range(2):
+            self.wave_s[k] = self.encoder_amplitude[k] * cos(self.encoder_phase[k])
+            self.wave_c[k] = self.encoder_amplitude[k] * sin(self.encoder_phase[k])
+        self.reach = 1e-3 / self.encoder_fine if self.encoder_amplitude[2] != 0.0 else 1e-3
+        self.mark = self.angle0
+        self.mark_s = sin(self.mark)
+        self.mark_c = cos(self.mark)
+        self.fine_s = self.encoder_amplitude[2] * sin(self.encoder_fine * self.mark + self.encoder_phase[2])
+        self.fine_c = self.encoder_amplitude[2] * cos(self.encoder_fine * self.mark + self.encoder_phase[2])
         self.x = self.angle0
         self.theta = self.angle0
         self.spin = self.earth(2)
@@ -242,28 +270,41 @@ class TableServo(Component):
         m = clip(demand, -self.torque_max, self.torque_max)
         return m if self.shaper == 1.0 else m * fabs(m) / self.torque_max
 
+    def sine(self, d):  # of a small angle: up to reach, 1e-3, exact to the last digit
+        return d - d * d * d * (SIXTH - d * d / 120.0)
+
+    def cosine_less_one(self, d):
+        return d * d * (d * d / 24.0 - 0.5)
+
+    def sine_now(self):
+        d = self.theta - self.mark
+        return self.mark_s + (self.mark_s * self.cosine_less_one(d) + self.mark_c * self.sine(d))
+
+    def cosine_now(self):
+        d = self.theta - self.mark
+        return self.mark_c + (self.mark_c * self.cosine_less_one(d) - self.mark_s * self.sine(d))
+
     def flow(self) -> None:
         slip = self.spin - 0.5 * (self.base_last + self.earth(2))  # a base that moves: its mean over the step
         volt = self.polarity * self.u if self.stage == FINE else 0.0
-        fast = (volt - self.filt) / self.lag
+        fast = (volt - self.filt) * self.per_lag
         self.der.filt = fast
         y = self.filt
-        high = 1.0
         for k in range(3):
-            self.der.net[k] = self.pole[k] * (y - self.net[k])
-            y = self.net[k] + self.ratio[k] * (y - self.net[k])
-            high = high * self.ratio[k]
+            lead = y - self.net[k]
+            self.der.net[k] = self.pole[k] * lead
+            y = self.net[k] + self.ratio[k] * lead
         m = -self.gain * y
         # what the motor gives beyond the linear law, at mid-step, from held values: nothing of it enters the Jacobian
         if self.stage == FINE:
-            middle = self.wish + 0.5 * self.h * (self.slope - self.gain * high * volt / self.lag)
+            middle = self.wish + 0.5 * self.h * (self.slope - self.kick * volt)
             m = m + (self.shaped(middle) - middle)
         if self.stage == CAPTURE:
             limit = self.brake * self.capture_speed
             demand = clip(-self.polarity * self.pull * self.u, -limit, limit) + self.drag
             m = m + clip(demand, -self.torque_max, self.torque_max)
         m = m + self.load + self.torque + self.noise.rumble - self.viscous * slip
-        self.der.spin = (m - self.H_g / self.K_g * fast) / self.J
+        self.der.spin = (m - self.back * fast) * self.per_J
         self.der.theta = slip
 
     @sampled(every=1)
@@ -322,6 +363,15 @@ class TableServo(Component):
             self.spin = self.earth(2) + self.v
         self.base_last = self.earth(2)
 
+        if fabs(self.theta - self.mark) > self.reach:
+            self.mark = self.theta
+            self.mark_s = sin(self.mark)
+            self.mark_c = cos(self.mark)
+            if self.encoder_amplitude[2] != 0.0:
+                phase = self.encoder_fine * self.mark + self.encoder_phase[2]
+                self.fine_s = self.encoder_amplitude[2] * sin(phase)
+                self.fine_c = self.encoder_amplitude[2] * cos(phase)
+
     @sampled(every=1)
     def servo(self) -> None:
         volt = self.polarity * self.u
@@ -347,43 +397,44 @@ class TableServo(Component):
         if self.ripple > 0.0:
             self.load = self.load + self.ripple * sin(self.ripple_cycles * self.theta + self.ripple_phase)
         if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0:
-            fx = cos(self.theta) * self.force(0) + sin(self.theta) * self.force(1)
-            fy = cos(self.theta) * self.force(1) - sin(self.theta) * self.force(0)
+            fx = self.cosine_now() * self.force(0) + self.sine_now() * self.force(1)
+            fy = self.cosine_now() * self.force(1) - self.sine_now() * self.force(0)
             self.load = self.load - (self.unbalance[0] * fy - self.unbalance[1] * fx)
         others = self.load + self.torque - self.viscous * slip
         if self.stage == FINE:
-            fast = -self.filt / self.lag
+            fast = -self.filt * self.per_lag
             y = self.filt
             dy = fast
             for k in range(3):
-                d = self.pole[k] * (y - self.net[k])
-                y = self.net[k] + self.ratio[k] * (y - self.net[k])
+                lead = y - self.net[k]
+                d = self.pole[k] * lead
+                y = self.net[k] + self.ratio[k] * lead
                 dy = d + self.ratio[k] * (dy - d)
             self.wish = -self.gain * y
             self.slope = -self.gain * dy
             self.push = self.shaped(self.wish)
-            others = others - self.H_g / self.K_g * (volt / self.lag + fast)
+            others = others - self.back * (volt * self.per_lag + fast)
         else:
             limit = self.brake * self.capture_speed
             self.drag = -self.brake * self.spin
             demand = clip(-self.pull * volt, -limit, limit) + self.drag
             self.push = clip(demand, -self.torque_max, self.torque_max)
-        self.acc = (self.push + others) / self.J
+        self.acc = (self.push + others) * self.per_J
         self.x = self.theta
         self.v = slip
         self.t_last = self.t
         self.arrived = 1.0 if self.stage == FINE else 0.0
 
     def outputs(self) -> None:
-        read = self.theta
-        for k in range(3):
-            if self.encoder_amplitude[k] != 0.0:
-                order = k + 1.0 if k < 2 else self.encoder_fine
-                read = read + self.encoder_amplitude[k] * sin(order * self.theta + self.encoder_phase[k])
+        s = self.sine_now()
+        c = self.cosine_now()
+        read = self.theta + self.wave_s[0] * s + self.wave_c[0] * c
+        read = read + 2.0 * s * (self.wave_s[1] * c - self.wave_c[1] * s) + self.wave_c[1]
+        if self.encoder_amplitude[2] != 0.0:
+            d = self.encoder_fine * (self.theta - self.mark)
+            read = read + (self.fine_s + (self.fine_s * self.cosine_less_one(d) + self.fine_c * self.sine(d)))
         if self.quantum > 0.0:
             read = self.quantum * floor(read / self.quantum + 0.5)
-        c = cos(self.theta)
-        s = sin(self.theta)
         rate = self.spin - self.earth(2)
         wx = c * self.earth(0) + s * self.earth(1)
         wy = c * self.earth(1) - s * self.earth(0)

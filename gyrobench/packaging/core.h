@@ -11,6 +11,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#define GAMMA 0x9E3779B97F4A7C15u
+#define AHEAD 64
+
 typedef struct {
     Vars v;
 #if N_X > 0
@@ -24,7 +27,10 @@ typedef struct { /* what follows from the numbers, kept because it seldom change
     double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
     int n, keyed;
     double seed; /* the seed that the keys of the noise ports were made for */
-    uint64_t key[N_PORTS + 1];
+    uint64_t key[N_PORTS + 1], first[N_PORTS + 1];
+    double ahead[N_PORTS + 1][AHEAD]; /* normal numbers of the counts first, first + 1, ... */
+    double seen[N_FOLLOWED > 0 ? N_FOLLOWED : 1]; /* what the outputs were last made from, while `settled` */
+    int settled;
 } Kept;
 
 typedef struct {
@@ -105,84 +111,7 @@ static inline dual d_maximum(dual a, dual b) { return a.v > b.v ? a : b; }
 static inline dual d_clip(dual x, dual lo, dual hi) { return x.v < lo.v ? lo : (x.v > hi.v ? hi : x); }
 static inline dual d_sign(dual x) { return d_con(f_sign(x.v)); }
 
-/* ------------------------------------------------------------------------------------------ noise */
-#define GAMMA 0x9E3779B97F4A7C15u
-
-static uint64_t mix(uint64_t z) { /* SplitMix64 output function */
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
-
-static double normal_quantile(double p) { /* Wichura, AS 241 (PPND16) */
-    double q = p - 0.5, r, x;
-    if (fabs(q) <= 0.425) {
-        r = 0.180625 - q * q;
-        return (((((((2.5090809287301226727e+3 * r + 3.3430575583588128105e+4) * r + 6.7265770927008700853e+4) * r
-                    + 4.5921953931549871457e+4) * r + 1.3731693765509461125e+4) * r + 1.9715909503065514427e+3) * r
-                 + 1.3314166789178437745e+2) * r + 3.3871328727963666080e+0) * q
-             / (((((((5.2264952788528545610e+3 * r + 2.8729085735721942674e+4) * r + 3.9307895800092710610e+4) * r
-                    + 2.1213794301586595867e+4) * r + 5.3941960214247511077e+3) * r + 6.8718700749205790830e+2) * r
-                 + 4.2313330701600911252e+1) * r + 1.0);
-    }
-    r = q <= 0.0 ? p : 1.0 - p;
-    r = sqrt(-log(r));
-    if (r <= 5.0) {
-        r = r - 1.6;
-        x = (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r + 2.41780725177450611770e-1) * r
-                + 1.27045825245236838258e+0) * r + 3.64784832476320460504e+0) * r + 5.76949722146069140550e+0) * r
-             + 4.63033784615654529590e+0) * r + 1.42343711074968357734e+0)
-          / (((((((1.05075007164441684324e-9 * r + 5.47593808499534494600e-4) * r + 1.51986665636164571966e-2) * r
-                + 1.48103976427480074590e-1) * r + 6.89767334985100004550e-1) * r + 1.67638483018380384940e+0) * r
-             + 2.05319162663775882187e+0) * r + 1.0);
-    } else {
-        r = r - 5.0;
-        x = (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r + 1.24266094738807843860e-3) * r
-                + 2.65321895265761230930e-2) * r + 2.96560571828504891230e-1) * r + 1.78482653991729133580e+0) * r
-             + 5.46378491116411436990e+0) * r + 6.65790464350110377720e+0)
-          / (((((((2.04426310338993978564e-15 * r + 1.42151175831644588870e-7) * r + 1.84631831751005468180e-5) * r
-                + 7.86869131145613259100e-4) * r + 1.48753612908506148525e-2) * r + 1.36929880922735805310e-1) * r
-             + 5.99832206555887937690e-1) * r + 1.0);
-    }
-    return q < 0.0 ? -x : x;
-}
-
-static uint64_t key_of(uint64_t seed, int port) {
-    return mix(mix((seed + 1) * GAMMA) + (uint64_t)(port + 1) * GAMMA);
-}
-
-static double normal(uint64_t key, uint64_t count) {
-    uint64_t z = mix(key + count * GAMMA);
-    return normal_quantile(((double)(z >> 11) + 0.5) * 0x1p-53);
-}
-
-static void draw(Part *p, int per) {
-#if N_PORTS > 0
-    double *a = value(p);
-    const uint64_t count = (uint64_t)p->n.v.tick;
-    int i;
-    if (!p->kept.keyed || p->kept.seed != p->n.v.seed) {
-        for (i = 0; i < N_PORTS; i++) p->kept.key[i] = key_of((uint64_t)p->n.v.seed, i);
-        p->kept.seed = p->n.v.seed;
-        p->kept.keyed = 1;
-    }
-    for (i = 0; i < N_PORTS; i++) {
-        double x = 0.0, size;
-        if (ports[i].per != per) continue;
-        size = a[ports[i].parameter];
-        if (size != 0.0) {
-            x = size * normal(p->kept.key[i], count);
-            if (per == 2) x = x / p->kept.root;
-        }
-        a[ports[i].sample] = x;
-    }
-#else
-    (void)p;
-    (void)per;
-    (void)normal;
-    (void)key_of;
-#endif
-}
+#include "noise.h"
 
 /* ------------------------------------------------------------------------------------ integration */
 #if N_X > 0
@@ -283,15 +212,20 @@ static void advance(Part *p, double h) {
 #endif
 
 /* --------------------------------------------------------------------------------------- stepping */
+/* 0 when one is not finite, or when large ones add up to more than a double holds: told_finite knows. */
 static inline int all_finite(const double *a, int n) {
-    double even = 0.0, odd = 0.0; /* NaN as soon as one is not finite; two sums, for they take turns */
+    double sum[4] = {0.0, 0.0, 0.0, 0.0}; /* four, for each addition waits for the one before it */
     int i;
-    for (i = 0; i + 1 < n; i += 2) {
-        even = even + a[i] * 0.0;
-        odd = odd + a[i + 1] * 0.0;
+    for (i = 0; i + 3 < n; i += 4) {
+        sum[0] = sum[0] + a[i];
+        sum[1] = sum[1] + a[i + 1];
+        sum[2] = sum[2] + a[i + 2];
+        sum[3] = sum[3] + a[i + 3];
     }
-    if (i < n) even = even + a[i] * 0.0;
-    return even + odd == 0.0;
+    if (i < n) sum[0] = sum[0] + a[i];
+    if (i + 1 < n) sum[1] = sum[1] + a[i + 1];
+    if (i + 2 < n) sum[2] = sum[2] + a[i + 2];
+    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) * 0.0 == 0.0;
 }
 
 static int told_finite(Part *p, int from, int n, const char *what) {
@@ -305,15 +239,31 @@ static int told_finite(Part *p, int from, int n, const char *what) {
     return 1;
 }
 
-static inline int finite(Part *p) { /* outputs, states, derivatives, discretes follow one another */
-    if (all_finite(value(p) + Y0, N_REFERENCES - Y0)) return 1;
+static int tell_finite(Part *p) { /* all that the equations write */
     return told_finite(p, Y0, N_Y, "output") && told_finite(p, X0, N_X, "state") && told_finite(p, Q0, N_Q, "discrete");
+}
+
+/* The outputs, unless all that they follow from is as it was: 1 when they were made anew. */
+static inline int renew(Part *p) {
+#if N_FOLLOWED >= 0
+    const double *a = value(p);
+    int i = 0;
+    if (p->kept.settled) {
+        while (i < N_FOLLOWED && memcmp(&a[followed[i]], &p->kept.seen[i], sizeof *a) == 0) i++; /* tells 0 from -0 */
+        if (i == N_FOLLOWED) return 0;
+    }
+    for (i = 0; i < N_FOLLOWED; i++) p->kept.seen[i] = a[followed[i]];
+    p->kept.settled = 1;
+#endif
+    outputs(p);
+    if (p->failed) p->kept.settled = 0;
+    return 1;
 }
 
 static void evaluate_start(Part *p) {
     p->n.v.tick = 0.0;
-    draw(p, 0);
-    draw(p, 1);
+    p->kept.settled = 0;
+    draw(p, ONCE, PER_STEP);
     start(p);
     if (!p->failed) outputs(p);
     p->n.dirty = 0.0;
@@ -322,6 +272,7 @@ static void evaluate_start(Part *p) {
 static void refresh(Part *p) {
     if (p->n.dirty == 0.0) return;
     if (p->n.running != 0.0) {
+        p->kept.settled = 0;
         outputs(p);
         p->n.dirty = 0.0;
     } else {
@@ -354,13 +305,13 @@ static void initialize(Part *p, double t0) {
         }
     }
     evaluate_start(p);
-    if (!p->failed && finite(p)) p->n.running = 1.0;
+    if (!p->failed && tell_finite(p)) p->n.running = 1.0;
 }
 
 static void do_step(Part *p, double t, double step) {
     double largest, h;
     int k, n;
-    if (!(isfinite(t) && isfinite(step) && step > 0.0)) {
+    if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
         fail(p, "a step must be positive and finite, not %g s", plain(step));
         return;
     }
@@ -381,8 +332,7 @@ static void do_step(Part *p, double t, double step) {
     for (k = 0; k < n; k++) {
         p->n.v.t = t + k * h;
         p->n.v.tick = p->n.v.tick + 1.0;
-        draw(p, 1);
-        draw(p, 2);
+        draw(p, PER_STEP, PER_SECOND);
 #if N_X > 0
         advance(p, h);
 #endif
@@ -390,7 +340,9 @@ static void do_step(Part *p, double t, double step) {
         ticks(p);
         if (p->failed) return;
     }
-    outputs(p);
+    const int anew = renew(p);
     p->n.dirty = 0.0;
-    if (!p->failed) finite(p);
+    if (p->failed) return;
+    if (anew && !all_finite(value(p) + Y0, DX0 - Y0)) tell_finite(p); /* outputs and states */
+    if (!all_finite(value(p) + Q1, N_REFERENCES - Q1)) tell_finite(p);
 }

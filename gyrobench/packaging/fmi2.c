@@ -62,6 +62,7 @@ fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
     fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, Type out[]) {      \
         Instance *m = (Instance *)c;                                                                      \
         size_t i;                                                                                         \
+        if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                    \
         for (i = 0; i < n; i++) {                                                                         \
             double x = 0.0;                                                                               \
             if (get_value(m, vr[i], &x)) return fmi2Error;                                                \

@@ -81,6 +81,7 @@ static const char *const counts = "as many values as value references are expect
         Instance *m = (Instance *)c;                                                                                 \
         size_t i;                                                                                                    \
         if (n != n_out) return wrong(m, counts);                                                                     \
+        if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                               \
         for (i = 0; i < n; i++) {                                                                                    \
             double x = m->part.n.v.t;                                                                                \
             if (vr[i] != (unsigned)N_REFERENCES && get_value(m, vr[i], &x)) return fmi3Error;                        \

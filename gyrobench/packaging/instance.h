@@ -28,6 +28,7 @@ static Instance *new_instance(const char *name, Logger logger, void *environment
 
 static void reset(Instance *m) {
     m->part.n = m->fresh;
+    m->part.kept.settled = 0;
     m->part.failed = 0;
 }
 
@@ -57,8 +58,7 @@ static int missing(Instance *m, unsigned reference) {
 }
 
 static inline int in_range(unsigned reference, int first, int n) {
-    const int k = (int)reference;
-    return k >= first && k < first + n;
+    return reference - (unsigned)first < (unsigned)n; /* below the first it wraps round */
 }
 
 static inline int has(unsigned reference) { return in_range(reference, 0, N_REFERENCES); }
@@ -70,12 +70,15 @@ static int has_all(Instance *m, const unsigned references[], size_t n) {
     return 1;
 }
 
+/* To be called before values are read: outputs follow inputs that were set since the last step. */
+static void freshen(Instance *m, const unsigned references[], size_t n) {
+    size_t i;
+    for (i = 0; i < n; i++)
+        if (in_range(references[i], Y0, N_Y)) refresh(&m->part);
+}
+
 static inline int get_value(Instance *m, unsigned reference, double *x) {
-    if (in_range(reference, Y0, N_Y)) { /* an output */
-        if (m->part.n.dirty != 0.0) refresh(&m->part);
-    } else if (!has(reference)) {
-        return missing(m, reference);
-    }
+    if (!has(reference)) return missing(m, reference);
     *x = value(&m->part)[reference];
     return 0;
 }
@@ -129,6 +132,7 @@ static int get_state(Instance *m, void **state) {
 static int set_state(Instance *m, const void *state) {
     if (!state) return wrong(m, "no state is given");
     memcpy(&m->part.n, state, sizeof(Numbers));
+    m->part.kept.settled = 0;
     m->part.failed = 0;
     return 0;
 }

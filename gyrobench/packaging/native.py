@@ -6,7 +6,7 @@ import importlib.util
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.source import Source, member
+from gyrobench.packaging.source import Source, followed, member, written
 from gyrobench.packaging.translate import equations
 
 HERE = Path(__file__).parent
@@ -67,6 +67,13 @@ def c_source(cls: type[Component], guid: str) -> str:
     bounds = [b for s in checked for b in _bounds(s)]
     samples = len(layout)
     param = {s.name: s.reference for s in layout if s.section == "parameter"}
+    changing = written(source)
+    names_followed = followed(source)
+    follow = (
+        None
+        if names_followed is None
+        else [str(s.reference) for n in names_followed for s in layout if s.decl.name == n]
+    )
     ports = [f"{{{param[n.name]}, {samples + i}, {PER[n.per]}}}" for i, n in enumerate(cls.noises)]
     defines = {
         "MODEL_GUID": f'"{guid}"',
@@ -82,6 +89,10 @@ def c_source(cls: type[Component], guid: str) -> str:
         "N_Q": counts.get("discrete", 0),
         "N_PORTS": len(ports),
         "N_BOUNDS": len(bounds),
+        "Q1": min(
+            (s.reference for s in layout if s.section == "discrete" and s.decl.name in changing), default=len(layout)
+        ),
+        "N_FOLLOWED": -1 if follow is None else len(follow),
         "NONLINEAR": f"(p->n.v.{cls.nonlinear} != 0.0)" if isinstance(cls.nonlinear, str) else int(cls.nonlinear),
         "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
         "LARGEST_STEP(p, step)": "((p)->n.v.step)" if "step" in cls.declarations else "(step)",
@@ -98,6 +109,8 @@ def c_source(cls: type[Component], guid: str) -> str:
         "/* kind of bound: 0 >=, 1 <=, 2 >, 3 <.  per: 0 start, 1 internal step, 2 second */",
         _table("static const struct { int reference, kind; double limit; } bounds[]", bounds, "{-1, 0, 0.0}"),
         _table("static const struct { int parameter, sample, per; } ports[]", ports, "{0, 0, 0}"),
+        "/* what the outputs follow from, where that is inputs and discretes alone */",
+        _table("static const int followed[]", follow or [], "0"),
         '#include "core.h"',
         equations(source),
     ]
@@ -117,6 +130,6 @@ def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
     headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
     return {
         "model.c": c_source(cls, guid),
-        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "instance.h", f"fmi{fmi}.c")},
+        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "noise.h", "instance.h", f"fmi{fmi}.c")},
         **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
     }

@@ -9,16 +9,16 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from gyrobench.component import Component, Input, Output
+from gyrobench.component import Component, Discrete, Input, Output, State
 
 KEYWORDS = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
     "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
     "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
     # macros of the C library and of core.h
-    "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA",
+    "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA", "AHEAD",
     "MODEL_GUID", "N_REFERENCES", "U0", "Y0", "X0", "DX0", "Q0", "N_U", "N_Y", "N_X", "N_Q", "N_PORTS", "N_BOUNDS",
-    "NONLINEAR", "RK4_SUBSTEPS", "LARGEST_STEP",
+    "Q1", "N_FOLLOWED",    "NONLINEAR", "RK4_SUBSTEPS", "LARGEST_STEP",
 }  # fmt: skip
 MEMBERS = KEYWORDS | {"tick"}  # of struct Vars
 LOCALS = KEYWORDS | {"part", "self", "seed", "dual", "Vars", "Part", "plain", "fail", "at", "whole"}
@@ -134,3 +134,42 @@ def dependencies(source: Source, method: str = "outputs") -> dict[str, set[str]]
     """Output (declared name) -> the inputs it follows without delay."""
     reach = Dependencies(source, method).reach
     return {n: reach.get(f"self.{n}", set()) for n, d in source.cls.declarations.items() if isinstance(d, Output)}
+
+
+# ------------------------------------------------------------------------------- what changes, what follows
+def _members(source: Source, method: str, inside: frozenset[str] = frozenset()) -> set[str]:
+    """Every `X` of a `self.X` in a method and in the helpers that it calls."""
+    node = source.methods.get(method)
+    names = {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)} if node else set()
+    for h in names & (set(source.helpers) - inside):
+        names |= _members(source, h, inside | {method, h})
+    return names
+
+
+def written(source: Source) -> set[str]:
+    """The discretes that a sampled method writes; the others keep what ``start`` gave them."""
+    names: set[str] = set()
+    for tick, _ in source.cls.ticks:
+        for n in ast.walk(source.methods[tick]):
+            if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store):
+                names.add(n.attr)
+            elif isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store):
+                names |= {a.attr for a in ast.walk(n.value) if isinstance(a, ast.Attribute)}
+    return {n for n in names if isinstance(source.cls.declarations.get(n), Discrete)}
+
+
+def followed(source: Source) -> list[str] | None:
+    """The inputs and changing discretes that ``outputs`` reads, discretes first.  None where it reads states, noise or
+    time, with which it changes at every step, and where it is too short (no loop) to be worth looking.
+    """
+    read = _members(source, "outputs")
+    node = source.methods.get("outputs")
+    if node is None or not any(isinstance(n, ast.For) for n in ast.walk(node)):
+        return None
+    declared = source.cls.declarations
+    if read & {"t", "h", "der", "noise"} or any(isinstance(declared.get(n), State) for n in read):
+        return None
+    changing = written(source)
+    return [n for n in declared if n in read & changing] + [
+        n for n in declared if n in read and isinstance(declared[n], Input)
+    ]

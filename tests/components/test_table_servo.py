@@ -183,7 +183,7 @@ def test_kinematic_modes_are_those_of_table_rate():
         assert servo.rate == pytest.approx(plain.rate, abs=1e-16)
         assert servo.omega == pytest.approx(plain.omega, abs=1e-16)
         assert servo.alpha == pytest.approx(plain.alpha, abs=1e-16)
-        assert servo.f == plain.f
+        assert servo.f == pytest.approx(plain.f, abs=1e-14)
 
 
 def test_from_rate_to_servo_and_back_to_an_index():

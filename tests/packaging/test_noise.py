@@ -22,22 +22,30 @@ N = 20000
 
 @pytest.fixture(scope="module")
 def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    """normal() and the quantile of core.h, called directly."""
+    """The normal numbers and the quantile of noise.h, called directly."""
     folder = tmp_path_factory.mktemp("noise")
     for name, text in native.source_files(load_part("noisy", TOYS), "guid", 2).items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "ask.c").write_text(
         '#include "model.c"\n'
         '#define SEEN __attribute__((visibility("default")))\n'
-        "SEEN double ask_quantile(double p) { return normal_quantile(p); }\n"
-        "SEEN double ask_normal(uint64_t s, int port, uint64_t k) { return normal(key_of(s, port), k); }\n",
+        "SEEN double ask_quantile(double p) {\n"
+        "    const lanes q = {p - 0.5};\n"
+        "    const lanes x = quantile_middle(q);\n"
+        "    return in_middle(p - 0.5) ? ((const double *)&x)[0] : quantile_tail(p, p - 0.5);\n"
+        "}\n"
+        "SEEN double ask_normal(uint64_t s, int port, uint64_t k, int ahead) {\n"
+        "    double out[AHEAD];\n"
+        "    normals(key_of(s, port), k, out);\n"
+        "    return out[ahead];\n"
+        "}\n",
         encoding="utf-8",
     )
     compiler.compile_library(folder / "ask.c", folder / "ask.so", (folder,), compiler.this_platform())
     library = ctypes.CDLL(str(folder / "ask.so"))
     library.ask_quantile.restype = library.ask_normal.restype = ctypes.c_double
     library.ask_quantile.argtypes = [ctypes.c_double]
-    library.ask_normal.argtypes = [ctypes.c_uint64, ctypes.c_int, ctypes.c_uint64]
+    library.ask_normal.argtypes = [ctypes.c_uint64, ctypes.c_int, ctypes.c_uint64, ctypes.c_int]
     return library
 
 
@@ -56,7 +64,8 @@ def test_normal_is_the_same_in_c(in_c: ctypes.CDLL) -> None:
     for seed in (0, 1, 7, 2**31 - 1):
         for port in (0, 1, 5):
             for count in (0, 1, 2, 12345, 2**40):
-                assert in_c.ask_normal(seed, port, count) == normal(seed, port, count)
+                for ahead in range(64):
+                    assert in_c.ask_normal(seed, port, count, ahead) == normal(seed, port, count + ahead)
 
 
 @pytest.fixture(scope="module")

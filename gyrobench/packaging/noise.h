@@ -1,0 +1,114 @@
+/* The noise of a native component: counter-based, so that a number depends on seed, port and count alone.
+ *
+ * Included by core.h.  The numbers are those of gyrobench/numerics.py bit for bit; they are made AHEAD at a time,
+ * because the rare branch of the quantile would stop the processor at each one.
+ */
+static uint64_t mix(uint64_t z) { /* SplitMix64 output function */
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return z ^ (z >> 31);
+}
+
+static uint64_t key_of(uint64_t seed, int port) {
+    return mix(mix((seed + 1) * GAMMA) + (uint64_t)(port + 1) * GAMMA);
+}
+
+/* The normal quantile of p, Wichura, AS 241 (PPND16), for |q| <= 0.425 and beyond; q = p - 0.5. */
+#ifdef __GNUC__
+typedef double lanes __attribute__((vector_size(16))); /* two numbers at a time: the same operations on each */
+#else
+typedef double lanes;
+#endif
+enum { LANES = sizeof(lanes) / sizeof(double) };
+
+static inline lanes quantile_middle(lanes q) {
+    const lanes r = 0.180625 - q * q;
+    return (((((((2.5090809287301226727e+3 * r + 3.3430575583588128105e+4) * r + 6.7265770927008700853e+4) * r
+                + 4.5921953931549871457e+4) * r + 1.3731693765509461125e+4) * r + 1.9715909503065514427e+3) * r
+             + 1.3314166789178437745e+2) * r + 3.3871328727963666080e+0) * q
+         / (((((((5.2264952788528545610e+3 * r + 2.8729085735721942674e+4) * r + 3.9307895800092710610e+4) * r
+                + 2.1213794301586595867e+4) * r + 5.3941960214247511077e+3) * r + 6.8718700749205790830e+2) * r
+             + 4.2313330701600911252e+1) * r + 1.0);
+}
+
+static double quantile_tail(double p, double q) {
+    double r, x;
+    r = q <= 0.0 ? p : 1.0 - p;
+    r = sqrt(-log(r));
+    if (r <= 5.0) {
+        r = r - 1.6;
+        x = (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r + 2.41780725177450611770e-1) * r
+                + 1.27045825245236838258e+0) * r + 3.64784832476320460504e+0) * r + 5.76949722146069140550e+0) * r
+             + 4.63033784615654529590e+0) * r + 1.42343711074968357734e+0)
+          / (((((((1.05075007164441684324e-9 * r + 5.47593808499534494600e-4) * r + 1.51986665636164571966e-2) * r
+                + 1.48103976427480074590e-1) * r + 6.89767334985100004550e-1) * r + 1.67638483018380384940e+0) * r
+             + 2.05319162663775882187e+0) * r + 1.0);
+    } else {
+        r = r - 5.0;
+        x = (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r + 1.24266094738807843860e-3) * r
+                + 2.65321895265761230930e-2) * r + 2.96560571828504891230e-1) * r + 1.78482653991729133580e+0) * r
+             + 5.46378491116411436990e+0) * r + 6.65790464350110377720e+0)
+          / (((((((2.04426310338993978564e-15 * r + 1.42151175831644588870e-7) * r + 1.84631831751005468180e-5) * r
+                + 7.86869131145613259100e-4) * r + 1.48753612908506148525e-2) * r + 1.36929880922735805310e-1) * r
+             + 5.99832206555887937690e-1) * r + 1.0);
+    }
+    return q < 0.0 ? -x : x;
+}
+
+static inline int in_middle(double q) { return fabs(q) <= 0.425; }
+
+static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of count, count + 1, ... */
+    double p[AHEAD];
+    int rare[AHEAD], n = 0, i;
+    for (i = 0; i < AHEAD; i++) {
+        const uint64_t z = mix(key + (count + (uint64_t)i) * GAMMA);
+        p[i] = ((double)(int64_t)(z >> 11) + 0.5) * 0x1p-53;
+        rare[n] = i;
+        n += !in_middle(p[i] - 0.5);
+    }
+    for (i = 0; i < AHEAD; i += LANES) {
+        lanes q;
+        memcpy(&q, p + i, sizeof q);
+        q = quantile_middle(q - 0.5);
+        memcpy(out + i, &q, sizeof q);
+    }
+    for (i = 0; i < n; i++) out[rare[i]] = quantile_tail(p[rare[i]], p[rare[i]] - 0.5);
+}
+
+enum { ONCE, PER_STEP, PER_SECOND }; /* kinds of ports */
+
+static inline void draw(Part *p, int from, int to) { /* the samples of these kinds */
+#if N_PORTS > 0
+    double *a = value(p);
+    const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
+    int i;
+    if (!p->kept.keyed || p->kept.seed != p->n.v.seed) {
+        for (i = 0; i < N_PORTS; i++) {
+            p->kept.key[i] = key_of((uint64_t)p->n.v.seed, i);
+            p->kept.first[i] = (uint64_t)1 << 63; /* none made: far from every count */
+        }
+        p->kept.seed = p->n.v.seed;
+        p->kept.keyed = 1;
+    }
+    for (i = 0; i < N_PORTS; i++) {
+        double x = 0.0, size;
+        if (ports[i].per < from || ports[i].per > to) continue;
+        size = a[ports[i].parameter];
+        if (size != 0.0) {
+            if (count - p->kept.first[i] >= AHEAD) { /* unsigned: before the first too */
+                normals(p->kept.key[i], count, p->kept.ahead[i]);
+                p->kept.first[i] = count;
+            }
+            x = size * p->kept.ahead[i][count - p->kept.first[i]];
+            if (ports[i].per == PER_SECOND) x = x / p->kept.root;
+        }
+        a[ports[i].sample] = x;
+    }
+#else
+    (void)p;
+    (void)from;
+    (void)to;
+    (void)normals;
+    (void)key_of;
+#endif
+}
