@@ -1,0 +1,146 @@
+"""Record of the single-axis platform -> stiffness, margins, isolation, error in the ride, drift, estimator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gyrobench.reduction.estimation import Value, rms
+from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops import Gate, drift
+from gyrobench.reduction.recorded import number
+from gyrobench.reduction.result import Result
+from gyrobench.system.record import Record
+
+DPH = math.pi / 180.0 / 3600.0
+MRAD = 1e-3
+ANGLE, RATE = "platform.attitude", "platform.omega[1]"
+
+
+def jitter(y: np.ndarray, n: int) -> np.ndarray:
+    """y less its running mean over n samples, without the ends: the wander of the gyro is no error of the loop."""
+    slow = np.convolve(y, np.full(n, 1.0 / n), "valid")
+    first = (n - 1) // 2
+    return np.asarray(y[first : first + slow.size] - slow)
+
+
+def level(y: np.ndarray, stretches: int = 10) -> Value:
+    """Root mean square of a ride: a sine and noise.  u from the scatter of the mean squares of ten stretches."""
+    squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
+    whole = math.sqrt(float(np.mean(y * y)))
+    u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0
+    return Value(whole, u, stretches - 1)
+
+
+def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """Result of one run.  Raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    summary = _ride(found)
+    _steps(found)
+    found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
+    found.ratio(
+        "attitude over base angle", "motion", 1, ANGLE, "exciter.motion_angle[1]",
+        caption="Isolation: how much of the base's angle the platform takes over.",
+    )  # fmt: skip
+    _drift(found)
+    _saturated(found)
+    return found.result(
+        title="Stabilized platform on one axis",
+        method="Disturbance step, command step, sine sweeps, ride and drift of a loop with a floated gyro in rebalance",
+        sources=["PLATFORM-1AXIS, GYRO-REBALANCE; 001_5d74e91bb8fa76be.txt ch. 4.1, fig. 4.1.1 (rebuilt)"],
+        equation="J dot(omega) = k_t i_m + M_d - H (omega_O + dot(beta)), quad "
+        r'v = -G(s) (hat(i) + i_"test" - omega_c\/k)',
+        conventions=[
+            "Platform x is the gyro's input axis; angles and rates are positive about +x.",
+            "i is the torquer current of the gyro: k i = omega_IA - omega_d. The stabilizer carries the minus.",
+            "L is the loop opened at the input of the stabilizer: what comes back over what is put in, with minus.",
+        ],
+        summary=summary,
+        ranked_by="platform error",
+        specification=specification,
+    )
+
+
+def _ride(found: LoopFindings) -> list[str]:
+    """Platform error, the measure that ranks estimators and loops; what the estimator makes of its reading."""
+    ride = next((g for g in found.of("motion", shape="sine") if g.label == "ride"), None)
+    if ride is None:
+        return []
+    two = round(2.0 / ride.f / float(ride.t[1] - ride.t[0]))
+    error, rate = level(jitter(ride[ANGLE], two)), level(ride[RATE] - ride[RATE].mean())
+    meaning = "attitude in the ride, rms about its running mean over two periods"
+    found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
+    found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
+    k = number(found.record.meta, "k", "gyro.k")
+    if k is not None:
+        _estimator(found, ride, k)
+    return [
+        f"A base that swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz leaves {error.value / ARCSEC:.3g}″ "
+        f"rms on the platform, and {rate.value / MRAD:.3g} mrad/s."
+    ]
+
+
+def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:
+    """Its reading and its estimate against the true rate, in the ride; noise reduction and distortion together.
+
+    The closed loop leaves little of the rate, so gain and phase of the estimator are taken in the sines of the base.
+    """
+    truth = ride[RATE] / k
+    raw, left = rms(ride["rebalance.i_read"] - truth), rms(ride["estimator.estimate"] - truth)
+    latency = float(ride["estimator.latency"][-1])
+    unit = "mA"
+    found.measure("reading error", "reading less true rate over k, rms in the ride", unit, 1e3 * raw.value, 1e3 * raw.u)
+    found.measure("estimate error", "the same of the estimate", unit, 1e3 * left.value, 1e3 * left.u)
+    found.measure("latency", "delay that the estimator states", "ms", 1e3 * latency)
+    found.ratio(
+        "estimate over reading", "test", 1, "estimator.estimate", "rebalance.i_read",
+        caption="What the estimator does to the signal of the loop: gain and phase at the test sines.",
+    )  # fmt: skip
+
+
+def _steps(found: LoopFindings) -> None:
+    for gate in found.of("torque", shape="step"):
+        found.step(gate, ANGLE, scale=ARCSEC, unit="″", y_name="attitude")
+        rest = gate.rest(ANGLE)
+        y = gate[ANGLE] - (float(rest.mean()) if rest.size else 0.0)
+        peak = int(np.argmax(np.abs(y)))
+        noise = float(np.std(np.diff(y[-y.size // 10 :]))) / math.sqrt(2.0)
+        found.measure("peak", "largest attitude after the load step", "″", y[peak] / ARCSEC, noise / ARCSEC)
+        stiffness = abs(gate.amplitude / y[peak])
+        u = stiffness * noise / abs(y[peak])
+        found.measure("load/peak", "torque of the step over that attitude", "N·m/rad", stiffness, u)
+    for gate in found.of("command", shape="step"):
+        step = found.step(gate, RATE, scale=MRAD, unit="mrad/s", y_name="rate")
+        share, u = step.change / gate.amplitude, step.u_change / abs(gate.amplitude)
+        found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0)
+        found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u)
+        found.measure("settling", "time until the rate stays within 5 %", "s", step.settled_5, step.u_settled)
+
+
+def _drift(found: LoopFindings) -> None:
+    hold = found.of("hold")
+    if not hold:
+        return
+    gate = hold[-1]
+    got = drift(gate.t, gate[ANGLE])
+    found.allan = got.allan
+    meta = found.record.meta
+    parts = [number(meta, n, f"gyro.{n}") for n in ("D_F", "D_S", "D_SS")]
+    closed = None
+    if all(p is not None for p in parts):  # x level, z up: (X, Y, Z) = (0, 0, -1) at standard gravity
+        fixed, along, squared = (float(p or 0.0) for p in parts)
+        closed = (fixed - along + squared) / DPH
+    found.measure("drift", "of the platform about x", "°/h", got.rate / DPH, got.u / DPH, closed=closed)
+    if got.walk is not None:
+        found.measure("random walk", "of the attitude", "°/√h", *(math.degrees(w) * 60.0 for w in got.walk))
+
+
+def _saturated(found: LoopFindings) -> None:
+    for name, text in (("platform.saturated", "the motor"), ("rebalance.saturated", "the torquer of the gyro")):
+        labels = [g.label for g in found.gates if name in g.channels and np.any(g[name] > 0.5)]
+        if labels:
+            found.warnings.append(
+                f"At its limit was {text} in: {', '.join(labels)}. What was measured there is not linear."
+            )

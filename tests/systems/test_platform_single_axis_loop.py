@@ -1,0 +1,106 @@
+"""The single-axis platform in its loop: linear model, stiffness, drift, and estimators and loops swapped."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gyrobench.system.run import Session, run
+from gyrobench.system.system import load_system
+
+NAME = "platform_single_axis"
+DPH = math.pi / 180.0 / 3600.0
+QUIET = {"gyro.white": 0.0, "gyro.markov": 0.0, "gyro.pickoff": 0.0, "reading_noise": 0.0}
+SHORT = {"hold": 10.0}
+
+
+def reduced(parts=None, **values):
+    system = load_system(NAME)
+    record = run(system, parts, values={**SHORT, **values})
+    result = load_system(NAME).reduce(record)
+    return record, result, {c.name: c for c in result.coefficients}
+
+
+def rows(result, title):
+    table = next(t for t in result.tables if t["title"].startswith(title))
+    return [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return reduced(**QUIET)
+
+
+def test_margins_of_the_sweep_are_those_of_the_linear_parts(quiet):
+    """Within 1 dB and 3 degrees up to twice the crossover; without noise far closer, as the delays are in the model."""
+    _, result, found = quiet
+    (row,) = rows(result, "Linear models against")
+    assert row["gain / dB"] < 0.01 and row["phase / °"] < 0.1
+    assert found["f_c"].estimate == pytest.approx(10.0, rel=0.03)  # the gain is set for it; delays shift it
+    margins = rows(result, "Stability margins")
+    assert margins[0]["phase margin / °"] == pytest.approx(margins[1]["phase margin / °"], abs=0.3)
+    assert 55.0 < found["PM"].estimate < 70.0
+
+
+def test_drift_of_the_platform_is_that_of_its_gyro(quiet):
+    """x level, z up: (X, Y, Z) = (0, 0, -1), so omega_d = D_F - D_S + D_SS = -0.3 + 0.7 + 0.04 = 0.44 deg/h."""
+    _, _, found = quiet
+    assert found["drift"].closed == pytest.approx(0.44, rel=1e-9)
+    assert found["drift"].estimate == pytest.approx(0.44, abs=2e-3)  # the lag of 50 s still moves a little
+
+
+def test_commanded_rate_is_reached(quiet):
+    _, _, found = quiet
+    assert found["rate gain"].estimate == pytest.approx(1.0, abs=2e-3)
+    assert found["settling"].estimate < 0.3
+
+
+def test_isolation_is_that_of_the_friction_and_the_back_emf():
+    """The base drags by (viscous + k_e k_t / R) (omega_b - omega): without both it cannot."""
+    _, result, _ = reduced(**QUIET)
+    _, free, _ = reduced(**QUIET, **{"platform.viscous": 0.0, "platform.k_e": 0.0, "gyro.D_F": 0.0, "gyro.D_S": 0.0,
+                                     "gyro.D_SS": 0.0, "gyro.D_O": 0.0, "gyro.D_IS": 0.0, "gyro.D_OS": 0.0,
+                                     "gyro.D_I": 0.0, "gyro.D_IO": 0.0, "gyro.D_II": 0.0})  # fmt: skip
+    taken = next(r for r in result.responses if r.name.startswith("attitude over"))
+    left = next(r for r in free.responses if r.name.startswith("attitude over"))
+    assert np.max(left.y) < 1e-9 < 1e-4 < np.min(taken.y)
+
+
+def test_estimators_are_ranked_by_platform_error_not_by_smoothness():
+    """With the same noise: the moving average has the smoothest estimate and the worst margin of the three."""
+    found = {e: reduced({"estimator": f"estimator_{e}"}, hold=30.0, reading_noise=3e-4)[1:]
+             for e in ("none", "kalman_rate", "moving_average")}  # fmt: skip
+    value = {e: {c.name: c.estimate for c in r.coefficients} for e, (r, _) in found.items()}
+    assert all(r.ranked_by == "platform error" for r, _ in found.values())
+    assert value["moving_average"]["estimate error"] < value["kalman_rate"]["estimate error"]
+    assert value["kalman_rate"]["estimate error"] < 0.6 * value["none"]["estimate error"]
+    assert value["moving_average"]["PM"] < value["none"]["PM"] - 5.0
+    assert value["none"]["rate error"] < value["kalman_rate"]["rate error"] < value["moving_average"]["rate error"]
+
+
+@pytest.mark.parametrize("name", ["kalman_ar", "sage_husa", "wavelet", "alpha_beta_gamma"])
+def test_every_estimator_runs_in_the_loop(name):
+    values = {"estimator.phi[1]": 0.95, "estimator.phi[2]": 0.0, "estimator.phi[3]": 0.0} if name == "kalman_ar" else {}
+    _, _, found = reduced({"estimator": f"estimator_{name}"}, **values)
+    assert math.isfinite(found["platform error"].estimate)
+    if name in ("sage_husa", "alpha_beta_gamma"):  # wavelet and AR filter may spoil the loop: that is what one learns
+        assert found["platform error"].estimate < 10.0
+
+
+def test_servo_with_a_current_loop_swaps_and_isolates_better():
+    """The current loop holds the torque against the back EMF, which is what the base drags by."""
+    _, result, found = reduced({"stabilizer": "servo_three_loop"}, **QUIET)
+    _, _, plain = reduced(**QUIET)
+    assert found["platform error"].estimate < 0.3 * plain["platform error"].estimate
+    assert rows(result, "Linear models against")[0]["gain / dB"] < 0.05
+
+
+def test_halving_the_step_moves_the_margin_by_its_delay():
+    """The exchange delays by about a step: 360 f_c h = 1.8 degrees at 10 Hz and 0.5 ms, half of it at half the step."""
+    with Session(NAME) as session:
+        pm = []
+        for h in (5e-4, 2.5e-4, 1.25e-4):
+            result = load_system(NAME).reduce(session.run({**QUIET, **SHORT}, step=h))
+            pm.append(next(c.estimate for c in result.coefficients if c.name == "PM"))
+    first, second = pm[1] - pm[0], pm[2] - pm[1]
+    assert 0.0 < first < 3.6 and second == pytest.approx(first / 2.0, rel=0.2)
