@@ -240,8 +240,13 @@ def poles(model: Mapping[str, Any]) -> list[complex]:
 
 
 def unstable(model: Mapping[str, Any]) -> list[complex]:
-    """Poles in the right half plane, the fastest growing first; those nearer to 0 than 0.01 rad/s do not count."""
-    right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > SLOW and p.real > 1e-6 * abs(p)]
+    """Poles in the right half plane, the fastest growing first; those nearer to 0 than 0.01 rad/s do not count.
+
+    Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
+    at z = 1, by the third root of 1e-16.
+    """
+    slow = max(SLOW, 1e-5 / model["step"]) if model["step"] else SLOW
+    right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > slow and p.real > 1e-6 * abs(p)]
     return sorted(right, key=lambda p: -p.real)
 
 
