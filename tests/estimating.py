@@ -37,11 +37,10 @@ def play(
 ) -> Array:
     """Outputs after each reading: (n,) for one output, (n, m) for a list; T: communication step, s.
 
-    instance: of the part, to be used again after a reset.
+    instance: of the part, used and reset.
     """
     names = [outputs] if isinstance(outputs, str) else list(outputs)
     one = instance or make(part, "native")
-    one.reset()
     try:
         one.set(arrays(parameters))
         one.initialize(0.0)
@@ -53,6 +52,8 @@ def play(
     finally:
         if instance is None:
             one.free()
+        else:
+            one.reset()
     return found[:, 0] if isinstance(outputs, str) else found
 
 
