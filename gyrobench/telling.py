@@ -88,7 +88,8 @@ def system(found: Mapping[str, Any]) -> str:
         lines.append("  " + w["wire"] + "".join(marks))
     lines += ["", "loops are cut at"] * bool(found["cuts"]) + [f"  {c}" for c in found["cuts"]]
     if found["plan"]:
-        lines += ["", f"plan: {found['duration']:,.0f} s without the ways between the phases"]
+        ways = "" if "shape" in found["plan"][0] else " without the ways between the phases"
+        lines += ["", f"plan: {found['duration']:,.0f} s{ways}"]
         rows = [_phase(p) for p in found["plan"]]
         last = "dwell" if "shape" in found["plan"][0] else "window"
         lines += columns([["", "phase", "mode", "", "settle", last], *rows], {1, 2, 3}, "  ")

@@ -7,7 +7,7 @@ from gyrobench.math import clip
 class StabilizerPower(Component):
     """Correction motor of a power gyro stabilizer: precession angle in, torque out.  [STAB-POWER-2DOF]
 
-        e = u + test,     u = k_u b                      potentiometer on the precession axis
+        e = polarity u + test,     polarity u = k_u b     potentiometer on the precession axis
         v = -k_i e,       limited to +-v_max              amplifier
         M = ratio k_m v + M_load                          motor behind its reducer, on the stabilised axis
 
@@ -26,6 +26,7 @@ class StabilizerPower(Component):
     version = "1.0.0"
 
     k_u = Parameter(10.0, "V/rad", "potentiometer: voltage per precession angle (of the gyro's pickoff)", above=0.0)
+    polarity = Parameter(1, int, "1: u = +k_u b; -1: u = -k_u b, the pickoff of a gyro", min=-1, max=1)
     k_i = Parameter(10.0, "1", "amplifier: voltage per voltage", above=0.0)
     k_m = Parameter(0.01, "N.m/V", "motor: torque per voltage", above=0.0)
     ratio = Parameter(100.0, "1", "reducer: torque on the axis per torque of the motor", above=0.0)
@@ -37,12 +38,12 @@ class StabilizerPower(Component):
     C_y = Parameter(0.0, "N.m.s/rad", "gyro: damping about the precession axis", min=0.0)
     allow_unstable = Parameter(0, int, "1: a K_m beyond the Routh limit is allowed", min=0, max=1)
 
-    u = Input(0.0, "V", "potentiometer voltage k_u b")
+    u = Input(0.0, "V", "potentiometer voltage, +-k_u b")
     test = Input(0.0, "V", "test signal")
     M_load = Input(0.0, "N.m", "what else acts on the stabilised axis")
 
     v = Output("V", "voltage of the motor")
-    e = Output("V", "u + test")
+    e = Output("V", "polarity u + test")
     M = Output("N.m", "torque on the stabilised axis: motor and load")
     saturated = Output("1", "1 while the voltage is limited")
 
@@ -50,6 +51,7 @@ class StabilizerPower(Component):
     limit = Discrete(0.0, "N.m/rad", "its Routh limit")
 
     def start(self) -> None:
+        self.refuse(self.polarity == 0.0, "polarity must be 1 or -1")
         self.K_m = self.ratio * self.k_u * self.k_i * self.k_m
         if self.H_g > 0.0:
             self.limit = (self.C_x / self.J_x + self.C_y / self.J_y) * (self.H_g + self.C_x * self.C_y / self.H_g)
@@ -60,7 +62,7 @@ class StabilizerPower(Component):
             )
 
     def outputs(self) -> None:
-        self.e = self.u + self.test
+        self.e = self.polarity * self.u + self.test
         wish = -self.k_i * self.e
         self.v = clip(wish, -self.v_max, self.v_max)
         self.M = self.ratio * self.k_m * self.v + self.M_load

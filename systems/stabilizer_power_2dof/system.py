@@ -52,7 +52,6 @@ class StabilizerPower2dof(System):
         stabilizer.M -> gyro.M_x
         load.M[2] -> gyro.M_y
     """
-    factors = {"gyro.u_y -> stabilizer.u": -1.0}  # u_y is the case against the rotor, the potentiometer reads +k_u b
     loops = {"stabilizer": "stabilizer.u"}
     step = 1e-4
     channel_period = 1e-3
@@ -95,6 +94,7 @@ class StabilizerPower2dof(System):
             **{f"gyro.{k}": v for k, v in gyro.items()},
             **{f"stabilizer.{there}": gyro[here] for here, there in TOLD.items()},
             "gyro.stop": math.radians(5.0),
+            "stabilizer.polarity": -1,  # u_y is the case against the rotor, the potentiometer reads k_u b
             "stabilizer.k_i": K_I,
             "stabilizer.ratio": RATIO,
             "stabilizer.k_m": self["K_m"] / (k_u * K_I * RATIO),
@@ -103,8 +103,10 @@ class StabilizerPower2dof(System):
 
     def check(self) -> list[str]:
         """Refusals before the run; an unstable K_m is refused by the stabilizer."""
+        if self["K_m"] == 0.0:
+            return ["K_m = 0: without the correction motor nothing takes the load off the gyro; K_m must be > 0"]
         stop = math.radians(5.0)
-        lean = abs(self["load"]) / self["K_m"] if self["K_m"] > 0.0 else math.inf
+        lean = abs(self["load"]) / self["K_m"]
         if lean > 0.8 * stop:
             return [
                 f"load = {self['load']:g} N.m leans the gyro by load / K_m = {math.degrees(lean):.3g} deg; its stop is "

@@ -48,6 +48,16 @@ def test_power_stabilizer_is_a_spring_of_stiffness_k_m():
     assert part.get("saturated") == 0.0
 
 
+def test_polarity_turns_the_signal_and_nothing_else():
+    parts = [StabilizerPower(polarity=s) for s in (1, -1)]
+    for part, sign in zip(parts, (1.0, -1.0), strict=True):
+        part.u, part.test = sign * 0.1, 0.02
+        part.initialize()
+    assert parts[0].get("M") == parts[1].get("M") and parts[1].get("e") == pytest.approx(0.12)
+    with pytest.raises(PartError, match="polarity must be 1 or -1"):
+        StabilizerPower(polarity=0).initialize()
+
+
 def test_motor_limit():
     part = StabilizerPower(v_max=2.0)
     part.u = 1.0
