@@ -283,14 +283,14 @@ def reduce(
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
     """
-    from gyrobench import work
+    from gyrobench import records
 
     if template:
-        say(work.template(system).rstrip("\n"))
+        say(records.template(system).rstrip("\n"))
         return
     if not data:
         raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
-    judge(work.reduce(system, data, settings(values), spec, out, force, as_json), strict)
+    judge(records.reduce(system, data, settings(values), spec, out, force, as_json), strict)
 
 
 @app.command()
@@ -305,9 +305,9 @@ def report(
     \b
     Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
     """
-    from gyrobench import work
+    from gyrobench import records
 
-    judge(work.report(folder, spec, as_json), strict)
+    judge(records.report(folder, spec, as_json), strict)
 
 
 @app.command()

@@ -20,7 +20,9 @@ from typing import Any
 from gyrobench import telling
 from gyrobench.bench import Bench, UsageError, short
 from gyrobench.folders import beside, claim, labels, whole_record
+from gyrobench.records import again
 from gyrobench.reduction.result import Result
+from gyrobench.report import NAMES
 from gyrobench.system import checkpoint
 from gyrobench.system.record import RecordError
 from gyrobench.system.suite import Suite
@@ -102,19 +104,23 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
     for number, (name, system) in enumerate(members.items(), 1):
         there = folder / name
         about = f"{name} ({number} of {len(members)})"
-        if job.resume and not job.force and whole_record(there) and (there / "result.json").is_file():
+        ran = job.resume and not job.force and whole_record(there)
+        if ran and all((there / file).is_file() for file in NAMES.values()):
             note(f"{about}: kept as it is in {short(there)}")
             continue
         go_on = job.resume and any((f / checkpoint.FILE).is_file() for f in (there, beside(there)))
-        note(f"{about}: {'goes on' if go_on else 'runs'}")
+        note(f"{about}: {'is reduced again' if ran else 'goes on' if go_on else 'runs'}")
         try:
-            done = perform(replace(jobs[name], out=there, resume=go_on), system, step)
+            if ran:
+                done = again(there, system, None)
+            else:
+                done = perform(replace(jobs[name], out=there, resume=go_on), system, step)
         except Interrupted as error:
             raise Interrupted(f"{error}\nthe suite goes on with the same command and --resume") from None
         except Exception as error:
             if not ours(error):
                 raise
-            failed[name] = str(error).splitlines()[0]
+            failed[name] = " ".join(line.strip(" -") for line in str(error).splitlines()[:2])
             note(f"{about}: no result: {error}")
             continue
         if done.stopped:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gyrobench import telling
 from gyrobench.bench import Bench, UsageError, nearest, short
-from gyrobench.folders import claim, keep, labels, run_folder
+from gyrobench.folders import keep, labels, run_folder
 from gyrobench.progress import Meter
 from gyrobench.reduction.result import Result
-from gyrobench.system.record import Record, RecordError
+from gyrobench.system.record import Record
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System, load_system
 from gyrobench.system.values import ValueProblem, parse
@@ -284,85 +284,7 @@ def show_paths(paths: Mapping[str, Path], text: str | None) -> None:
         print(short(path), file=sys.stderr if text is None else sys.stdout)
 
 
-# ------------------------------------------------------------------------------- measured data, again
-def measuring(name: str) -> Any:
-    system = load(name)
-    if isinstance(system, Suite):
-        raise UsageError(f"{name} compares runs: reduce each record by its own test, then give it their folders")
-    if not hasattr(system, "measured"):
-        raise UsageError(f"{system.name} has no reduction of measured data")
-    return system
-
-
-def template(name: str) -> str:
-    """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
-    from gyrobench.system.laboratory import explained
-
-    return explained(str(measuring(name).template()))
-
-
-def reduce(
-    name: str,
-    data: Sequence[Path],
-    values: Mapping[str, str],
-    spec: str | None,
-    out: Path | None,
-    force: bool = False,
-    as_json: bool = False,
-) -> str:
-    """A laboratory's CSV to a report, or runs to that of a suite; returns the verdict."""
-    if isinstance(load(name), Suite):
-        from gyrobench import suites
-
-        return suites.reduce(load(name, values), data, spec, out, force, as_json)
-    system = measuring(name)
-    if len(data) > 1:
-        raise UsageError(f"{name} reduces one record at a time; --data was given {len(data)} times")
-    file = specification(spec)
-    limits = limits_of(file)
-    one = data[0]
-    text = one.read_bytes()
-    record = system.measured(one, values)
-    record.meta["data"] = {"file": one.name, "sha256": hashlib.sha256(text).hexdigest()}
-    result: Result = system.reduce(record, limits)
-    result.provenance = dict(record.meta)
-    identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
-    folder = out or Bench.find().out / name / f"measured-{identity}"
-    claim(folder, {"system": name, "data": {"file": one.name}}, force)
-    record.save(folder)
-    show_paths(publish(result, folder, record, file), None if as_json else telling.answer(result))
-    return result.verdict
-
-
-def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
-    """Reduces a saved record again and writes its report; returns the verdict.
-
-    Raises RecordError when the folder is no run, and WorkError naming what an incomplete record lacks.
-    """
-    if not (folder / "run.json").is_file():
-        raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
-    system = load(str(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("system")))
-    if isinstance(system, Suite):
-        from gyrobench import suites
-
-        return suites.report(folder, system, spec, as_json)
-    record = Record.load(folder)
-    file = specification(spec)
-    try:
-        result = reduced(system, record, limits_of(file))
-    except Exception as error:
-        if not ours(error) or record.complete:
-            raise
-        raise WorkError(
-            f"{folder}: the record is not complete, so there is no report\n{telling.lacking(record)}"
-        ) from None
-    old = folder / "result.json"
-    if old.exists():  # the step check is a run of its own and is kept
-        result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
-    show_paths(publish(result, folder, record, file), None if as_json else telling.answer(result))
-    return result.verdict
-
-
+# ------------------------------------------------------------------------------------------ side by side
 def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
     """Reports of several runs side by side; the first is the baseline."""
     from gyrobench import report as reports

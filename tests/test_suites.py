@@ -220,8 +220,11 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
     assert [m["label"] for m in found["suite"]["members"]] == ["tumble_single_axis", "servo_vertical_level"]
     assert found["suite"]["failed"][0]["label"] == "fixed_position"
     assert any(w.startswith("fixed_position gave no result") for w in found["warnings"])
+    assert "flagged" in found["suite"]["failed"][0]["reason"]
     assert Record.load(Path("s/fixed_position")).complete  # what it recorded is there
     assert "methods: " in out
+    code, _, err = gyrobench("run", NAME, *three, "--out", "s", "--resume")  # nothing runs again
+    assert code == 3 and "fixed_position (2 of 3): is reduced again" in err and err.count(": kept as it is") == 2
 
 
 # ------------------------------------------------------------------------------------------- refusals
