@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from .blocks import Picture, pictures
+from .blocks import Column, Fold, Picture, Row, Table, number_cell, pictures
 from .plots import finite, short
 from .style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 
@@ -21,7 +21,24 @@ def blocks(doc: Json) -> list[Any]:
         key = f"response-{k + 1}"
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
         found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
+        if r["kind"] != "step" and r["x"]:
+            found.append(Fold(f"Points of the {r['name']}", [_points(doc, k)]))
     return found
+
+
+def _points(doc: Json, k: int) -> Table:
+    """Frequency, gain, phase, uncertainty and coherence of every measured point."""
+    r = doc["responses"][k]
+    columns = {"x": (r["x_name"], r["x_unit"]), "y": (r["y_name"], r["y_unit"]), "phase": ("phase", "°")}
+    columns |= {"u": ("u, relative", ""), "coherence": ("coherence", "")}
+    shown = [name for name in columns if r[name]]
+    digits = {"x": 4, "u": 2, "coherence": 7}
+    rows = [
+        Row([number_cell(doc, ("responses", k, n, i), significant=digits.get(n, 6)) for n in shown])
+        for i in range(len(r["x"]))
+    ]
+    caption = f"Points of the {r['name']}. u: standard uncertainty of the gain, relative, and of the phase in radians."
+    return Table([Column(*columns[n]) for n in shown], rows, caption, small=True)
 
 
 def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
