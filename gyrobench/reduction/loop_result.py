@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,11 @@ from numpy.typing import NDArray
 
 from gyrobench.reduction import margins as m
 from gyrobench.reduction import recorded, uncertainty
-from gyrobench.reduction.loops import Gate, Point, Step, gates, response, step
+from gyrobench.reduction.loops import LAST, Drift, Gate, Point, Step, drift, gates, response, scatter, step
 from gyrobench.reduction.result import Coefficient, Response, Result
 
 Array = NDArray[np.float64]
-ARCSEC = math.pi / 648000.0
+ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
@@ -134,11 +135,11 @@ class LoopFindings:
              "rows": rows}
         )  # fmt: skip
         key = "" if loop == "stabilizer" else f" {loop}"
-        if shown.crossover is not None and shown.phase is not None:
-            u = _u_margin(points, shown)
+        values = m.measured_values(points)
+        if "phase" in values:
             closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
-            self.measure(f"f_c{key}", "crossover frequency", "Hz", shown.crossover, u[0], closed=closest[1])
-            self.measure(f"PM{key}", "phase margin", "°", shown.phase, u[1], closed=closest[2])
+            self.measure(f"f_c{key}", "crossover frequency", "Hz", *values["crossover"], closed=closest[1])
+            self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
         return points
 
     def _agreement(self, points: Sequence[Point], model: Any, found: m.Margins, label: str, up_to: float) -> None:
@@ -209,11 +210,13 @@ class LoopFindings:
     # ------------------------------------------------------------------ steps
     def step(
         self, gate: Gate, output: str, *, scale: float = 1.0, unit: str = "1", y_name: str = "",
-        plus: str | None = None, drift: float = 0.0,
+        plus: str | None = None, drift: float = 0.0, quiet: Gate | None = None,
     ) -> Step:  # fmt: skip
         """Measures of a step phase (SI) and its figure, with the response of the linear model over it.
 
-        drift: rate (SI per s) with which the output moves without the step too; it is taken off.
+        drift: rate (SI per s) with which the output moves without the step too; it is taken off.  quiet: a hold phase
+        several times as long, from whose noise the uncertainty of the change is taken; without, it is that of white
+        noise, too small where the noise is slow.
         """
         y, rest = gate[output], gate.rest(output)
         if plus:
@@ -221,6 +224,10 @@ class LoopFindings:
         before = gate.channels["time"][gate.before]
         y, rest = y - drift * (gate.t - gate.t[0]), rest - drift * (before - gate.t[0])
         found = step(gate.t, y, rest)
+        if quiet is not None:
+            at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
+            u = scatter(at_rest, rest.size, y.size, max(2, int(LAST * y.size)))
+            found = found if u is None else replace(found, u_change=u)
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
         curves = []
@@ -248,6 +255,25 @@ class LoopFindings:
                 curves=curves,
             )
         )
+        return found
+
+    # ------------------------------------------------------------------ drift
+    def drift(
+        self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
+    ) -> Drift:
+        """Drift and random walk of an angle in a hold phase, °/h and °/√h, and the Allan deviation of the report.
+
+        key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
+        """
+        found = drift(gate.t, gate[output])
+        scaled = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
+        self.allan = {**found.allan, **scaled, "unit": "°/h"} if found.allan else {}
+        true = None if truth is None else truth / DPH
+        self.measure(f"drift{key}", "of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true)
+        if found.walk is not None:
+            size, u = (math.degrees(w) * 60.0 for w in found.walk)
+            true = math.degrees(walk) * 60.0 if walk else None
+            self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
         return found
 
     def result(
@@ -349,20 +375,6 @@ def _simulated(model: Mapping[str, Any], gate: Gate, output: str) -> Array | Non
     _, y, *_ = dlsim((a, b, c, d, model["step"]), np.full((count, 1), gate.amplitude))
     at = np.minimum(np.round((gate.t - gate.t[0]) / model["step"]).astype(int), count - 1)
     return np.asarray(y[at, 0])
-
-
-def _u_margin(points: Sequence[Point], found: m.Margins) -> tuple[float, float]:
-    """Standard uncertainties of crossover (Hz) and phase margin (degrees) from those of the nearest points."""
-    u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / float(found.crossover or 1.0))))[:2])
-    near = m.grid(float(found.crossover or 1.0) * 0.99, float(found.crossover or 1.0) * 1.01, 3)
-    low, high = min(p.f for p in points), max(p.f for p in points)
-    near = np.clip(near, low, high)
-    gain = m.between(points, near)
-    span = math.log(near[-1] / near[0]) or 1.0
-    fall = math.log(abs(gain[-1]) / abs(gain[0])) / span  # d ln|L| / d ln f
-    turn = float(np.angle(gain[-1] / gain[0])) / span
-    u_f = u / abs(fall) if fall else 0.0
-    return float(found.crossover or 0.0) * u_f, math.degrees(math.hypot(u, turn * u_f))
 
 
 def _margin_note(meta: Mapping[str, Any]) -> str:

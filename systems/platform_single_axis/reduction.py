@@ -9,12 +9,11 @@ import numpy as np
 
 from gyrobench.reduction.estimation import Value, rms
 from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Gate, drift
+from gyrobench.reduction.loops import Gate
 from gyrobench.reduction.recorded import number
 from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record
 
-DPH = math.pi / 180.0 / 3600.0
 MRAD = 1e-3
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 
@@ -123,18 +122,13 @@ def _drift(found: LoopFindings) -> None:
     hold = found.of("hold")
     if not hold:
         return
-    gate = hold[-1]
-    got = drift(gate.t, gate[ANGLE])
-    found.allan = got.allan
-    meta = found.record.meta
-    parts = [number(meta, n, f"gyro.{n}") for n in ("D_F", "D_S", "D_SS")]
-    closed = None
-    if all(p is not None for p in parts):  # x level, z up: (X, Y, Z) = (0, 0, -1) at standard gravity
-        fixed, along, squared = (float(p or 0.0) for p in parts)
-        closed = (fixed - along + squared) / DPH
-    found.measure("drift", "of the platform about x", "°/h", got.rate / DPH, got.u / DPH, closed=closed)
-    if got.walk is not None:
-        found.measure("random walk", "of the attitude", "°/√h", *(math.degrees(w) * 60.0 for w in got.walk))
+    parameters = found.record.meta.get("parameters", {})
+    names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
+    truth = None
+    if all(n in parameters for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1) at standard gravity
+        fixed, along, squared = (float(parameters[n]) for n in names)
+        truth = fixed - along + squared
+    found.drift(hold[-1], ANGLE, truth=truth)
 
 
 def _saturated(found: LoopFindings) -> None:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gyrobench.reduction import margins
 from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Gate, Point, drift
+from gyrobench.reduction.loops import Drift, Gate, Point, drift
 from gyrobench.reduction.result import Result
 
 Specification = Mapping[str, tuple[float | None, float | None]]
@@ -74,9 +75,9 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     gyro = {n: float(p[f"gyro.{n}"]) for n in ("H", "J_x", "J_y", "C_x", "C_y")}
     K_m, H = k_m(p), gyro["H"]
     holds = found.of("hold")
-    own = drift(holds[0].t, holds[0]["gyro.alpha"]).rate if holds else 0.0
+    own = drift(holds[0].t, holds[0]["gyro.alpha"]) if holds else None
     for gate in found.of("torque", 1, "step"):
-        _load(found, gate, K_m, H, gyro["C_y"], own)
+        _load(found, gate, K_m, gyro, own, holds[0] if holds else None)
     points = found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     if points:
         _limits(found, points, K_m, gyro)
@@ -101,10 +102,15 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     return result
 
 
-def _load(found: LoopFindings, gate: Gate, K_m: float, H: float, C_y: float, own: float) -> None:
-    M = gate.amplitude
-    b = found.step(gate, "gyro.beta", scale=ARCSEC, unit="″", y_name="precession β")
-    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", drift=own)
+def _load(
+    found: LoopFindings, gate: Gate, K_m: float, gyro: Mapping[str, float], own: Drift | None, quiet: Gate | None
+) -> None:
+    """Lean and platform after the load step, the platform's own drift taken off with its uncertainty."""
+    M, H, C_y = gate.amplitude, gyro["H"], gyro["C_y"]
+    rate, u_rate = (own.rate, own.u) if own is not None else (0.0, 0.0)
+    b = found.step(gate, "gyro.beta", scale=ARCSEC, unit="″", y_name="precession β", quiet=quiet)
+    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", drift=rate, quiet=quiet)
+    a = replace(a, u_change=math.hypot(a.u_change, u_rate * float(gate.t[-1] - gate.t[0])))
     found.measure(
         "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
     )
@@ -134,23 +140,14 @@ def _inverse(M: float, change: float, u: float) -> tuple[float | None, float]:
 
 def _limits(found: LoopFindings, points: list[Point], K_m: float, gyro: Mapping[str, float]) -> None:
     """The phase of L passes -180 degrees at the undamped nutation frequency, where its gain tells the limit of K_m."""
-    shown = margins.measured_margins(points)
-    if shown.upper is None:
+    values = margins.measured_values(points)
+    if "upper" not in values:
         return
-    f = next(f for f, g in shown.gains if g == shown.upper)
-    u = max(q.u or 0.0 for q in sorted(points, key=lambda q: abs(q.f - f))[:2])
+    factor, u = values["upper"]
     limit = routh_limit(**gyro)
-    found.measure(
-        "K_m limit",
-        "K_m at which the loop is at its limit",
-        "N·m/rad",
-        K_m * shown.upper,
-        K_m * shown.upper * u,
-        closed=limit,
-    )
-    near = np.array([0.99 * f, 1.01 * f])
-    turn = abs(float(np.angle(np.divide(*margins.between(points, near)[::-1])))) / 0.02  # rad per relative frequency
-    found.measure("f_n", "undamped nutation frequency", "Hz", f, f * u / turn if turn else 0.0, closed=nutation(**gyro))
+    name = "K_m at which the loop is at its limit"
+    found.measure("K_m limit", name, "N·m/rad", K_m * factor, K_m * u, closed=limit)
+    found.measure("f_n", "undamped nutation frequency", "Hz", *values["f_upper"], closed=nutation(**gyro))
 
 
 def _friction(found: LoopFindings, points: list[Point]) -> None:
@@ -165,27 +162,23 @@ def _friction(found: LoopFindings, points: list[Point]) -> None:
         )
 
 
-def _servo(found: LoopFindings, gate: Gate, H: float, own: float) -> None:
+def _servo(found: LoopFindings, gate: Gate, H: float, own: Drift | None) -> None:
     """What the torque adds to the platform's own drift."""
     d = drift(gate.t, gate["gyro.alpha"])
-    rate, closed = (d.rate - own) / DPH, -gate.amplitude / H / DPH
-    found.measure("servo rate", "turned by M_y on the precession axis, −M_y/H", "°/h", rate, d.u / DPH, closed=closed)
+    rate, u = (d.rate - own.rate, math.hypot(d.u, own.u)) if own is not None else (d.rate, d.u)
+    closed = -gate.amplitude / H / DPH
+    found.measure(
+        "servo rate", "turned by M_y on the precession axis, −M_y/H", "°/h", rate / DPH, u / DPH, closed=closed
+    )
 
 
 def _drift(found: LoopFindings, gate: Gate) -> None:
     """Truth: the static drift of the gyro at rest, where f = (0, 0, g): X = Y = 0, Z = -1."""
-    d = drift(gate.t, gate["gyro.alpha"])
     p = found.record.meta["parameters"]
     truth = None
     if "gyro.Dx_zz" in p and not p.get("motion.preset"):
-        truth = (float(p["gyro.Dx_0"]) - float(p["gyro.Dx_z"]) + float(p["gyro.Dx_zz"])) / DPH
-    found.measure("drift", "of the platform at rest", "°/h", d.rate / DPH, d.u / DPH, truth=truth)
-    scale = {k: [v / DPH for v in d.allan[k]] for k in ("dev", "lo", "hi") if k in d.allan}
-    found.allan = {**d.allan, **scale, "unit": "°/h"} if d.allan else {}
-    if d.walk is not None:
-        walk, u = (math.degrees(w) * 60.0 for w in d.walk)
-        white = math.degrees(float(p.get("gyro.white_x", 0.0))) * 60.0
-        found.measure("N", "angle random walk", "°/√h", walk, u, truth=white or None)
+        truth = float(p["gyro.Dx_0"]) - float(p["gyro.Dx_z"]) + float(p["gyro.Dx_zz"])
+    found.drift(gate, "gyro.alpha", truth=truth, walk=float(p.get("gyro.white_x", 0.0)))
 
 
 def _summary(result: Result) -> list[str]:
