@@ -188,6 +188,6 @@ class PlatformThreeGimbal2dof(Component):
         self.f[Z] = fz
         c = fabs(cf) if self.mount == 0.0 else fabs(cr)
         self.condition = 1.0 / c if c > DET else 1.0 / DET
-        self.lock = self.near
+        self.lock = 1.0 if c < sin(pi / 36.0) else 0.0
         self.lock_time = self.since
         self.lock_angle = self.at_angle

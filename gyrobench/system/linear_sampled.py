@@ -101,6 +101,7 @@ def _differences(part: Component, inputs: list[str], outputs: list[str], step: f
         return [part.get(n) for n in names]
 
     def output() -> list[float]:
+        part.flow()  # an output may be a derivative
         return [part.get(n) for n in outputs]
 
     def matrix(columns: list[str], after: Callable[[], list[float]], move: bool, rows: int) -> Array:

@@ -1,0 +1,172 @@
+"""Record of the three-gimbal platform -> stiffness, margins, coupling, drift, and what the flight did to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gyrobench.reduction.gimbals import DEG, Flight, lock_table, over_time, spans
+from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops import cross_axis, drift, response
+from gyrobench.reduction.result import Result
+from gyrobench.system.record import Record
+
+DPH = math.pi / 180.0 / 3600.0
+AXES = ("pitch", "roll", "azimuth")
+COUPLING = 4.0  # Hz, where the coupling between the axes is shown
+DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z of the platform
+
+
+def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """Result of one run.  Raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    _loads(found)
+    for k, axis in enumerate(AXES, 1):
+        found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+    _coupling(found)
+    _command(found)
+    _drift(found)
+    summary = _flight(found)
+    return found.result(
+        title="Three-gimbal platform with two gyros",
+        method="Load steps, sine sweeps of the loops, commanded rate, drift hold, and a flight of the base",
+        sources=["PLATFORM-3GIMBAL-2DOF; 004_a44a05c7e88249d1.txt ch. 5.2.1 (no equations there; spec d4, 8)"],
+        equation="[bold(a)_o space bold(a)_m space bold(a)_i] (dot(o), dot(m), dot(i))^T = "
+        "T_1 bold(s) - bold(omega)_b, quad det = cos m, quad bold(u)_A = R(i) bold(u)",
+        conventions=[
+            "o, m, i: outer, middle and azimuth gimbal. Joint angles: pitch about x, roll about y, azimuth about z.",
+            "Platform error: size of the integral of the platform's rate in the flight, less its drift at rest.",
+            "Gimbal lock is told within 5° of m = 90°; the largest gimbal rate for a unit rate of the base is 1/cos m.",
+            "L: the loop opened at the input of a channel, the others closed; what comes back over what is put in.",
+        ],
+        summary=summary,
+        ranked_by="platform error",
+        specification=specification,
+    )  # fmt: skip
+
+
+def _loads(found: LoopFindings) -> None:
+    """The servo yields by M / (drag feedback) when the channel has no integral; drag and lag are the platform's."""
+    p = found.record.meta["parameters"]
+    drag, gain = p.get("platform.drag"), p.get("platform.rate_gain", 1.0)
+    feedback = float(p["gyro_a.K_sg_x"]) * float(p["pitch.K"]) * gain if "pitch.K" in p else None
+    for gate in found.of("torque", shape="step"):
+        axis = AXES[gate.axis - 1]
+        output = f"platform.theta[{gate.axis}]"
+        own = drift(found.of("hold")[0].t, found.of("hold")[0][output]).rate if found.of("hold") else 0.0
+        step = found.step(gate, output, scale=ARCSEC, unit="″", y_name=f"{axis} gimbal", drift=own)
+        closed = drag * feedback if drag and feedback and not p.get("pitch.integral") else None
+        if step.change and closed:
+            stiffness, u = gate.amplitude / step.change, abs(gate.amplitude / step.change**2) * step.u_change
+            meaning = "stiffness, torque over angle that it leaves"
+            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed)
+        found.measure(f"t_5 {axis}", "settling to 5 % after the load step", "s", step.settled_5, step.u_settled)
+
+
+def _coupling(found: LoopFindings) -> None:
+    points = {}
+    for k in (1, 2, 3):
+        for gate in found.of("test", k, "sine"):
+            if math.isclose(gate.f, COUPLING):
+                for j in (1, 2, 3):
+                    name = f"platform.theta[{j}]"
+                    points[(k, j)] = response(gate.t, gate[f"exciter.test[{k}]"], gate[name], gate.f).value
+    if points:
+        table = cross_axis(points, AXES, f"test signals at {COUPLING:g} Hz")
+        table["caption"] = "Gimbal angles of the axes, in percent of the excited one's"
+        found.tables.append(table)
+
+
+def _command(found: LoopFindings) -> None:
+    """Less the drift that the hold showed."""
+    holds = found.of("hold")[:1]
+    for gate in found.of("command", shape="step"):
+        own = drift(holds[0].t, holds[0][f"platform.attitude[{gate.axis}]"]).rate if holds else 0.0
+        late = gate.t > gate.t[0] + 0.3 * (gate.t[-1] - gate.t[0])
+        y = gate[f"platform.attitude[{gate.axis}]"][late]
+        got = drift(gate.t[late], y)
+        share, u = (got.rate - own) / gate.amplitude, got.u / abs(gate.amplitude)
+        truth = 1.0 + float(found.record.meta["options"].get("torquer", 0.0))
+        found.measure("rate gain", "rate of the platform over rate commanded", "1", share, u, truth=truth)
+
+
+def _drift(found: LoopFindings) -> None:
+    for gate in found.of("hold")[:1]:
+        for axis, k, name in zip("xyz", (1, 2, 3), DRIFTS, strict=True):
+            got = drift(gate.t, gate[f"platform.attitude[{k}]"])
+            truth = float(np.mean(gate[name])) / DPH if name in gate.channels else None
+            rate, u = got.rate / DPH, got.u / DPH
+            found.measure(f"drift {axis}", f"of the platform about {axis}", "°/h", rate, u, truth=truth)
+            if axis == "x":
+                found.allan = got.allan
+        scale = float(found.record.meta["parameters"].get("gyro_a.K_sg_y", 10.0))
+        apart = drift(gate.t, (gate["gyro_b.u_x"] - gate["gyro_a.u_y"]) / scale)
+        truth = float(np.mean(gate["gyro_a.drift_y"] - gate["gyro_b.drift_x"])) / DPH
+        meaning = "the fourth axis against the third, both about z: difference of two drifts"
+        found.measure("monitor", meaning, "°/h", apart.rate / DPH, apart.u / DPH, truth=truth)
+
+
+def _flight(found: LoopFindings) -> list[str]:
+    """What the flight did: errors, gimbal rates, lock."""
+    holds = found.of("hold")
+    legs = holds[1:]
+    if not legs:
+        return []
+    flight = Flight(legs, "platform.attitude", holds[0])
+    mount = int(found.record.meta["options"].get("mount", 1))
+    middle = flight[f"platform.theta[{2 if mount else 1}]"]
+    end, most = float(flight.error[-1]), float(flight.error.max())
+    found.measure("platform error", "largest in the flight, drift taken off", "°", most / DEG, flight.noise / DEG)
+    found.measure("error at the end", "of the flight", "°", end / DEG, flight.noise / DEG)
+    found.tables.append(_legs(flight, middle))
+    locked = spans(flight["platform.lock"])
+    found.tables.append(lock_table(flight, {"lock": flight["platform.lock"]}, middle, "middle gimbal"))
+    theta = {axis: flight[f"platform.theta[{k}]"] / DEG for k, axis in enumerate(AXES, 1)}
+    found.responses += [
+        over_time(
+            "platform error", flight.t, {"error": flight.error / DEG},
+            caption="Error of the platform in the flight: how far it has turned in space.",
+        ),
+        over_time("gimbal angles", flight.t, theta, y_name="joint angle", caption="Gimbal angles in the flight."),
+    ]  # fmt: skip
+    if any(np.any(flight[f"{g}.saturated"] > 0.5) for g in ("gyro_a", "gyro_b")):
+        found.warnings.append(
+            "A pickoff of the gyros was saturated in the flight: the platform has left them; they must be caged."
+        )
+    if not locked:
+        return [f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."]
+    a, b = locked[0]
+    when, angle = float(flight.t[a]), float(middle[a]) / DEG
+    text = f"Gimbal lock from t = {when:.4g} s (leg “{flight.leg_at(a)}”) at {angle:.4g}° of the middle gimbal"
+    if b < flight.t.size - 1:
+        text += f", to t = {flight.t[b]:.4g} s"
+    found.warnings.insert(0, f"{text}.")
+    return [f"{text}: the platform turned by {end / DEG:.5g}° and by {float(flight.error[a]) / DEG:.2g}° before it."]
+
+
+def _legs(flight: Flight, middle: np.ndarray) -> dict[str, object]:
+    rows = []
+    for gate in flight.gates:
+        s = flight.leg(gate)
+        base = np.linalg.norm([flight[f"motion.omega[{k}]"][s] for k in (1, 2, 3)], axis=0)
+        rings = np.max([np.abs(flight[f"platform.theta_dot[{k}]"][s]) for k in (1, 2, 3)], axis=0)
+        rows.append(
+            [
+                gate.label,
+                float(gate.t[-1] - gate.t[0]),
+                float(base.max()) / DEG,
+                float(rings.max()) / DEG,
+                1.0 / max(1e-3, float(np.min(np.abs(np.cos(middle[s]))))),
+                float(np.max(flight.error[s])) / DEG,
+                float(flight.error[s][-1]) / DEG,
+            ]
+        )
+    return {
+        "title": "Legs of the flight",
+        "caption": "1/cos m: gimbal rate for a unit rate of the base along the normal of the ring plane, at most 1000",
+        "columns": ["leg", "time / s", "base rate / (°/s)", "gimbal rate / (°/s)", "largest 1/cos m",
+                    "largest error / °", "at the end / °"],
+        "rows": rows,
+    }  # fmt: skip
