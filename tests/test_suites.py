@@ -62,7 +62,16 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A suite that ran: three tests, with a name for the signature."""
     folder = tmp_path_factory.mktemp("suite")
-    more = ["--set", "operator=A. B.", "--set", "instrument=gyro 17", "--set", "tumble_single_axis.u_scale_factor=1e-3"]
+    more = [
+        "--set",
+        "operator=A. B.",
+        "--set",
+        "instrument=gyro 17",
+        "--set",
+        "u_scale_factor=1e-3",
+        "--set",
+        "u_latitude=1arcsec",
+    ]
     made = subprocess.run(
         [sys.executable, "-m", "gyrobench.cli", "run", NAME, *words(*PLANS), *more, "--seed", "3", "--out", "s"],
         cwd=folder, capture_output=True, text=True, check=False, env=_env(),
@@ -153,8 +162,11 @@ def test_the_terminal_gives_the_answer(done: Path) -> None:
 
 
 def test_the_shared_scale_factor_is_named(done: Path) -> None:
+    """Two tests have a torquer in their loop; the latitude is a source of one alone."""
     found = result(done)["suite"]
     assert found["shared"] == ["torquer scale factor"]
+    drift = next(q for q in found["quantities"] if q["name"] == "ω_d")
+    assert [v["u_shared"] > 0.0 for v in drift["values"]] == [True, True, False]
 
 
 def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:

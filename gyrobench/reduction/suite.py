@@ -85,6 +85,7 @@ class Compare:
 
 def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Compare]:
     """Every quantity that the results report, by every one that sees it."""
+    shared = common(results, shared)
     noisy = {label: not combinations.ideal(r) for label, r in results.items()}
     out = []
     for q in combinations.quantities(results):
@@ -97,6 +98,12 @@ def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Comp
     for k, p in zip(tested, adjusted, strict=True):
         out[k] = Compare(out[k].quantity, out[k].values, out[k].found, p)
     return out
+
+
+def common(results: Mapping[str, Result], shared: Collection[str]) -> list[str]:
+    """Those of the sources ``shared`` that two results or more name."""
+    named = [{b["source"] for b in r.type_b} for r in results.values()]
+    return sorted(s for s in set(shared) if sum(s in sources for sources in named) > 1)
 
 
 def problems(results: Mapping[str, Result]) -> list[str]:
@@ -180,7 +187,7 @@ def together(
     )  # fmt: skip
     out.suite = {
         "rule": RULE,
-        "shared": sorted({b["source"] for r in results.values() for b in r.type_b} & set(shared)),
+        "shared": common(results, shared),
         "members": [_member(label, m) for label, m in members.items()],
         "failed": [{"label": n, "reason": why} for n, why in (failed or {}).items()],
         "quantities": [_row(c) for c in compared],

@@ -161,6 +161,7 @@ def test_a_quantity_from_several_estimates() -> None:
     a.correlation = [[1.0, -0.5], [-0.5, 1.0]]
     a.type_b = [{"source": "mount", "changes": [[0.1, -0.1], [0.2, 0.2]]}, {"source": "k", "changes": [[0.3, 0.1]]}]
     b = result({"ω_d": (1.6, 0.1)}, made_of={"ω_d": {"D_F": 1.0, "D_II": 1.0}})
+    b.type_b = [{"source": "k", "changes": [[0.2]]}]
     found = {c.quantity.name: c for c in compare({"a": a, "b": b}, ("k",))}
     assert set(found) == {"D_F", "D_II", "ω_d"} and len(found["D_F"].values) == 1
     v = found["ω_d"].values[0]
