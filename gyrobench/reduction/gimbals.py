@@ -83,8 +83,9 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
     rows = []
     for kind, flag in kinds.items():
         for a, b in spans(flag):
-            rows.append([kind, flight.leg_at(a), flight.t[a], flight.t[b], angle[a] / DEG, angle[b] / DEG,
-                         flight.error[a] / DEG, float(np.max(flight.error[a : b + 1])) / DEG])  # fmt: skip
+            numbers = [flight.t[a], flight.t[b], angle[a] / DEG, angle[b] / DEG, flight.error[a] / DEG]
+            worst = float(np.max(flight.error[a : b + 1])) / DEG
+            rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
     return {
         "title": "Gimbal lock",
         "caption": "When the gimbals were locked or too near to it, in time of the record",

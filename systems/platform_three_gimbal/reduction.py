@@ -110,7 +110,7 @@ def _drift(found: LoopFindings) -> None:
 
 def _flight(found: LoopFindings) -> list[str]:
     """What the flight did: errors, gimbal rates, lock."""
-    holds = found.of("hold")
+    holds = found.of("hold")  # the drift hold, and the legs
     legs = holds[1:]
     if not legs:
         return []

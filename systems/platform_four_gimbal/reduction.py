@@ -1,0 +1,152 @@
+"""Record of the four-gimbal platform -> loops, drift, and where the flight left its inner element and its rings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gyrobench.reduction.gimbals import DEG, Flight, lock_table, over_time, spans
+from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops import drift
+from gyrobench.reduction.result import Result
+from gyrobench.system.record import Record
+
+DPH = math.pi / 180.0 / 3600.0
+AXES = ("pitch", "roll", "azimuth")
+REST = "drift"  # label of the drift hold; the other phases without excitation are legs
+STEEP = math.sin(5.0 * DEG)  # |cos(pitch)| below which the fourth gimbal has no authority
+KEPT = 0.01  # deg: up to this the inner element counts as kept
+PITCH, INNER, AZIMUTH, OUTER = "platform.theta[1]", "platform.theta[2]", "platform.theta[3]", "platform.theta_4"
+
+
+def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """Result of one run.  Raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    holds = [g for g in found.of("hold") if g.label == REST]
+    legs = [g for g in found.of("hold") if g.label != REST]
+    summary = _flight(found, Flight(legs, "platform.attitude", holds[0] if holds else None)) if legs else []
+    _loads(found)
+    for k, axis in enumerate(AXES, 1):
+        found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+    for k, axis in enumerate("xyz", 1) if holds else ():
+        got = drift(holds[0].t, holds[0][f"platform.attitude[{k}]"])
+        found.measure(f"drift {axis}", f"of the platform about {axis}, at rest", "°/h", got.rate / DPH, got.u / DPH)
+    return found.result(
+        title="Four-gimbal platform",
+        method="Load steps and sine sweeps of the loops, drift hold, and a flight of the base",
+        sources=["PLATFORM-4GIMBAL; 004_a44a05c7e88249d1.txt ch. 5.2.2 (no equations there; spec d4, 9)"],
+        equation='dot(g)_4 = k G(g_3) g_2, quad G = sec g_3 \\, "sign" cos g_3 \\, 1, '
+        "quad dot(g)_2 = -dot(g)_4 cos g_3",
+        conventions=[
+            "Gimbals from outside: g4 outer roll about y, g3 pitch about x, g2 inner roll about y, g1 azimuth about z.",
+            "Platform error: size of the integral of the platform's rate in the flight, less its drift at rest.",
+            "The servo of the fourth gimbal nulls g2; within 5° of pitch 90° it has no authority (told as lock).",
+        ],
+        summary=summary,
+        ranked_by="platform error",
+        specification=specification,
+    )
+
+
+def _flight(found: LoopFindings, flight: Flight) -> list[str]:
+    error, travel = flight.error / DEG, float(np.ptp(flight[OUTER])) / DEG
+    g2 = np.abs(flight[INNER]) / DEG
+    u = flight.noise / DEG
+    found.measure("platform error", "largest in the flight, drift taken off", "°", float(error.max()), u)
+    found.measure("error at the end", "of the flight", "°", float(error[-1]), u)
+    found.measure("ring 4 travel", "largest less smallest angle of the fourth gimbal", "°", travel, u)
+    found.measure("g2 max", "largest inner roll", "°", float(g2.max()), u)
+    steep = np.abs(np.cos(flight[PITCH])) < STEEP
+    held = _held(flight)
+    kinds = {"fourth gimbal locked": held, "pitch within 5° of the vertical": steep & (held < 0.5)}
+    found.tables += [lock_table(flight, kinds, flight[PITCH], "pitch gimbal"), _legs(flight)]
+    rings = {"g4 outer roll": OUTER, "g3 pitch": PITCH, "g2 inner roll": INNER, "g1 azimuth": AZIMUTH}
+    found.responses += [
+        over_time("platform error", flight.t, {"error": error}, caption="Error of the inner element in the flight."),
+        over_time(
+            "ring angles", flight.t, {label: flight[name] / DEG for label, name in rings.items()},
+            y_name="ring angle", caption="Angles of the four gimbals in the flight.",
+        ),
+        over_time("inner roll", flight.t, {"g2": flight[INNER] / DEG}, y_name="inner roll g2",
+                  caption="The angle that the servo of the fourth gimbal keeps at zero."),
+    ]  # fmt: skip
+    if any(np.any(flight[f"{g}.saturated"] > 0.5) for g in ("gyro_a", "gyro_b")):
+        found.warnings.append("A pickoff of the gyros was saturated in the flight: the platform has left them.")
+    fast = max(float(np.abs(flight[f"platform.theta_dot[{k}]"]).max()) for k in (1, 2, 3))
+    fast = max(fast, float(np.abs(flight["platform.theta_4_dot"]).max()))
+    top = found.record.meta["parameters"].get("platform.rate_max")
+    if top and fast >= float(top) * (1.0 - 1e-9):
+        found.warnings.append(f"A gimbal was at its largest rate, {float(top) / DEG:.4g}°/s, in the flight.")
+    return _said(flight, error, travel, steep & (held < 0.5))
+
+
+def _held(flight: Flight) -> np.ndarray:
+    """1 while the fourth gimbal is locked: lock is told and its servo, which sees an inner roll, stands."""
+    stands = (flight["platform.theta_4_dot"] == 0.0) & (flight[INNER] != 0.0)
+    return np.asarray((flight["platform.lock"] > 0.5) & stands, float)
+
+
+def _said(flight: Flight, error: np.ndarray, travel: float, steep: np.ndarray) -> list[str]:
+    worst = int(np.argmax(error))
+    if error[worst] <= KEPT:
+        first = f"The inner element was kept within {error[worst]:.2g}° all through the flight."
+    else:
+        a, b = spans(error > KEPT)[0]
+        first = (
+            f"The inner element was not kept: from t = {flight.t[a]:.4g} s (leg “{flight.leg_at(a)}”, pitch gimbal "
+            f"{flight[PITCH][a] / DEG:.4g}°) its error is above {KEPT:g}°, at most {error[worst]:.3g}° at "
+            f"t = {flight.t[worst]:.4g} s"
+            + (f"; from {flight.t[b]:.4g} s on it is below again." if b < error.size - 1 else ".")
+        )
+    said = [first]
+    if travel > 150.0 and np.any(steep):
+        said.append(f"The fourth gimbal turned over: it travelled {travel:.4g}°.")
+    elif np.any(steep):
+        said.append(f"The fourth gimbal travelled {travel:.4g}° in a flight that passed the vertical.")
+    return said
+
+
+def _legs(flight: Flight) -> dict[str, object]:
+    rows = []
+    for gate in flight.gates:
+        s = flight.leg(gate)
+        base = np.linalg.norm([flight[f"motion.omega[{k}]"][s] for k in (1, 2, 3)], axis=0)
+        rows.append(
+            [
+                gate.label,
+                float(gate.t[-1] - gate.t[0]),
+                float(base.max()) / DEG,
+                float(np.ptp(flight[OUTER][s])) / DEG,
+                float(np.abs(flight[INNER][s]).max()) / DEG,
+                float(flight.error[s].max()) / DEG,
+                float(flight.error[s][-1]) / DEG,
+            ]
+        )
+    return {
+        "title": "Legs of the flight",
+        "caption": "What the rings did, and the error of the inner element",
+        "columns": ["leg", "time / s", "base rate / (°/s)", "ring 4 travel / °", "largest g2 / °",
+                    "largest error / °", "at the end / °"],
+        "rows": rows,
+    }  # fmt: skip
+
+
+def _loads(found: LoopFindings) -> None:
+    """The servo yields by M / (drag feedback), drag being the platform's; at rest motor and platform axes are the same."""
+    p = found.record.meta["parameters"]
+    feedback = found.record.meta["options"].get("feedback")
+    drag = p.get("platform.drag")
+    holds = [g for g in found.of("hold") if g.label == REST]
+    for gate in found.of("torque", shape="step"):
+        axis, output = AXES[gate.axis - 1], f"platform.attitude[{gate.axis}]"
+        own = drift(holds[0].t, holds[0][output]).rate if holds else 0.0
+        step = found.step(
+            gate, output, scale=ARCSEC, unit="″", y_name=f"platform about {'xyz'[gate.axis - 1]}", drift=own
+        )
+        if step.change:
+            stiffness, u = gate.amplitude / step.change, abs(gate.amplitude / step.change**2) * step.u_change
+            meaning = "stiffness, torque over angle that it leaves"
+            closed = drag * feedback if drag and feedback else None
+            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed)
