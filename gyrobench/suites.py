@@ -97,7 +97,10 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
     limits_of(spec)
     identity = _identity(job, suite, members, jobs, step)
     digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:8]
-    folder = claim(job.out or Bench.find().out / suite.name / digest, identity, job.force)
+    folder = job.out or Bench.find().out / suite.name / digest
+    if job.resume and not (folder / RUN).is_file():
+        raise UsageError(f"--resume: nothing to continue in {folder}: no suite with these tests, parts and values")
+    claim(folder, identity, job.force)
     meta = _meta(suite, identity)
     _write(folder, {**meta, "complete": False})
     failed: dict[str, str] = {}
