@@ -21,7 +21,7 @@ def blocks(doc: Json) -> list[Any]:
         key = f"response-{k + 1}"
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
         found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
-        if r["kind"] != "step" and r["x"]:
+        if r["kind"] not in ("step", "time") and r["x"]:
             found.append(Fold(f"Points of the {r['name']}", [_points(doc, k)]))
     return found
 

@@ -64,7 +64,10 @@ def _flight(found: LoopFindings, flight: Flight) -> list[str]:
     found.tables += [lock_table(flight, kinds, flight[PITCH], "pitch gimbal"), _legs(flight)]
     rings = {"g4 outer roll": OUTER, "g3 pitch": PITCH, "g2 inner roll": INNER, "g1 azimuth": AZIMUTH}
     found.responses += [
-        over_time("platform error", flight.t, {"error": error}, caption="Error of the inner element in the flight."),
+        over_time(
+            "platform error", flight.t, {"error": flight.error / ARCSEC}, unit="″",
+            caption="Error of the inner element in the flight.",
+        ),
         over_time(
             "ring angles", flight.t, {label: flight[name] / DEG for label, name in rings.items()},
             y_name="ring angle", caption="Angles of the four gimbals in the flight.",
@@ -134,7 +137,7 @@ def _legs(flight: Flight) -> dict[str, object]:
 
 
 def _loads(found: LoopFindings) -> None:
-    """The servo yields by M / (drag feedback), drag being the platform's; at rest motor and platform axes are the same."""
+    """The servo yields by M / (drag feedback), drag being the platform's; at rest both have the same axes."""
     p = found.record.meta["parameters"]
     feedback = found.record.meta["options"].get("feedback")
     drag = p.get("platform.drag")
