@@ -20,7 +20,7 @@ from .windows import Track
 
 Array = NDArray[np.float64]
 SMALL = 1e-5  # rad, size of the perturbations
-SIZES = ("u_axis", "u_square", "u_mount", "u_angle1", "u_angle2", "u_time")
+SIZES = ("u_axis", "u_square", "u_mount", "u_angle1", "u_angle2", "u_wobble", "u_time")
 AXES = ("outer", "inner")
 
 
@@ -68,6 +68,12 @@ def effects(
             Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder")
             for k, name in enumerate(AXES)
         ]
+    for k, name in enumerate(AXES):
+        both = [replace(seen, wobble=(SMALL * (k == 0), SMALL * (k == 1), p)) for p in (0.0, np.pi / 2.0)]
+        change = -np.array([moved(one) for one in both])
+        out.append(
+            Effect(f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase")
+        )
     slow = replace(seen, rate=(1.0 - SMALL) * seen.rate)
     return [*out, Effect("time base", sizes["u_time"], "1", moved(slow), "relative")]
 

@@ -23,7 +23,7 @@ Rates = Callable[[Array], tuple[float, float]]
 DPH = units.factor("deg/h")
 WARN, MOST, MOST_SINGLE = 100.0, 1e3, 1e4  # of the condition; a single mount is warned of, not refused (spec d1, 5.6)
 TILTED = math.cos(math.radians(30.0))  # least cosine of the gyro's x and y axes to those of the plate
-STEP_MAX = 2e-3  # s
+STEP_MAX = 1e-3  # s, the largest internal step of table_servo
 
 
 def designs(mounts: Sequence[int], latitude: float, time: float, terms: int, earth_rate: float) -> dict[str, Array]:

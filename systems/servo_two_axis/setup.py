@@ -26,6 +26,8 @@ FACE = "gyro x, y, z along X, Y, Z at 0, 0"
 NEXT = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 #: what a servo table is told of a free rotor, which neither lags nor pulls at the table: H/C = 1, hardly any inertia
 FREE = {"H_g": 1e-6, "C_g": 1e-6, "J_g": 1e-12, "network": 1}
+#: rad/s (8 Hz): brushes hold the turning table M / (J capture_rate2) from null, and must let it within capture_angle
+CAPTURE = 50.0
 
 COUPLING = Socket(
     "AxisCoupling",
@@ -39,17 +41,34 @@ COUPLING = Socket(
         Connector("in_position", "output", "1", "1 when both axes are in position", whole=True),
     ),
 )
+WOBBLE = Socket(
+    "AxisWobble",
+    "wobble of a table axis: what the table's base feels",
+    (
+        Connector("angle", "input", "rad", "table angle"),
+        Connector("f_base", "input", "m/s2", "specific force along the axes of what carries the table", (3,)),
+        Connector("omega_base", "input", "rad/s", "inertial rate along them", (3,)),
+        Connector("f", "output", "m/s2", "specific force along the axes that wobble", (3,)),
+        Connector("omega", "output", "rad/s", "inertial rate along them", (3,)),
+    ),
+)
 # the torquer about y precesses the rotor about x: the cage of u_x feeds i_y
 WIRES = """
     site.f -> stand.f_face
     site.omega -> stand.omega_face
     sequencer.phase -> stand.mount
-    stand.f -> outer.f_local
-    stand.omega -> outer.omega_local
+    outer.angle -> wobble_x.angle
+    stand.f -> wobble_x.f_base
+    stand.omega -> wobble_x.omega_base
+    wobble_x.f -> outer.f_local
+    wobble_x.omega -> outer.omega_local
     sequencer.mode -> outer.mode
     sequencer.target -> outer.target
-    outer.f -> inner.f_local
-    outer.omega -> inner.omega_local
+    inner.angle -> wobble_y.angle
+    outer.f -> wobble_y.f_base
+    outer.omega -> wobble_y.omega_base
+    wobble_y.f -> inner.f_local
+    wobble_y.omega -> inner.omega_local
     sequencer.mode -> inner.mode
     sequencer.target -> inner.target
     sequencer.face -> inner.face
@@ -110,7 +129,7 @@ def parameters(system: System, mounts: Sequence[int]) -> dict[str, Any]:
     placed = {
         f"stand.mounts[{2 * k + i},{j + 1}]": MOUNTS[m][j] for k, m in enumerate(mounts) for i in (1, 2) for j in (0, 1)
     }
-    table = {**FREE, "base": NEXT, "index_rate": servo.INDEX_RATE}
+    table = {**FREE, "base": NEXT, "index_rate": servo.INDEX_RATE, "capture_rate": CAPTURE}
     gains = {
         f"{slot}.K_g": system.overrides[name]
         for slot, name in (("outer", "gyro.K_sg_x"), ("inner", "gyro.K_sg_y"))
@@ -126,4 +145,6 @@ def parameters(system: System, mounts: Sequence[int]) -> dict[str, Any]:
         "stand.base": np.eye(3),
         **{f"{slot}.{n}": value for slot in ("outer", "inner") for n, value in table.items()},
         **gains,
+        "wobble_x.axis": 1,  # X of X, Y, Z
+        "wobble_y.axis": 1,  # Y of Y, Z, X
     }

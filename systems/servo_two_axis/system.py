@@ -35,7 +35,9 @@ class ServoTwoAxis(System):
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
         "stand": Slot(servo.STAND, "fixture"),
+        "wobble_x": Slot(setup.WOBBLE, "axis_wobble"),
         "outer": Slot(servo.SERVO_TABLE, "table_servo"),
+        "wobble_y": Slot(setup.WOBBLE, "axis_wobble"),
         "inner": Slot(servo.SERVO_TABLE, "table_servo"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "coupling": Slot(setup.COUPLING, "axis_coupling"),
@@ -60,6 +62,7 @@ class ServoTwoAxis(System):
         "u_mount": Option(0.0, "rad", "standard uncertainty of the gyro axes against the plate", 0.0),
         "u_angle1": Option(0.0, "rad", "angle error once a turn of either axis, std. unc. of its amplitude", 0.0),
         "u_angle2": Option(0.0, "rad", "angle error twice a turn of either axis, std. unc. of its amplitude", 0.0),
+        "u_wobble": Option(0.0, "rad", "wobble of either axis twice a turn, std. unc. of its amplitude", 0.0),
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
     noises = setup.NOISES

@@ -32,6 +32,7 @@ ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")
 class Track:
     """Angles and rates of both axes at the nodes (n, nodes, 2), rad and rad/s, rows X, Y, Z of the mount of each window
     in ENU (n, 3, 3), times (n,) s.  body: gyro axes in those of the plate.  square: the inner axis turned about Z.
+    wobble: amplitudes of the outer and the inner axis, twice a turn, and their phase.
     """
 
     angle: Array
@@ -41,24 +42,38 @@ class Track:
     t_end: Array
     body: Array | None = None
     square: float = 0.0
+    wobble: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def axes(self) -> Array:
-        """Gyro axes x, y, z (rows) in those of the mount (n, nodes, 3, 3)."""
+    def turns(self) -> list[tuple[Array, Array]]:
+        """From the mount to the gyro: passive rotations (..., 3, 3) in turn and the rate (..., 3) each adds."""
         x, y = self.angle[..., 0], self.angle[..., 1]
-        A = geometry.attitude(x, y)
+        zero, e = np.zeros_like(x), np.eye(3)
+        outer, inner = (self.rate[..., k, None] * e[k] for k in (0, 1))
+        steps = [(geometry.attitude(x, zero), outer), (geometry.attitude(zero, y), inner)]
         if self.square:
-            A = geometry.attitude(0.0 * x, y) @ frames.passive_z(self.square) @ geometry.attitude(x, 0.0 * y)
-        return A if self.body is None else np.asarray(self.body @ A)
+            steps.insert(1, (frames.passive_z(self.square), np.zeros(3)))
+        if any(self.wobble):
+            steps.insert(0, self._wobble(0))
+            steps.insert(-1, self._wobble(1))
+        return steps if self.body is None else [*steps, (self.body, np.zeros(3))]
+
+    def _wobble(self, axis: int) -> tuple[Array, Array]:
+        """Of the outer (0) or inner (1) axis, to first order: as the part axis_wobble, order 2."""
+        size, phase = self.wobble[axis], self.wobble[2]
+        a = 2.0 * self.angle[..., axis] + phase
+        turned = np.zeros((*a.shape, 3))
+        turned[..., (axis + 1) % 3], turned[..., (axis + 2) % 3] = size * np.cos(a), size * np.sin(a)
+        rate = np.zeros_like(turned)
+        rate[..., (axis + 1) % 3], rate[..., (axis + 2) % 3] = -size * np.sin(a), size * np.cos(a)
+        cross = np.cross(turned[..., None, :], np.eye(3))  # rows: turned x e_k, so that [turned x] is its transpose
+        return np.eye(3) - np.swapaxes(cross, -1, -2), 2.0 * self.rate[..., axis, None] * rate
 
     def inertial(self, site: Site) -> Array:
         """Means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
-        earth = self.base @ frames.earth_rate_local(site.latitude, site.earth_rate)
-        A = self.axes()
-        inner = np.eye(3) if self.body is None else self.body
-        moved = A @ earth[:, None, :, None]
-        x_axis = A[..., :, 0]  # the outer axis X in gyro axes
-        total = moved[..., 0] + self.rate[..., 0, None] * x_axis + self.rate[..., 1, None] * inner[:, 1]
-        return average(total)
+        w = (self.base @ frames.earth_rate_local(site.latitude, site.earth_rate))[:, None, :]
+        for R, rate in self.turns():
+            w = (R @ w[..., None])[..., 0] + rate
+        return average(w)
 
     def middle(self) -> tuple[Array, Array, Array, Array]:
         """Outer and inner angle and their rates at the middle of each window, (n,) each."""
@@ -68,9 +83,10 @@ class Track:
 
     def force(self, site: Site) -> Array:
         """-f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
-        down = self.base @ np.array([0.0, 0.0, -site.g])
-        out: Array = (self.axes() @ down[:, None, :, None])[..., 0]
-        return out
+        g = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
+        for R, _ in self.turns():
+            g = (R @ g[..., None])[..., 0]
+        return g
 
     def design(self, site: Site, names: tuple[str, ...]) -> Array:
         """Means (n, p) of the regressors ``names`` of a channel."""

@@ -124,6 +124,8 @@ def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[An
         ({"outer.tilt[2]": 1.0}, "u_axis", "table set up, about Z", None),
         # the inner axis tilted about its table's first axis Z, out of the right angle with X
         ({"inner.tilt[1]": 1.0}, "u_square", "right angle", 0),
+        ({"wobble_x.amplitude": 1.0}, "u_wobble", "wobble of the outer", 0),
+        ({"wobble_y.amplitude": 1.0, "wobble_y.phase": math.pi / 2}, "u_wobble", "wobble of the inner", 1),
     ],
 )
 def test_table_effects_as_predicted(
@@ -237,6 +239,17 @@ def test_run_ends_before_gimbal_lock(table: Session) -> None:
     """The stop of the part: mount 2 goes to 45.75 degrees, cosine 0.698."""
     with pytest.raises(RunError, match=r"gimbal lock: inner angle -?0\.6"):
         table.run({**day(500.0), **QUIET, "coupling.least": 0.8})
+
+
+def test_brushes_are_overcome(table: Session) -> None:
+    """Friction of 1400 g.cm on both axes, the base turning: capture comes near enough to null, M / (J w2) = 4.4 arcsec,
+    and the fine loop then holds it to M / K_T, 0.09 arcsec, far within the 2 arcsec of the book.
+    """
+    brushes = {f"{slot}.friction": 0.137 for slot in BOTH}
+    w = table.run({**day(500.0), **QUIET, **brushes}).windows
+    servo = np.isin(w["phase"], [2, 4])
+    for a in "xy":
+        assert np.max(np.abs(w[f"mean_{a}"][servo])) / 10.0 < 0.15 * ARCSEC
 
 
 def test_refused_records(quiet: Any) -> None:
