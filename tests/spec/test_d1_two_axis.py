@@ -231,8 +231,8 @@ def test_d_oo_folds() -> None:
 
 @pytest.mark.parametrize(("axis", "which"), [(0, "input"), (1, "output"), (2, "spin")])
 def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
-    """Turned by 20 arcsec against the plate: estimates change by what the budget names, sign apart (with noise, or the
-    noise model would be one of the tilt itself; what the tilt still does to it is a few percent of the largest change).
+    """Turned by 20 arcsec against the plate: estimates change by what the budget names, sign apart (with noise, and
+    more of it than tilt, or the noise model would be one of the tilt itself).
     """
     truth, size = random_truth(12), math.radians(20.0 / 3600.0)
     s = T.setup(truth=truth, u_mount=size)
@@ -240,14 +240,14 @@ def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
     found = []
     for rotation in (None, turned):
         rng = np.random.default_rng(4)
-        w = T.record(s, truth, noise=lambda rng=rng: rng.normal() * 0.003 * DPH, turned=rotation)
+        w = T.record(s, truth, noise=lambda rng=rng: rng.normal() * 0.01 * DPH, turned=rotation)
         found.append(T.reduction.reduce(w, s))
     noisy, tilted = found
     shift = {c.name: d.estimate - c.estimate for c, d in zip(noisy.coefficients, tilted.coefficients, strict=True)}
     lines = {b.coefficient: b.contribution for b in noisy.budget if f"its {which} axis" in b.source}
     assert lines and max(lines.values()) > 1e-5
     for name, value in lines.items():
-        assert abs(shift[name]) == pytest.approx(value, rel=0.1, abs=0.05 * max(lines.values())), name
+        assert abs(shift[name]) == pytest.approx(value, rel=0.1, abs=0.03 * max(lines.values())), name
 
 
 # ------------------------------------------------------------------------------------------ refusals
