@@ -266,7 +266,7 @@ class LoopFindings:
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """
         found = drift(gate.t, gate[output])
-        scaled = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
+        scaled: dict[str, Any] = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
         self.allan = {**found.allan, **scaled, "unit": "°/h"} if found.allan else {}
         true = None if truth is None else truth / DPH
         self.measure(f"drift{key}", "of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true)

@@ -221,6 +221,23 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
     )
 
 
+def scatter(y: Array, before: int, gap: int, after: int) -> float | None:
+    """Standard deviation that a change between two means has where nothing is excited.
+
+    y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``
+    samples that end ``gap`` samples later; it is taken from every piece of the record without overlap, so noise of any
+    colour is in it.  None for fewer than 5 pieces.
+    """
+    span = before + gap
+    starts = range(0, y.size - span + 1, max(span, 1))
+    if len(starts) < 5:
+        return None
+    line = y - np.polyval(np.polyfit(np.arange(y.size), y, 1), np.arange(y.size))
+    ends = [line[k + span - after : k + span].mean() for k in starts]
+    begins = [line[k : k + before].mean() if before else line[k] for k in starts]
+    return float(np.std(np.array(ends) - np.array(begins), ddof=1))
+
+
 # ------------------------------------------------------------------------------------------- drift
 @dataclass(frozen=True)
 class Drift:

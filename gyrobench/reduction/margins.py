@@ -128,17 +128,19 @@ def margins(f: Array, gain: Complex) -> Margins:
     )
 
 
-def between(points: Sequence[Point], f: Array) -> Complex:
+def between(points: Sequence[Point], f: Array, spline: bool = False) -> Complex:
     """Measured points interpolated in log gain and unwrapped phase over log frequency, monotone between points.
 
-    Consecutive points must not turn by more than 180 degrees; f must lie inside their range.
+    Consecutive points must not turn by more than 180 degrees; f must lie inside their range.  spline: by a cubic spline
+    instead, which is smoother and may overshoot.
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
     known = sorted(points, key=lambda p: p.f)
     x = np.log([p.f for p in known])
-    size = PchipInterpolator(x, np.log([abs(p.value) for p in known]))(np.log(f))
-    turn = PchipInterpolator(x, np.unwrap(np.angle([p.value for p in known])))(np.log(f))
+    curve = CubicSpline if spline else PchipInterpolator
+    size = curve(x, np.log([abs(p.value) for p in known]))(np.log(f))
+    turn = curve(x, np.unwrap(np.angle([p.value for p in known])))(np.log(f))
     return np.asarray(np.exp(size + 1j * turn))
 
 
@@ -148,6 +150,46 @@ def measured_margins(points: Sequence[Point]) -> Margins:
         return Margins()
     f = grid(min(p.f for p in points), max(p.f for p in points))
     return margins(f, between(points, f))
+
+
+def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
+    """What measured points say of the loop's limits: name -> (value, standard uncertainty).
+
+    crossover (Hz) and phase (degrees) of the smallest phase margin; upper and f_upper, lower and f_lower: the factors
+    on the gain to the next limits, and their frequencies (Hz).  Missing where the range of the points has none.  The
+    uncertainty holds that of the nearest points and the difference of two interpolations between them.
+    """
+    if len(points) < 4:
+        return {}
+    f = grid(min(p.f for p in points), max(p.f for p in points))
+    shown, other = margins(f, between(points, f)), margins(f, between(points, f, spline=True))
+    found: dict[str, tuple[float, float]] = {}
+    if shown.crossovers:
+        cross, phase = min(shown.crossovers, key=lambda c: abs(c[1]))
+        u, fall, turn = _around(points, cross)
+        twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
+        u_f = u / abs(fall) if fall else 0.0
+        found["crossover"] = cross, math.hypot(cross * u_f, twin[0] - cross)
+        found["phase"] = phase, math.hypot(math.degrees(math.hypot(u, turn * u_f)), twin[1] - phase)
+    for name, factor in (("upper", shown.upper), ("lower", shown.lower)):
+        if factor is None:
+            continue
+        at = next(x for x, g in shown.gains if g == factor)
+        u, fall, turn = _around(points, at)
+        same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
+        u_f = u / abs(turn) if turn else 0.0
+        found[name] = factor, math.hypot(factor * math.hypot(u, fall * u_f), same[1] - factor)
+        found[f"f_{name}"] = at, math.hypot(at * u_f, same[0] - at)
+    return found
+
+
+def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:
+    """Relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
+    u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / f)))[:2])
+    near = np.clip([0.99 * f, 1.01 * f], min(p.f for p in points), max(p.f for p in points))
+    gain = between(points, near)
+    span = math.log(near[1] / near[0])
+    return u, math.log(abs(gain[1]) / abs(gain[0])) / span, float(np.angle(gain[1] / gain[0])) / span
 
 
 def deviation(points: Sequence[Point], model: Complex, up_to: float) -> tuple[float, float]:

@@ -76,7 +76,7 @@ class StabilizerPower2dof(System):
         settle = 1.5  # s: the slowest pole of the default loop, -9.1 1/s, leaves exp(-7) in the second half
         return LoopPlan(
             [
-                LoopPhase("load step", "torque", "step", 1, self["load"], settle=0.5, dwell=1.5),
+                LoopPhase("load step", "torque", "step", 1, self["load"], settle=settle, dwell=3.0),
                 LoopPhase("servo torque", "torque", "constant", 2, self["servo"], settle=2 * settle, dwell=3.0),
                 *sweep("loop", "test", TEST, self["test"], settle=2 * settle),
                 *sweep("base", "motion", MOTION, lambda f: self["base"] / max(1.0, f), settle=2 * settle, periods=3),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.reduction.checks import ReductionError
-from gyrobench.reduction.loops import cross_axis, drift, gates, phasor, response, step
+from gyrobench.reduction.loops import cross_axis, drift, gates, phasor, response, scatter, step
 
 DT = 1e-3
 
@@ -102,6 +102,18 @@ def test_uncertainty_of_a_change() -> None:
     found = [step(t, 1 + 0.1 * rng.standard_normal(1000), 0.1 * rng.standard_normal(400)) for _ in range(400)]
     assert np.std([s.change for s in found]) == pytest.approx(0.1 * math.sqrt(1 / 100 + 1 / 400), rel=0.1)
     assert np.mean([s.u_change for s in found]) == pytest.approx(0.1 * math.sqrt(1 / 100 + 1 / 400), rel=0.03)
+
+
+def test_scatter_of_a_change_knows_slow_noise() -> None:
+    """A random walk of step s: over a gap of n samples between two short means a change has s sqrt(n) = 0.01 sqrt(200),
+    less a third of each mean's length: n - (before + after) / 3 ... by hand 200 - 20/3 - 10/3 = 190, to 10 % over 400
+    records; white noise of 0.1: 0.1 sqrt(1/20 + 1/10)."""
+    rng = np.random.default_rng(9)
+    walks = [scatter(np.cumsum(0.01 * rng.standard_normal(8000)), 20, 190, 10) for _ in range(100)]
+    assert np.sqrt(np.mean(np.square(walks))) == pytest.approx(0.01 * math.sqrt(210 - 40 / 3 - 20 / 3), rel=0.1)
+    white = [scatter(0.1 * rng.standard_normal(8000), 20, 190, 10) for _ in range(50)]
+    assert np.mean(white) == pytest.approx(0.1 * math.sqrt(1 / 20 + 1 / 10), rel=0.05)
+    assert scatter(np.zeros(500), 20, 190, 10) is None  # two pieces say nothing
 
 
 # ------------------------------------------------------------------------------------------- drift

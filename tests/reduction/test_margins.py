@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from gyrobench.reduction.loops import Point
-from gyrobench.reduction.margins import between, deviation, excited, grid, margins, measured_margins, model_response
+from gyrobench.reduction.margins import (
+    between,
+    deviation,
+    excited,
+    grid,
+    margins,
+    measured_margins,
+    measured_values,
+    model_response,
+)
 
 
 def test_integrator_with_a_lag() -> None:
@@ -66,6 +75,29 @@ def test_margins_from_sparse_points() -> None:
     assert measured_margins(points[:3]).crossovers == []
     at = np.array([p.f for p in points])
     np.testing.assert_allclose(between(points, at), [p.value for p in points], rtol=1e-9)
+
+
+def test_uncertainty_of_measured_margins_covers_interpolation_and_noise() -> None:
+    """12 points over two decades, each wrong by 0.3 % in both parts: of 200 draws the true crossover 15.92 Hz, phase
+    margin 52.3 degrees and lower limit 0.044 lie inside 2 u in nine of ten cases or more, u staying below 1 % and 1
+    degree."""
+    loop, rng = leadlag(), np.random.default_rng(4)
+    dense = grid(0.02, 300.0)
+    true = margins(dense, np.array([complex(loop(2j * np.pi * x)) for x in dense]))
+    truth = {"crossover": true.crossover, "phase": true.phase, "lower": true.lower}
+    inside = dict.fromkeys(truth, 0)
+    for _ in range(200):
+        noise = 1 + 3e-3 * (rng.standard_normal(12) + 1j * rng.standard_normal(12))
+        points = [
+            Point(x, complex(loop(2j * np.pi * x)) * n, 3e-3, 1.0)
+            for x, n in zip(np.geomspace(0.5, 50.0, 12), noise, strict=True)
+        ]
+        for name, (value, u) in measured_values(points).items():
+            if name in inside:
+                inside[name] += abs(value - truth[name]) < 2.0 * u
+                assert u < {"crossover": 0.16, "phase": 1.5, "lower": 0.004}[name]
+    assert all(n >= 180 for n in inside.values()), inside
+    assert measured_values([]) == {}
 
 
 def test_deviation() -> None:

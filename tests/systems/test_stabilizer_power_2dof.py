@@ -6,6 +6,7 @@ import importlib
 import logging
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -202,6 +203,21 @@ def test_measures_of_the_whole_run(whole: Any) -> None:
         worst = np.max(np.abs(np.array(r.curves[0]["y"]) - np.array(r.y)))
         assert worst < 1e-3 * np.ptp(r.y)
     assert not result.warnings
+
+
+def test_intervals_cover() -> None:
+    """60 runs with the gyro's noise: K_m, platform angle and drift lie inside their 95 % intervals; of 60 the binomial
+    law leaves less than 50 one time in a thousand.  Before and after the step the loop has come to rest."""
+    step, hold = replace(STEP, settle=1.5, dwell=3.0), LoopPhase("drift", settle=3.0, dwell=30.0)
+    truth = {"K_m": 100.0, "α*": 2e-3 * 648000 / math.pi, "drift": 0.44}
+    inside = dict.fromkeys(truth, 0)
+    with session(step, hold) as s:
+        for seed in range(60):
+            found = {c.name: c for c in R.from_record(s.run({}, seed=seed + 1)).coefficients}
+            for name, value in truth.items():
+                low, high = found[name].interval
+                inside[name] += low <= value <= high
+    assert all(n >= 50 for n in inside.values()), inside
 
 
 def test_isolation_by_hand(whole: Any) -> None:
