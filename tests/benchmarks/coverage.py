@@ -143,6 +143,11 @@ def of_encoder(n: Noise, values: Values) -> Values:
     return {**of_gyro(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
 
 
+def of_two_encoders(n: Noise, values: Values) -> Values:
+    quantum = n.error(0.02 * DPH) * math.sqrt(12.0)
+    return {**of_two_channels(n, values), "outer.quantum": quantum, "inner.quantum": quantum}
+
+
 def of_pickoff(dwell: float, size: float) -> Callable[[Noise, Values], Values]:
     """Errors of the voltage readings are white noise over the dwell; H = C in the standard gyro."""
 
@@ -210,6 +215,12 @@ CASES = {
         {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "time": 172.4, "window": 4.8, "dwell": 48.0,
          "settle": 2.0},
         floated, latitude(12.0, 78.0), of_encoder,
+    ),
+    "servo_two_axis": Case(
+        "servo_two_axis",
+        {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage_x.i_max": 10.0, "cage_y.i_max": 10.0, "time": 172.8,
+         "window": 2.4, "settle": 2.0},
+        two_channels, latitude(30.0, 68.0), of_two_encoders,
     ),
     "pickoff_scale_factor": Case(
         "pickoff_scale_factor", {}, lambda rng: {**floated(rng), "gyro.K_sg": rng.uniform(8.0, 10.0)},

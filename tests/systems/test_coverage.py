@@ -61,17 +61,34 @@ def acceleration(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generato
     return {"mean": w["mean"] + sampler(rng, n, 2e-4)(w["t_start"], w["t_end"]) / p["accelerometer.scale"]}
 
 
-def angle(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
-    """Rates add up to angles from stretch to stretch of the windows; neighbours share a reading and its error."""
+def walk(w: dict[str, Array], rng: np.random.Generator, n: Any, along: Any = 1.0) -> tuple[Array, Array]:
+    """Rates, times ``along``, add up to angles from stretch to stretch of the windows; neighbours share a reading and
+    its error.  Readings at both ends of the windows, less the true angles.
+    """
     t0, t1 = w["t_start"], w["t_end"]
-    way = sampler(rng, n, SIZE)(t0, t1) * (t1 - t0)
+    way = sampler(rng, n, SIZE)(t0, t1) * (t1 - t0) * along
     start, end, true = np.empty_like(t0), np.empty_like(t0), 0.0
     for j in range(t0.size):
         new = j == 0 or t0[j] - t1[j - 1] > 1e-6
         start[j] = n.error(SIZE) * rng.standard_normal() if new else end[j - 1]
         true = 0.0 if new else true + way[j - 1]
         end[j] = true + way[j] + n.error(SIZE) * rng.standard_normal()
+    return start, end
+
+
+def angle(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    start, end = walk(w, rng, n)
     return {"angle_start": w["angle_start"] + start, "angle_end": w["angle_end"] + end}
+
+
+def angles(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
+    """Of two axes: the outer one turns the gyro about x by the cosine of the inner angle."""
+    found = {}
+    secant = 1.0 / np.cos((w["inner_start"] + w["inner_end"]) / 2.0)
+    for axis, along in (("outer", secant), ("inner", 1.0)):
+        start, end = walk(w, rng, n, along)
+        found |= {f"{axis}_start": w[f"{axis}_start"] + start, f"{axis}_end": w[f"{axis}_end"] + end}
+    return found
 
 
 def voltage(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n: Any) -> dict[str, Array]:
@@ -94,6 +111,7 @@ READ: dict[str, tuple[Any, int]] = {  # what is read, runs
     "accelerometer_multipoint, 12": (acceleration, 200),
     "servo_vertical_level": (angle, 140),
     "servo_polar": (angle, 120),
+    "servo_two_axis": (angles, 90),
     "pickoff_scale_factor": (voltage, 350),
     "torquer_scale_factor": (angle, 330),
 }
