@@ -131,6 +131,34 @@ def tumble(quick: bool) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+PLATFORM = """
+import sys, time
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.run import Session
+with Session("platform_three_axis", engine=sys.argv[1]) as s:
+    type(s.system).plan = lambda self: LoopPlan([LoopPhase("hold", dwell=float(sys.argv[2]))])
+    began, wall = time.process_time(), time.perf_counter()
+    record = s.run({"motion.preset": 2})
+    print(time.process_time() - began, time.perf_counter() - wall, record.meta["steps"])
+"""
+
+
+def platform(quick: bool) -> None:
+    """The three-axis platform in a seaway, against the same FMUs stepped by a loop on FMPy's API in Python."""
+    print("\nThree-axis platform, three gyros, T2, three loops (11 FMUs), 0.1 ms, noise on")
+
+    def cost(engine: str, seconds: float) -> tuple[float, float, float]:
+        command = [sys.executable, "-c", PLATFORM, engine, str(seconds)]
+        found = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        return float(found[0]), float(found[1]), float(found[2])
+
+    cpu, wall, steps = cost("native", 60.0 if quick else 600.0)
+    other, _, few = cost("reference", 1.0)
+    ratio = f"{other / few / (cpu / steps):.0f} x slower by FMPy's API"
+    row(f"{60 if quick else 600} s of platform, wall time", f"{wall:.1f} s", "6 s" if quick else "60 s")
+    row("  a step, CPU time", f"{1e6 * cpu / steps:.2f} us", "", ratio)
+
+
 def builds() -> None:
     """Cold and warm build of all native FMUs, and the light commands."""
     print("\nBuild and commands")
@@ -162,6 +190,7 @@ def main() -> None:
     print(", ".join(f"{p} {found.get(p, '-')}" for p in packages), f"on {os.cpu_count()} cores")
     masters(quick)
     tumble(quick)
+    platform(quick)
     builds()
 
 

@@ -1,0 +1,158 @@
+"""Record of the three-axis platform -> margins, stiffness, coupling of the axes, isolation, drift."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gyrobench import drift as static
+from gyrobench.frames import G0
+from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops import Point, cross_axis, response
+from gyrobench.reduction.result import Result
+from gyrobench.system.record import Record
+
+AXES = ("pitch", "roll", "azimuth")
+XYZ = "xyz"
+ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
+
+
+def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+    """Result of one run.  Raises ReductionError for a record without a whole phase."""
+    found = LoopFindings(record)
+    summary = [_coupling(found), _isolation(found)]
+    _loads(found)
+    for k, axis in enumerate(AXES, 1):
+        found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+    _drift(found)
+    _limits(found)
+    return found.result(
+        title="Three-axis stabilized platform",
+        method="Load steps, commanded sines, sines of the base, test sines of each axis and drift of a platform of "
+        "three gimbals",
+        sources=[
+            "PLATFORM-3AXIS-DYN, PLATFORM-3AXIS-KIN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; 001_5d74e91bb8fa76be.txt "
+            "ch. 5, eq. 5.1.1-5.2.8 (corrected)"
+        ],
+        equation="M(q) dot.double(q) + b = M_m, quad u_A = T_2 u, quad T_2 = T_1^(-1)",
+        conventions=[
+            "Motor axes: pitch about x of the roll gimbal, roll about y of the base, azimuth about z of the pitch one.",
+            "Platform axes x, y, z belong to the inner element; commands and attitudes are along them.",
+            "Loop gains are those of one axis with the two others closed.",
+        ],
+        summary=[s for s in summary if s],
+        specification=specification,
+    )
+
+
+def _norm(points: list[Point]) -> tuple[float, float]:
+    """Root of the sum of squares of the gains, and its standard uncertainty."""
+    size = math.sqrt(sum(abs(p.value) ** 2 for p in points))
+    return size, math.sqrt(sum((abs(p.value) ** 2 * (p.u or 0.0)) ** 2 for p in points)) / size if size else 0.0
+
+
+def _coupling(found: LoopFindings) -> str:
+    """Cross over main angle of a commanded sine: [F15] of the bench with 83 mil."""
+    points, worst = {}, 0.0
+    gates = found.of("command", shape="sine")
+    for gate in gates:
+        main = gate[ANGLES[gate.axis - 1]]
+        there = {j: response(gate.t, main, gate[name], gate.f) for j, name in enumerate(ANGLES, 1)}
+        points |= {(gate.axis, j): p.value for j, p in there.items()}
+        cross, u = _norm([p for j, p in there.items() if j != gate.axis])
+        worst = max(worst, cross)
+        name = XYZ[gate.axis - 1]
+        meaning = f"other axes over {name}, commanded sine of {gate.f:g} Hz"
+        found.measure(f"cross {name}", meaning, "%", 100.0 * cross, 100.0 * u)
+        rate = response(gate.t, gate[f"exciter.command[{gate.axis}]"], main, gate.f)
+        reached = abs(rate.value) * 2.0 * math.pi * gate.f
+        meaning = "amplitude of the angle reached over that commanded"
+        found.measure(f"reached {name}", meaning, "1", reached, reached * (rate.u or 0.0))
+    if not gates:
+        return ""
+    table = cross_axis(points, tuple(XYZ), f"commanded sines of {gates[0].f:g} Hz")
+    table["caption"] = "Angle about each platform axis over that about the commanded one"
+    found.tables.append(table)
+    return f"A commanded sine moves the other axes by at most {100.0 * worst:.2g} % of its own angle."
+
+
+def _isolation(found: LoopFindings) -> str:
+    """What the platform takes over of the base: the whole angle, not only that about the base's axis."""
+    worst = 0.0
+    for gate in found.of("motion", shape="sine"):
+        base = gate[f"motion.angle[{gate.axis}]"]
+        taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
+        worst = max(worst, taken)
+        meaning = f"platform over base, base about {XYZ[gate.axis - 1]} at {gate.f:g} Hz"
+        if taken:
+            size = 20.0 * math.log10(taken)
+            found.measure(f"isolation {XYZ[gate.axis - 1]}", meaning, "dB", size, 20.0 / math.log(10.0) * u / taken)
+    return f"Of a swinging base it takes over at most {20.0 * math.log10(worst):.1f} dB." if worst else ""
+
+
+def _loads(found: LoopFindings) -> None:
+    for gate in found.of("torque", shape="step"):
+        rest = [gate.rest(name) for name in ANGLES]
+        moved = np.array([gate[n] - (float(r.mean()) if r.size else 0.0) for n, r in zip(ANGLES, rest, strict=True)])
+        angle = np.linalg.norm(moved, axis=0)
+        peak = float(angle.max())
+        u = float(np.std(np.diff(moved[:, -angle.size // 10 :]))) / math.sqrt(2.0)
+        axis = AXES[gate.axis - 1]
+        found.measure(
+            f"peak {axis}",
+            f"largest attitude after {gate.amplitude:g} N·m about {axis}",
+            "″",
+            peak / ARCSEC,
+            u / ARCSEC,
+        )
+        if peak:
+            found.measure(
+                f"load/peak {axis}",
+                "torque over that attitude",
+                "N·m/rad",
+                gate.amplitude / peak,
+                gate.amplitude * u / peak**2,
+            )
+        main = int(np.argmax(np.abs(moved).max(axis=1)))
+        found.step(gate, ANGLES[main], scale=ARCSEC, unit="″", y_name=f"attitude about {XYZ[main]}")
+
+
+def _drift(found: LoopFindings) -> None:
+    """Each axis turns with the drift of its gyro, for the specific force that the element sees at rest."""
+    for gate in found.of("hold"):
+        up = _up([gate.channels[f"platform.theta[{k}]"][0] for k in (1, 2, 3)])
+        parameters = found.record.meta.get("parameters", {})
+        for name, axis in zip(ANGLES, XYZ, strict=True):
+            truth, slot = None, f"gyro_{axis}"
+            named = {n: parameters.get(f"{slot}.{n}") for n in static.NAMES}
+            mount, gravity = parameters.get(f"{slot}.mount"), parameters.get("motion.gravity")
+            if mount is not None and gravity is not None and all(v is not None for v in named.values()):
+                xyz = -np.asarray(mount, float) @ up * float(gravity) / G0
+                truth = float(static.drift(xyz, {n: float(v) for n, v in named.items() if v is not None}))
+            found.drift(gate, name, key=f" {axis}", truth=truth)
+
+
+def _up(q: Any) -> Any:
+    """Up in platform axes for these joint angles (pitch, roll, azimuth), base level: third column of C_b^a."""
+    f, r, a = (float(x) for x in q)
+    x, y, z = -math.sin(r), math.sin(f) * math.cos(r), math.cos(f) * math.cos(r)
+    return np.array([math.cos(a) * x + math.sin(a) * y, -math.sin(a) * x + math.cos(a) * y, z])
+
+
+def _limits(found: LoopFindings) -> None:
+    for name, text in (
+        ("platform.saturated", "A motor was at its limit"),
+        ("decoupler.saturated", "The secant of the decoupler was at its limit"),
+        ("platform.lock", "The gimbals were near their lock"),
+    ):
+        if name not in found.gates[0].channels:
+            continue
+        values = found.gates[0].channels[name]
+        if np.any(values > 0.5):
+            first = int(np.argmax(values > 0.5))
+            time = found.gates[0].channels["time"][first]
+            pitch = math.degrees(found.gates[0].channels["platform.theta[1]"][first])
+            found.warnings.append(f"{text}, first at t = {time:.4g} s, pitch {pitch:.3g}°.")
