@@ -19,6 +19,7 @@ from gyrobench.reduction.result import Result
 
 Specification = Mapping[str, tuple[float | None, float | None]]
 DPH = math.pi / 648000.0
+BASE = "motion.angle[1]"  # of the base, to be added to what the gyro reads against it
 EQUATION = (
     "J_x dot.double(alpha) + C_x dot(alpha) + H dot(beta) = -K_m beta + M_x, quad "
     "J_y dot.double(beta) + C_y dot(beta) - H dot(alpha) = M_y, quad K_m = i k_u k_i k_m"
@@ -75,14 +76,14 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     gyro = {n: float(p[f"gyro.{n}"]) for n in ("H", "J_x", "J_y", "C_x", "C_y")}
     K_m, H = k_m(p), gyro["H"]
     holds = found.of("hold")
-    own = drift(holds[0].t, holds[0]["gyro.alpha"]) if holds else None
+    own = drift(holds[0].t, _platform(holds[0])) if holds else None
     for gate in found.of("torque", 1, "step"):
         _load(found, gate, K_m, gyro, own, holds[0] if holds else None)
     points = found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     if points:
         _limits(found, points, K_m, gyro)
     isolation = found.ratio(
-        "isolation", "motion", 1, "gyro.alpha", "motion.angle[1]", plus="motion.angle[1]",
+        "isolation", "motion", 1, "gyro.alpha", BASE, plus=BASE,
         caption="Isolation: inertial angle of the platform over that of the base. Points: measured; lines: linear.",
     )  # fmt: skip
     _friction(found, isolation)
@@ -102,6 +103,11 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     return result
 
 
+def _platform(gate: Gate) -> Any:
+    """Inertial angle of the platform, rad: against the base, and the base."""
+    return gate["gyro.alpha"] + gate[BASE]
+
+
 def _load(
     found: LoopFindings, gate: Gate, K_m: float, gyro: Mapping[str, float], own: Drift | None, quiet: Gate | None
 ) -> None:
@@ -109,7 +115,7 @@ def _load(
     M, H, C_y = gate.amplitude, gyro["H"], gyro["C_y"]
     rate, u_rate = (own.rate, own.u) if own is not None else (0.0, 0.0)
     b = found.step(gate, "gyro.beta", scale=ARCSEC, unit="″", y_name="precession β", quiet=quiet)
-    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", drift=rate, quiet=quiet)
+    a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", plus=BASE, drift=rate, quiet=quiet)
     a = replace(a, u_change=math.hypot(a.u_change, u_rate * float(gate.t[-1] - gate.t[0])))
     found.measure(
         "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
@@ -154,7 +160,7 @@ def _friction(found: LoopFindings, points: list[Point]) -> None:
     """The base turns the platform through the damping of the axis."""
     if points:
         at = min(points, key=lambda q: abs(q.f - 1.0))
-        linear = found.excited("discrete", "motion", 1, "gyro.alpha", [at.f], plus="motion.angle[1]")
+        linear = found.excited("discrete", "motion", 1, "gyro.alpha", [at.f], plus=BASE)
         size = 20.0 * math.log10(abs(at.value))
         closed = None if linear is None else 20.0 * math.log10(abs(linear[0]))
         found.measure(
@@ -164,7 +170,7 @@ def _friction(found: LoopFindings, points: list[Point]) -> None:
 
 def _servo(found: LoopFindings, gate: Gate, H: float, own: Drift | None) -> None:
     """What the torque adds to the platform's own drift."""
-    d = drift(gate.t, gate["gyro.alpha"])
+    d = drift(gate.t, _platform(gate))
     rate, u = (d.rate - own.rate, math.hypot(d.u, own.u)) if own is not None else (d.rate, d.u)
     closed = -gate.amplitude / H / DPH
     found.measure(
