@@ -117,10 +117,10 @@ def effects(
     held: Held, site: Site, found: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
     sizes: Mapping[str, float],
 ) -> list[Effect]:  # fmt: skip
-    """Type B: axis of the table, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
 
-    sizes: u_axis, u_mount, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The axis is set up
-    anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
+    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
+    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
     columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
@@ -134,6 +134,16 @@ def effects(
     def axis(k: int) -> Array:
         tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
         return np.array([moved(tilted, phase == p) for p in np.unique(phase)])
+
+    def wobble() -> Array:  # q about y, z is (cos, sin) of 2 theta + phase, as of the part axis_wobble
+        middle = held.angle_start + held.angle_end
+        cases = []
+        for a in (middle, middle + np.pi / 2.0):
+            q = np.column_stack([np.zeros_like(a), np.cos(a), np.sin(a)])
+            # the reduction takes the axis as still: against the axis as it is, it is turned by -q
+            turned = held.axes + SMALL * np.cross(q[:, None, :], np.swapaxes(held.axes, 1, 2)).swapaxes(1, 2)
+            cases.append(moved(replace(held, axes=turned)))
+        return np.array(cases)
 
     def order(n: int) -> Array:
         length = held.t_end - held.t_start
@@ -156,6 +166,7 @@ def effects(
         Effect("table axis about y", sizes["u_axis"], "rad", axis(1), "each phase set up by itself"),
         Effect("table axis about z", sizes["u_axis"], "rad", axis(2), "each phase set up by itself"),
         Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), "each phase set up by itself"),
+        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble()),
         Effect("input axis towards output axis", sizes["u_mount"], "rad", mount(2)),
         Effect("input axis towards spin axis", sizes["u_mount"], "rad", mount(1)),
         Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder"),

@@ -30,7 +30,7 @@ from .model import Model
 Array = NDArray[np.float64]
 Limits = Mapping[str, tuple[float | None, float | None]]
 DPH = units.factor("deg/h")
-SIZES = ("u_axis", "u_mount", "u_angle1", "u_angle2", "u_unbalance", "u_time")
+SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:

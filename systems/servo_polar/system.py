@@ -53,6 +53,7 @@ class ServoPolar(System):
         "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
         "u_axis": Option(0.0, "rad", "standard uncertainty of the table axis, about each axis, each phase", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the table axis", 0.0),
+        "u_wobble": Option(0.0, "rad", "wobble of the table axis twice a turn, std. unc. of its amplitude", 0.0),
         "u_angle1": Option(0.0, "rad", "angle error once a turn, standard uncertainty of its amplitude", 0.0),
         "u_angle2": Option(0.0, "rad", "angle error twice a turn, standard uncertainty of its amplitude", 0.0),
         "u_unbalance": Option(0.0, "rad", "angle by unbalance of the table at 1 g over the stiffness, std. unc.", 0.0),

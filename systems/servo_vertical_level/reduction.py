@@ -73,7 +73,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
         bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
         statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
-    sizes = {"u_angle1": 0.0, "u_angle2": 0.0, **recorded.sizes(meta, SIZES)}
+    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **recorded.sizes(meta, SIZES)}
     effects = [e for e in servo.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source]
     warnings = refusals.unseen(list(labels.values()))
     both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
