@@ -157,8 +157,9 @@ CONVENTIONS = (
     "Drift ω_d in precession sign: inertial rate of the plate along the gyro's x and y axes; the book's ω_M = −ω_dx.",
     "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (book sign: a body axis that points up "
     "reads −1); g0 = 9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
-    "Outer angle x right-handed about X, inner angle y about Y of the mount; gyro x along X, y along Y at 0, 0; local "
-    "frame east, north, up. Torquers idle while the gyro holds the table; the turn about z is not controlled.",
+    "Outer angle x right-handed about X, inner angle y about Y of the mount; gyro x along X, y along Y at 0, 0; ω_X, "
+    "ω_Y, ω_Z: Earth rate along X, Y, Z = X × Y; local frame east, north, up. Torquers idle while the gyro holds the "
+    "table; the turn about z is not controlled.",
 )
 
 
@@ -263,4 +264,4 @@ def _equation(c: str, names: tuple[str, ...]) -> str:
         if c == "x"
         else "dot(y) + omega_Y cos x + omega_Z sin x"
     )
-    return f'{left} = omega_"d{c}" = {" + ".join(parts)}'
+    return f'{left} = omega_"d{c}" \\ omega_"d{c}" = {" + ".join(parts)}'
