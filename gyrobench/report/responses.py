@@ -49,10 +49,11 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
         alike = [n for n in named if (n[1]["kind"], n[1]["y_unit"]) == (named[0][1]["kind"], named[0][1]["y_unit"])]
         if len(alike) > 1:
             key = f"response-{k + 1}"
-            alt = f"{r['name']} of all runs in one figure"
-            found += pictures(
-                Picture(key, draw(alike, key), f"{r['name'][:1].upper()}{r['name'][1:]}: all runs in one figure.", alt)
-            )
+            lines = alike[0][1]["curves"]
+            several = alike[0][1]["kind"] == "time" and len(lines) > 1
+            name = f"{r['name']}, {lines[0]['label']}" if several else r["name"]
+            text = f"{name[:1].upper()}{name[1:]}: all runs in one figure."
+            found += pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
     return found
 
 

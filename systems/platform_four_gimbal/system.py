@@ -88,12 +88,12 @@ class PlatformFourGimbal(System):
     noises = tuple(f"{g}.{n}_{c}" for g in MOUNTS for n in ("turn_on", "markov", "white", "pickoff") for c in "xy")
     step = 5e-4
     done = "exciter.done"
-    channels = (
-        "exciter.phase", "exciter.gate", *(f"exciter.torque[{k}]" for k in (1, 2, 3)),
+    channels = (  # those that a report draws come first
+        *(f"platform.attitude[{k}]" for k in (1, 2, 3)), "platform.theta_4", "platform.theta[1]", "platform.theta[2]",
+        "platform.theta[3]", "exciter.phase", "exciter.gate", *(f"exciter.torque[{k}]" for k in (1, 2, 3)),
         *(f"exciter.test[{k}]" for k in (1, 2, 3)), *(f"motion.omega[{k}]" for k in (1, 2, 3)),
-        *(f"platform.attitude[{k}]" for k in (1, 2, 3)), *(f"platform.theta[{k}]" for k in (1, 2, 3)),
-        *(f"platform.theta_dot[{k}]" for k in (1, 2, 3)), "platform.theta_4", "platform.theta_4_dot",
-        "platform.lock", "pitch.e", "roll.e", "azimuth.e", "gyro_a.saturated", "gyro_b.saturated",
+        *(f"platform.theta_dot[{k}]" for k in (1, 2, 3)), "platform.theta_4_dot", "platform.lock",
+        "pitch.e", "roll.e", "azimuth.e", "gyro_a.saturated", "gyro_b.saturated",
     )  # fmt: skip
     channel_period = 2e-3
 

@@ -110,12 +110,13 @@ class PlatformThreeGimbal(System):
     noises = tuple(f"{g}.{n}_{c}" for g in MOUNTS for n in ("turn_on", "markov", "white", "pickoff") for c in "xy")
     step = 5e-4
     done = "exciter.done"
-    channels = (
+    channels = (  # those that a report draws come first
+        *(f"platform.attitude[{k}]" for k in (1, 2, 3)), *(f"platform.theta[{k}]" for k in (1, 2, 3)),
         "exciter.phase", "exciter.gate", *(f"exciter.torque[{k}]" for k in (1, 2, 3)),
         *(f"exciter.test[{k}]" for k in (1, 2, 3)), "exciter.command[3]", *(f"motion.omega[{k}]" for k in (1, 2, 3)),
-        *(f"platform.{n}[{k}]" for n in ("attitude", "theta", "theta_dot") for k in (1, 2, 3)),
-        "platform.lock", "pitch.e", "roll.e", "azimuth.e", "gyro_a.u_y", "gyro_b.u_x",
-        "gyro_a.drift_x", "gyro_a.drift_y", "gyro_b.drift_x", "gyro_b.drift_y", "gyro_a.saturated", "gyro_b.saturated",
+        *(f"platform.theta_dot[{k}]" for k in (1, 2, 3)), "platform.lock", "pitch.e", "roll.e", "azimuth.e",
+        "gyro_a.u_y", "gyro_b.u_x", "gyro_a.drift_x", "gyro_a.drift_y", "gyro_b.drift_x", "gyro_b.drift_y",
+        "gyro_a.saturated", "gyro_b.saturated",
     )  # fmt: skip
     channel_period = 2e-3
 
