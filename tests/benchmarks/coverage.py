@@ -10,7 +10,7 @@ Noise: by default drawn from the population that the reduction takes for granted
 alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windows to half the record; where data are
 differences of readings, with errors of the readings too.  Windows are shortened, so the sizes are scaled: the parts get
 the densities that give a window the drawn shares.  ``--noise`` takes one instrument instead, a corner of the
-population; there intervals may hold the truth more or less often than 95 %.
+population; there intervals may hold the truth more or less often than 95 %.  README.md here has the figures.
 """
 
 from __future__ import annotations
