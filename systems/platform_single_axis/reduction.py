@@ -100,8 +100,9 @@ def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:
 
 
 def _steps(found: LoopFindings) -> None:
+    quiet = next(iter(found.of("hold")), None)
     for gate in found.of("torque", shape="step"):
-        found.step(gate, ANGLE, scale=ARCSEC, unit="″", y_name="attitude")
+        found.step(gate, ANGLE, scale=ARCSEC, unit="″", y_name="attitude", quiet=quiet)
         rest = gate.rest(ANGLE)
         y = gate[ANGLE] - (float(rest.mean()) if rest.size else 0.0)
         peak = int(np.argmax(np.abs(y)))
@@ -111,7 +112,7 @@ def _steps(found: LoopFindings) -> None:
         u = stiffness * noise / abs(y[peak])
         found.measure("load/peak", "torque of the step over that attitude", "N·m/rad", stiffness, u)
     for gate in found.of("command", shape="step"):
-        step = found.step(gate, RATE, scale=MRAD, unit="mrad/s", y_name="rate")
+        step = found.step(gate, RATE, scale=MRAD, unit="mrad/s", y_name="rate", quiet=quiet)
         share, u = step.change / gate.amplitude, step.u_change / abs(gate.amplitude)
         found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0)
         found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u)

@@ -94,6 +94,7 @@ def _isolation(found: LoopFindings) -> str:
 
 
 def _loads(found: LoopFindings) -> None:
+    quiet = next(iter(found.of("hold")), None)
     for gate in found.of("torque", shape="step"):
         rest = [gate.rest(name) for name in ANGLES]
         moved = np.array([gate[n] - (float(r.mean()) if r.size else 0.0) for n, r in zip(ANGLES, rest, strict=True)])
@@ -117,7 +118,7 @@ def _loads(found: LoopFindings) -> None:
                 gate.amplitude * u / peak**2,
             )
         main = int(np.argmax(np.abs(moved).max(axis=1)))
-        found.step(gate, ANGLES[main], scale=ARCSEC, unit="″", y_name=f"attitude about {XYZ[main]}")
+        found.step(gate, ANGLES[main], scale=ARCSEC, unit="″", y_name=f"attitude about {XYZ[main]}", quiet=quiet)
 
 
 def _drift(found: LoopFindings) -> None:

@@ -184,20 +184,6 @@ def test_refusals() -> None:
         correlated.fit(X, y + math.nan, names, t0, t1)
 
 
-def test_time_of_a_fit() -> None:
-    """Budget: 30 ms for a record of 164 windows (a tenth of a second where the machine is busy)."""
-    import time
-
-    t0, t1, X = mc.plan(72, 10)
-    y = next(mc.samples(t0, t1, 3.0, 0.5, 1, 1))
-    times = []
-    for _ in range(7):
-        start = time.perf_counter()
-        correlated.fit(X, y, drift.terms(9), t0, t1)
-        times.append(time.perf_counter() - start)
-    assert min(times) < 0.1
-
-
 # ------------------------------------------------------------------------------------------ coverage
 def bounds(runs: int, low: float = 0.93, high: float = 0.97) -> tuple[float, float]:
     """Observed fractions that a true coverage inside low..high allows (4 standard deviations)."""
