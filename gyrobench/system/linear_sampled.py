@@ -43,14 +43,17 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         return None
     twin = type(part)(part.instance)
     twin.set_state(part.get_state())
-    if not _listens(twin, inputs, discrete, step):
+    heard = _heard(twin, inputs, discrete, step)
+    if not heard.any():
         return None
     if len(discrete) > MOST:
         raise ValueError(f"keeps {len(discrete)} values in memory")
     first = _differences(twin, inputs, outputs, step, discrete)
     n = len(part.states)
-    if not (np.any(first.a[:n, n:]) or np.any(first.c[:, n:])):
-        return None
+    for _ in discrete:  # what is handed on from value to value
+        heard = heard | np.any(first.a[n:, n:][:, heard], axis=1)
+    if not (np.any(first.a[:n, n:][:, heard]) or np.any(first.c[:, n:][:, heard])):
+        return None  # none that the inputs reach goes further; constants of the part do not count
     try:
         for k in range(SETTLED):
             twin.do_step(k * step, step)
@@ -66,8 +69,8 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     return last
 
 
-def _listens(part: Component, inputs: list[str], discrete: list[str], step: float) -> bool:
-    """Whether a discrete value after two steps depends on the inputs, or on the states before."""
+def _heard(part: Component, inputs: list[str], discrete: list[str], step: float) -> NDArray[np.bool_]:
+    """Which discrete values after two steps depend on the inputs, or on the states before."""
     seen = []
     for size in (0.0, DELTA):
         twin = type(part)(part.instance)
@@ -76,8 +79,8 @@ def _listens(part: Component, inputs: list[str], discrete: list[str], step: floa
             twin.set(n, twin.get(n) + size)
         for k in range(2):
             twin.do_step(k * step, step)
-        seen.append([twin.get(n) for n in discrete])
-    return seen[0] != seen[1]
+        seen.append(np.array([twin.get(n) for n in discrete]))
+    return np.asarray(seen[0] != seen[1])
 
 
 def _differences(part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]) -> Step:

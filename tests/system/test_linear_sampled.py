@@ -44,3 +44,11 @@ def test_what_has_no_such_step():
         sampled_step(started("estimator_moving_average", Ts=H), ["z"], ["estimate"], H)
     with pytest.raises(ValueError, match="one step is not like the next"):
         sampled_step(started("estimator_kalman_rate", Ts=2 * H), ["z"], ["estimate"], H)
+
+
+def test_a_value_that_only_reports_leaves_the_part_continuous():
+    """With L = 0 the platform keeps the current that flowed, which v reaches; no state takes it, only i_motor shows it.
+    Its inertia is kept beside it and acts on the states, but no input reaches that."""
+    part = started("platform_single_axis", L=0.0)
+    assert sampled_step(part, ["v"], ["theta"], H) is None
+    assert sampled_step(part, ["v"], ["theta", "i_motor"], H) is not None
