@@ -1,0 +1,78 @@
+"""Closed forms of an axis with a floated two-degree-of-freedom gyro, ideal motor and lag-lead network.
+
+    J_x th'' = M - K_m K_x G(s) th,     G = K_G (1 + tau1 s)(1 + tau2 s) / ((1 + T1 s)(1 + T2 s))
+
+[STAB-FLOATED-2DOF; 004_a44a05c7e88249d1.txt eq. 5-24..5-26, corrected]  What the text prints as theta/M in 5-25,
+K_m K_x / (J_x s2), is the loop gain without network; theta/M is 1/(J_x s2 + K_m K_x G).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Loop:
+    """J: kg.m2; K: K_m K_x K_G, torque per angle at rest, N.m/rad; time constants in s, T1 and T2 above 0."""
+
+    J: float
+    K: float
+    tau1: float
+    T1: float
+    tau2: float
+    T2: float
+
+    def network(self, s: Any) -> Any:
+        """G / K_G at s, rad/s."""
+        return (1.0 + self.tau1 * s) * (1.0 + self.tau2 * s) / ((1.0 + self.T1 * s) * (1.0 + self.T2 * s))
+
+    def gain(self, s: Any) -> Any:
+        """Loop gain L = K_m K_x G / (J_x s2)."""
+        return self.K * self.network(s) / (self.J * s * s)
+
+    def compliance(self, s: Any) -> Any:
+        """theta/M, rad/(N.m): 1 / (J_x s2 + K_m K_x G); at rest 1/K, which the lag of finite T1 does not remove."""
+        return 1.0 / (self.J * s * s + self.K * self.network(s))
+
+    def isolation(self, s: Any, drag: float) -> Any:
+        """Platform over base angle, when a torque ``drag`` (N.m.s/rad) times the rate against the base acts."""
+        return drag * s / (self.J * s * s + drag * s + self.K * self.network(s))
+
+    def limit(self) -> tuple[float, float] | None:
+        """Where the phase of L is -180 degrees: (frequency in rad/s, share of K at which the loop is at its limit).
+
+        G is real where (t)(1 - T w2) = (T')(1 - tau w2), t = tau1 + tau2, T' = T1 + T2, tau = tau1 tau2, T = T1 T2;
+        there G/K_G = t/T'.  A share below 1: the loop is conditionally stable, unstable when its gain falls below.
+        The same as the Routh table of the fourth-order equation.  None: no such frequency.
+        """
+        t, big = self.tau1 + self.tau2, self.T1 + self.T2
+        below = big * self.tau1 * self.tau2 - t * self.T1 * self.T2
+        if below == 0.0 or not (big - t) / below > 0.0 or t == 0.0:
+            return None
+        w = math.sqrt((big - t) / below)
+        return w, self.J * w * w * big / (t * self.K)
+
+    def stable(self) -> bool:
+        """Routh: the loop of two integrations needs a net lead, and a gain above the limit where it has one."""
+        t, big = self.tau1 + self.tau2, self.T1 + self.T2
+        below = big * self.tau1 * self.tau2 - t * self.T1 * self.T2
+        return self.K * t * below > self.J * big * (big - t)
+
+    def margin(self) -> tuple[float, float]:
+        """Crossover (rad/s) and phase margin (degrees); |L| falls with the frequency, so there is one crossover."""
+        low, high = 1e-6, 1e6
+        for _ in range(200):
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if abs(self.gain(1j * middle)) > 1.0 else (low, middle)
+        turn = sum(math.atan(x * low) for x in (self.tau1, self.tau2)) - sum(
+            math.atan(x * low) for x in (self.T1, self.T2)
+        )
+        return low, math.degrees(turn)
+
+    def slope(self, w: float) -> float:
+        """d 20 log|L| / d log10 w at w, dB per decade: -40 without the network."""
+        lead = sum((x * w) ** 2 / (1.0 + (x * w) ** 2) for x in (self.tau1, self.tau2))
+        lag = sum((x * w) ** 2 / (1.0 + (x * w) ** 2) for x in (self.T1, self.T2))
+        return 20.0 * (lead - lag - 2.0)

@@ -1,0 +1,185 @@
+"""A platform axis held by a motor; a floated two-degree-of-freedom gyro on it is the sensor only."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.reduction.result import Result
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.record import Record
+from gyrobench.system.system import Option, Slot, System
+
+from .closed import Loop
+
+Specification = Mapping[str, tuple[float | None, float | None]]
+K_SG = 10.0  # V/rad, pickoffs
+RANGE = 0.1  # rad, of the pickoffs
+K_Y = 0.0832909904  # rad/s/A, torquer about y (17.180 deg/h/mA): it turns the platform about x
+CAGE = 12.0  # A/V, from u_y to the torquer about x: the second channel follows the case with about 10 1/s
+MOTORS = {  # 27 V make 2.7 N.m in both; the ideal one at once, without lag and back EMF
+    "ideal": {"k_t": 1.0, "R": 10.0, "L": 0.0, "k_e": 0.0},
+    "real": {"k_t": 1.0, "R": 10.0, "L": 0.01, "k_e": 1.0},
+}
+V_MAX, I_MAX = 27.0, 2.7  # V, A
+TEST = (0.5, 0.8, 1.2, 1.6, 2.0, 2.5, 3.2, 4.5, 6.5, 9.0, 12.0, 15.0, 18.0, 23.0, 30.0, 45.0)  # Hz
+MOTION = (0.5, 1.0, 2.0, 5.0, 10.0)  # Hz
+TIMES = ("tau1", "T1", "tau2", "T2")
+NAMES = ("platform.J", "platform.k_t", "platform.R", "gyro.K_sg_x", "stabilizer.K", *(f"stabilizer.{n}" for n in TIMES))
+
+
+def loop_of(parameters: Mapping[str, Any]) -> Loop | None:
+    """The closed form of the parts with these parameters; None where they do not have them (another stabilizer)."""
+    if any(n not in parameters for n in NAMES) or parameters.get("stabilizer.integral"):
+        return None
+    j, k_t, r, k_sg, gain, *times = (float(parameters[n]) for n in NAMES)
+    return Loop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
+
+
+class StabilizerFloated2dof(System):
+    """The gyro's case is fixed to the platform and its rotor keeps its direction; the x pickoff gives the angle of the
+    platform, a lag-lead network and a motor turn it back.  A current in the torquer about y precesses the rotor about
+    x, and the platform follows.  The second channel, u_y, is caged by its own torquer.
+
+        J_x th'' = M - K_m K_x G(s) th       L = K_m K_x G/(J_x s2),  K_m the motor with its amplifier, K_x the pickoff
+
+    [STAB-FLOATED-2DOF; 004_a44a05c7e88249d1.txt eq. 5-24..5-26, corrected]
+    """
+
+    title = "Stabilizer with a floated two-degree-of-freedom gyro"
+    spec = ("STAB-FLOATED-2DOF",)
+    slots = {
+        "exciter": Slot("Excitation", "exciter"),
+        "motion": Slot("Motion", "base_motion"),
+        "load": Slot("Load", "load_torque"),
+        "platform": Slot("PlatformAxis", "platform_single_axis"),
+        "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
+        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
+    }
+    wires = """
+        exciter.motion_angle -> motion.motion_angle
+        exciter.motion_rate -> motion.motion_rate
+        exciter.motion_acceleration -> motion.motion_acceleration
+        exciter.torque -> load.torque
+        exciter.command[1] -> gyro.i_y
+        exciter.test[1] -> stabilizer.test
+        motion.omega -> platform.omega_b
+        motion.alpha -> platform.alpha_b
+        motion.f -> platform.f_b
+        load.M[1] -> platform.M_load
+        platform.omega -> gyro.omega
+        platform.f -> gyro.f
+        gyro.M_react[1] -> platform.M_gyro
+        gyro.u_y -> gyro.i_x
+        gyro.u_x -> stabilizer.u
+        stabilizer.v -> platform.v
+    """
+    factors = {"exciter.command[1] -> gyro.i_y": 1.0 / K_Y, "gyro.u_y -> gyro.i_x": CAGE}
+    loops = {"stabilizer": "stabilizer.u"}
+    options = {
+        "J_x": Option(0.5, "kg.m2", "inertia of the platform"),
+        "stiffness": Option(8250.0, "N.m/rad", "K_m K_x: motor with amplifier, times pickoff"),
+        "K_G": Option(2.0, "1", "gain of the network at rest"),
+        "tau1": Option(0.2, "s", "lag, numerator", 0.0),
+        "T1": Option(2.0, "s", "lag, denominator"),
+        "tau2": Option(0.03, "s", "lead, numerator", 0.0),
+        "T2": Option(0.003, "s", "lead, denominator"),
+        "motor": Option("ideal", str, "ideal: a torque at once; real: with inductance and back EMF"),
+        "viscous": Option(0.02, "N.m.s/rad", "viscous friction against the base", 0.0),
+        "load": Option(1.0, "N.m", "disturbance torque of the step"),
+        "command": Option(5e-3, "rad/s", "rate commanded by the torquer of the gyro"),
+        "base": Option("1deg", "rad", "amplitude of the base up to 1 Hz", 0.0),
+        "test": Option(1e-3, "V", "amplitude of the test sines from 15 Hz on; below it grows, as the loop leaves less"),
+        "hold": Option(30.0, "s", "length of the drift hold", 1.0),
+        "blow": Option(0.0, "N.m", "torque of a last, large disturbance; 0: none"),
+        "blow_time": Option(0.1, "s", "how long it acts", 1e-3),
+    }
+    noises = tuple(f"gyro.{n}_{c}" for n in ("turn_on", "markov", "white", "pickoff") for c in "xy")
+    step = 1e-4
+    channel_period = 1e-3
+    done = "exciter.done"
+    channels = (
+        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "exciter.test[1]",
+        "exciter.motion_angle[1]", "platform.attitude", "platform.omega[1]", "platform.saturated",
+        "gyro.saturated", "stabilizer.e",
+    )  # fmt: skip
+
+    def plan(self) -> LoopPlan:
+        settle = 3.0  # s: the slowest pole of the default loop, -4.96 1/s, leaves exp(-7) in the second half
+        phases = [
+            LoopPhase("load step", "torque", "step", 1, self["load"], settle=1.0, dwell=3.0),
+            LoopPhase("command step", "command", "step", 1, self["command"], settle=settle, dwell=3.0),
+            *sweep("loop", "test", TEST, lambda f: self["test"] * max(1.0, 15.0 / f) ** 1.5, settle=settle),
+            *sweep("base", "motion", MOTION, lambda f: self["base"] / max(1.0, f * f), settle=settle, dwell=2.0),
+            LoopPhase("drift", "hold", settle=settle, dwell=self["hold"]),
+        ]
+        if self["blow"] != 0.0:
+            phases += [
+                LoopPhase("blow", "torque", "step", 1, self["blow"], settle=0.5, dwell=self["blow_time"]),
+                LoopPhase("after the blow", dwell=3.0),
+            ]
+        return LoopPlan(phases)
+
+    def parameters(self) -> dict[str, Any]:
+        motor = MOTORS.get(self["motor"], MOTORS["ideal"])
+        amplifier = self["stiffness"] / (K_SG * motor["k_t"] / motor["R"])  # counts to K_m
+        return {
+            **self.plan().parameters(),
+            "platform.J": self["J_x"],
+            "platform.viscous?": self["viscous"],
+            **{f"platform.{n}?": v for n, v in motor.items()},
+            "platform.v_max?": V_MAX,
+            "platform.i_max?": I_MAX,
+            "gyro.K_sg_x": K_SG,
+            "gyro.K_sg_y": K_SG,
+            "gyro.u_max": RANGE * K_SG,
+            "gyro.k_y": K_Y,
+            "stabilizer.K": self["K_G"] * amplifier,
+            **{f"stabilizer.{n}?": self[n] for n in TIMES},
+            "stabilizer.v_max?": V_MAX,
+        }
+
+    def check(self) -> list[str]:
+        """Refusals of values; an unstable loop is let run, warned with its pole."""
+        problems = [
+            f"{n} = {self[n]:g} {self.options[n].unit}: must be > 0"
+            for n in ("J_x", "stiffness", "K_G", "T1", "T2")
+            if not self[n] > 0.0
+        ]
+        if self["motor"] not in MOTORS:
+            problems.append(f"motor = {self['motor']}: must be one of {', '.join(MOTORS)}")
+        most = V_MAX * MOTORS["ideal"]["k_t"] / MOTORS["ideal"]["R"]
+        if abs(self["load"]) >= most:
+            problems.append(
+                f"load = {self['load']:g} N.m: the motor gives {most:g} N.m, and no loop stands against more; "
+                "what a larger disturbance does is shown by the option blow"
+            )
+        return problems
+
+    def warnings(self) -> list[str]:
+        found = []
+        if not self["T1"] > self["tau1"] > self["tau2"] > self["T2"]:
+            found.append("the network is not a lag and a lead: T1 > tau1 > tau2 > T2 does not hold")
+        return found
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        """Nothing is refused here; what is known of the loop before the run is said."""
+        say = logging.getLogger("gyrobench").warning
+        for text in self.warnings():
+            say("%s: %s", self.name, text)
+        loop = loop_of(parameters)
+        at = loop.limit() if loop is not None and loop.stable() else None
+        if at is not None and at[1] < 1.0 and abs(self["blow"]) > 0.0:
+            say(
+                "%s: the loop is conditionally stable: it becomes unstable at %.3g of its gain, where it swings with "
+                "%.3g Hz; a motor at its limit lowers the gain, and the blow may bring it there",
+                self.name, at[1], at[0] / (2.0 * math.pi),
+            )  # fmt: skip
+        return []
+
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+        from .reduction import from_record
+
+        return from_record(record, specification)
