@@ -15,6 +15,7 @@ from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record
 
 MRAD = 1e-3
+SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 
 
@@ -64,19 +65,20 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
 
 def _ride(found: LoopFindings) -> list[str]:
     """Platform error, the measure that ranks estimators and loops; what the estimator makes of its reading."""
-    ride = next((g for g in found.of("motion", shape="sine") if g.label == "ride"), None)
+    ride = next((g for g in found.gates if g.label == "ride"), None)
     if ride is None:
         return []
-    two = round(2.0 / ride.f / float(ride.t[1] - ride.t[0]))
+    two = round(2.0 / (ride.f or SLOW) / float(ride.t[1] - ride.t[0]))
     error, rate = level(jitter(ride[ANGLE], two)), level(ride[RATE] - ride[RATE].mean())
-    meaning = "attitude in the ride, rms about its running mean over two periods"
+    meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
     k = number(found.record.meta, "k", "gyro.k")
     if k is not None:
         _estimator(found, ride, k)
+    base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
     return [
-        f"A base that swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz leaves {error.value / ARCSEC:.3g}″ "
+        f"A base that {base} leaves {error.value / ARCSEC:.3g}″ "
         f"rms on the platform, and {rate.value / MRAD:.3g} mrad/s."
     ]
 
@@ -120,7 +122,7 @@ def _steps(found: LoopFindings) -> None:
 
 
 def _drift(found: LoopFindings) -> None:
-    hold = found.of("hold")
+    hold = [g for g in found.of("hold") if g.label == "drift"]
     if not hold:
         return
     parameters = found.record.meta.get("parameters", {})

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.profile import read_profile
 from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
@@ -67,6 +69,7 @@ class PlatformSingleAxisLoop(System):
         "command": Option(1e-3, "rad/s", "rate commanded in the command step"),
         "base": Option("1deg", "rad", "amplitude of the base at and below the frequency of the ride", 0.0),
         "ride": Option(1.0, "Hz", "frequency of the ride, the sine of the base for the platform error", 0.1, 5.0),
+        "profile": Option("", str, "CSV file with a recorded motion of the base: the ride instead of the whole plan"),
         "hold": Option(60.0, "s", "time of ride, and of the drift hold", 10.0, 3600.0),
         "reading_noise": Option(1e-5, "A/sqrt(Hz)", "noise density of the current that is read", 0.0),
     }
@@ -84,6 +87,8 @@ class PlatformSingleAxisLoop(System):
     def plan(self) -> LoopPlan:
         """Step of torque, step of commanded rate, test sines for the loop, sines of the base, ride, drift."""
         fc = self["crossover"]
+        if self["profile"]:
+            return LoopPlan([LoopPhase("ride", dwell=self["hold"])])
         return LoopPlan(
             [
                 LoopPhase("load step", "torque", "step", amplitude=self["load_step"], settle=2.0, dwell=4.0),
@@ -123,6 +128,7 @@ class PlatformSingleAxisLoop(System):
         wide = (2.0 * math.pi * 5.0 * self["crossover"]) ** 4  # the filter follows five times faster than the loop
         return {
             **self.plan().parameters(),
+            **(read_profile(Path(self["profile"])) if self["profile"] else {}),
             "gyro.reaction": True,
             "gyro.k": TORQUER,
             "gyro.pickoff": PICKOFF_NOISE,

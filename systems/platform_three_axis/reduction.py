@@ -23,7 +23,7 @@ ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    summary = [_coupling(found), _isolation(found)]
+    summary = [_coupling(found), _isolation(found), _ride(found)]
     _loads(found)
     for k, axis in enumerate(AXES, 1):
         found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
@@ -93,6 +93,25 @@ def _isolation(found: LoopFindings) -> str:
     return f"Of a swinging base it takes over at most {20.0 * math.log10(worst):.1f} dB." if worst else ""
 
 
+def _ride(found: LoopFindings) -> str:
+    """Attitude while the base moves as recorded, less its mean and slope, each axis and all of them over the base."""
+    gate = next((g for g in found.of("hold") if g.label == "ride"), None)
+    if gate is None:
+        return ""
+    left = [still(gate.t, gate[name]) for name in ANGLES]
+    base = [still(gate.t, gate[f"motion.angle[{k}]"]) for k in (1, 2, 3)]
+    for axis, y in zip(XYZ, left, strict=True):
+        found.measure(f"error {axis}", "attitude in the ride, rms about mean and slope", "″", float(np.std(y)) / ARCSEC)
+    share = float(np.sqrt(np.sum(np.var(left, axis=1)) / np.sum(np.var(base, axis=1))))
+    found.measure("ride", "platform over base, rms of all axes", "dB", 20.0 * math.log10(share))
+    return f"In the ride the platform takes over {20.0 * math.log10(share):.1f} dB of the base's motion."
+
+
+def still(t: Any, y: Any) -> Any:
+    """y without its mean and slope: a drift is the gyro's, not the loop's."""
+    return y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
+
+
 def _loads(found: LoopFindings) -> None:
     quiet = next(iter(found.of("hold")), None)
     for gate in found.of("torque", shape="step"):
@@ -123,7 +142,7 @@ def _loads(found: LoopFindings) -> None:
 
 def _drift(found: LoopFindings) -> None:
     """Each axis turns with the drift of its gyro, for the specific force that the element sees at rest."""
-    for gate in found.of("hold"):
+    for gate in (g for g in found.of("hold") if g.label == "drift"):
         up = _up([gate.channels[f"platform.theta[{k}]"][0] for k in (1, 2, 3)])
         parameters = found.record.meta.get("parameters", {})
         for name, axis in zip(ANGLES, XYZ, strict=True):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.profile import read_profile
 from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
@@ -86,6 +88,7 @@ class PlatformThreeAxis(System):
             83.0 * MIL, "rad", "amplitude of base and of commanded angle (83 of 6000 mil); 0: neither", 0.0
         ),
         "frequency": Option(1.0, "Hz", "frequency of the commanded sine", 0.1, 5.0),
+        "profile": Option("", str, "CSV file with a recorded motion of the base: a ride of `hold` instead of the plan"),
         "hold": Option(30.0, "s", "time of the drift hold", 5.0, 3600.0),
         "sweeps": Option(True, bool, "test sines for the margins of each axis"),
     }
@@ -111,6 +114,8 @@ class PlatformThreeAxis(System):
     def plan(self) -> LoopPlan:
         """Load steps, commanded sines, base sines at 0.5, 0.7, 0.9 Hz, test sines of each axis, drift."""
         f, fc = self["frequency"], self["crossover"]
+        if self["profile"]:
+            return LoopPlan([LoopPhase("ride", dwell=self["hold"])])
         rate = self["swing"] * 2.0 * math.pi * f
         phases = [
             LoopPhase(f"load {a}", "torque", "step", k, self["load_step"], settle=3.0, dwell=3.0)
@@ -141,6 +146,7 @@ class PlatformThreeAxis(System):
     def parameters(self) -> dict[str, Any]:
         found: dict[str, Any] = {
             **self.plan().parameters(),
+            **(read_profile(Path(self["profile"])) if self["profile"] else {}),
             "platform.theta_0": [self["pitch"], self["roll"], self["azimuth"]],
             **{f"platform.{n}": [x] * 3 for n, x in MOTOR.items()},
             "platform.i_max": [48.0] * 3,

@@ -103,3 +103,15 @@ def test_halving_the_step_moves_the_margin_by_its_delay():
             pm.append(next(c.estimate for c in result.coefficients if c.name == "PM"))
     first, second = pm[1] - pm[0], pm[2] - pm[1]
     assert 0.0 < first < 3.6 and second == pytest.approx(first / 2.0, rel=0.2)
+
+
+def test_ride_by_a_recorded_profile(tmp_path):
+    """Pitch of 1 degree at 1 Hz as a recording leaves what the exciter's sine of that size leaves, but for its ends."""
+    t = np.arange(0.0, 20.0, 0.05)
+    path = tmp_path / "pitch.csv"
+    rows = (f"{x:.3f},{math.sin(2 * math.pi * x):.6f}" for x in t)
+    path.write_text("\n".join(["time [s],pitch [deg]", *rows]) + "\n")
+    _, _, recorded = reduced(**{**QUIET, "profile": str(path), "hold": 18.0})
+    _, _, plain = reduced(**QUIET)
+    assert recorded["platform error"].estimate == pytest.approx(plain["platform error"].estimate, rel=0.1)
+    assert "drift" not in recorded

@@ -7,6 +7,7 @@ import pytest
 
 from gyrobench.reduction import margins as m
 from gyrobench.system.linear import unstable
+from gyrobench.system.measured import DataError
 from gyrobench.system.run import RunError, Session, run
 from gyrobench.system.system import load_system
 from gyrobench.system.wiring import WiringError
@@ -131,3 +132,18 @@ def test_rate_into_current_wants_its_factor():
     bare.name, bare.folder = NAME, system.folder
     with pytest.raises(WiringError, match=r"rad/s into A: the dimensions differ, and the wire has no factor"):
         Session(bare)
+
+
+def test_ride_by_a_recorded_profile(tmp_path):
+    """Roll of 5 degrees at 0.2 Hz as a recording: taken over far below -40 dB; a gap in it is refused."""
+    t = np.arange(0.0, 20.0, 0.1)
+    lines = ["time [s],roll [deg]", *(f"{x:.2f},{5 * math.sin(2 * math.pi * 0.2 * x):.6f}" for x in t)]
+    path = tmp_path / "roll.csv"
+    path.write_text("\n".join(lines) + "\n")
+    record = run(NAME, values={**IDEAL, "profile": str(path), "hold": 20.0})
+    found = {c.name: c.estimate for c in load_system(NAME).reduce(record).coefficients}
+    assert np.ptp(record.channels["motion.angle[2]"]) == pytest.approx(math.radians(10.0), rel=0.01)
+    assert -120.0 < found["ride"] < -60.0
+    path.write_text("\n".join(lines[:50] + lines[90:]) + "\n")
+    with pytest.raises(DataError, match=r"a gap of 4\.1 s after time = 4\.8 s"):
+        run(NAME, values={"profile": str(path)})
