@@ -7,7 +7,7 @@ from typing import Any
 from . import drawing, plots
 from .blocks import Column, Fold, Picture, Row, Table, Text, number_cell, pictures, text_cell
 from .numbers import write_number, write_p
-from .tables import generic, heading, words
+from .tables import generic, heading, unit_groups, words
 
 Json = dict[str, Any]
 
@@ -117,27 +117,31 @@ def estimates(doc: Json) -> list[Any]:
             "difference",
         )
     ]
+    groups = unit_groups(doc["coefficients"])
+    if not groups:
+        columns.insert(1, Column("unit"))
     rows: list[Row] = []
-    for unit in dict.fromkeys(c["unit"] for c in doc["coefficients"]):
-        rows.append(heading(f"u, U, closed formula and difference in {unit}"))
-        for k, c in enumerate(doc["coefficients"]):
-            if c["unit"] == unit:
-                path, u = ("coefficients", k), c["u"]
-                rows.append(
-                    Row(
-                        [
-                            text_cell(c["name"], "strong"),
-                            number_cell(doc, (*path, "u_a"), u),
-                            number_cell(doc, (*path, "dof"), significant=3),
-                            number_cell(doc, (*path, "k"), 0.1),
-                            number_cell(doc, ("derived", "U", k), u),
-                            number_cell(doc, (*path, "t"), significant=3, trim=False),
-                            number_cell(doc, (*path, "p"), write=write_p),
-                            number_cell(doc, (*path, "closed"), u),
-                            number_cell(doc, ("derived", "closed_minus_estimate", k), significant=2),
-                        ]
-                    )
+    for unit, members in groups or [("", list(range(len(names))))]:
+        rows += [heading(f"u, U, closed formula and difference in {unit}")] if groups else []
+        for k in members:
+            c = doc["coefficients"][k]
+            path, u = ("coefficients", k), c["u"]
+            rows.append(
+                Row(
+                    [
+                        text_cell(c["name"], "strong"),
+                        *([] if groups else [text_cell(c["unit"])]),
+                        number_cell(doc, (*path, "u_a"), u),
+                        number_cell(doc, (*path, "dof"), significant=3),
+                        number_cell(doc, (*path, "k"), 0.1),
+                        number_cell(doc, ("derived", "U", k), u),
+                        number_cell(doc, (*path, "t"), significant=3, trim=False),
+                        number_cell(doc, (*path, "p"), write=write_p),
+                        number_cell(doc, (*path, "closed"), u),
+                        number_cell(doc, ("derived", "closed_minus_estimate", k), significant=2),
+                    ]
                 )
+            )
     caption = "Uncertainty of each estimate, and the book's closed formula against the reported estimate."
     blocks.append(Table(columns, rows, caption, small=True))
     z = [c["z"] for c in doc["coefficients"]]

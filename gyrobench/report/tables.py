@@ -44,6 +44,19 @@ def heading(text: str) -> Row:
     return Row([], group=text)
 
 
+def unit_groups(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[int]]]:
+    """Numbers of the rows by their "unit", units in the order in which they come.
+
+    Empty where most units have one row only, as in loop tests: there the unit belongs into a column, for headings
+    would tear the table.
+    """
+    found: dict[str, list[int]] = {}
+    for k, row in enumerate(rows):
+        found.setdefault(str(row["unit"]), []).append(k)
+    alone = sum(len(members) == 1 for members in found.values())
+    return [] if 2 * alone > len(found) > 1 else list(found.items())
+
+
 def limit_text(limit: Sequence[float | None] | None) -> str:
     """ "−1.5 … 1.5", "≥ −1.5", "≤ 1.5", or a dash."""
     low, high = limit if limit is not None else (None, None)

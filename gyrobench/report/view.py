@@ -14,7 +14,7 @@ from .blocks import Answer, Cell, Column, Page, Picture, Row, Section, Table, nu
 from .numbers import write_number
 from .signing import signing
 from .style import styled
-from .tables import heading, how_tables, limit_text, words
+from .tables import heading, how_tables, limit_text, unit_groups, words
 
 Json = dict[str, Any]
 
@@ -126,16 +126,19 @@ def coefficients(doc: Json) -> list[Any]:
     ]
     columns += [Column("truth"), Column("z")] if truth else []
     columns += [Column("limit"), Column("verdict")] if limits else []
+    groups = unit_groups(doc["coefficients"])
+    if not groups:
+        columns.insert(2, Column("unit"))
     rows: list[Row] = []
-    for unit in dict.fromkeys(c["unit"] for c in doc["coefficients"]):
-        rows.append(heading(f"in {unit}"))
-        for k, c in enumerate(doc["coefficients"]):
-            if c["unit"] != unit:
-                continue
+    for unit, members in groups or [("", list(range(len(doc["coefficients"]))))]:
+        rows += [heading(f"in {unit}")] if groups else []
+        for k in members:
+            c = doc["coefficients"][k]
             path, u = ("coefficients", k), c["u"]
             cells = [
                 text_cell(c["name"], "strong"),
                 text_cell(c["meaning"]),
+                *([] if groups else [text_cell(c["unit"])]),
                 number_cell(doc, (*path, "estimate"), u),
                 number_cell(doc, (*path, "u"), u),
                 number_cell(doc, (*path, "interval", 0), u),

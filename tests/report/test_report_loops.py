@@ -18,6 +18,7 @@ from gyrobench.report.content import read_content
 from gyrobench.report.document import document
 from gyrobench.report.responses import draw
 from gyrobench.report.style import styled
+from gyrobench.report.tables import unit_groups
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 
 PLAN = LoopPlan(
@@ -115,3 +116,22 @@ def test_phases_a_turn_apart_are_drawn_together() -> None:
         one = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(a))], "k")
         two = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(b))], "k")
     assert one == two
+
+
+def test_units_of_a_loop_stand_in_a_column(tmp_path: Any) -> None:
+    """Gain margin in dB, crossover in Hz, stiffness in N·m/rad: headings would make as many groups as rows."""
+    loop = result()
+    first = loop.coefficients[0]
+    loop.coefficients += [dataclasses.replace(first, name=f"other {unit}", unit=unit) for unit in ("Hz", "s", "V")]
+    html = Written(report.write(loop, tmp_path)).paths["html"].read_text(encoding="utf-8")
+    assert ">unit<" in html and ">Hz<" in html and ">in Hz<" not in html
+    loop.coefficients += [dataclasses.replace(first, name=f"further {unit}", unit=unit) for unit in ("Hz", "s", "V")]
+    html = Written(report.write(loop, tmp_path)).paths["html"].read_text(encoding="utf-8")
+    assert ">in Hz<" in html and ">in s<" in html
+
+
+def test_one_unit_or_few_units_of_many_rows_are_groups() -> None:
+    rows = [{"unit": unit} for unit in ("°/h", "°/h/g", "°/h/g", "°/h/g²", "°/h/g²")]
+    assert unit_groups(rows) == [("°/h", [0]), ("°/h/g", [1, 2]), ("°/h/g²", [3, 4])]
+    assert unit_groups(rows[:1]) == [("°/h", [0])]
+    assert unit_groups([{"unit": "s"}, {"unit": "Hz"}, {"unit": "s"}, {"unit": "V"}]) == []
