@@ -111,7 +111,7 @@ READ: dict[str, tuple[Any, int]] = {  # what is read, runs
     "accelerometer_multipoint, 12": (acceleration, 200),
     "servo_vertical_level": (angle, 140),
     "servo_polar": (angle, 120),
-    "servo_two_axis": (angles, 90),
+    "servo_two_axis": (angles, 70),
     "pickoff_scale_factor": (voltage, 350),
     "torquer_scale_factor": (angle, 330),
 }
