@@ -93,3 +93,31 @@ def test_scale_factor_error_scales_everything(session: Session) -> None:
     k = 17.2e3 * DPH
     found, _, _ = tumble(session, **truth, k=1.001 * k)
     expect(found, **{n[5:]: 1.001 * v / DPH for n, v in truth.items()})
+
+
+def test_rate_ripple_once_a_turn(session: Session) -> None:
+    """A rate W_t (1 + r sin theta) of the table gives it r W_t2 cos(theta) of acceleration about the output axis, which
+    J/H turns into a rate: cosines with opposite sign in the mounts are D_IO, 2 (J/H) r W_t2/(gamma2 sin 2 phi).  It
+    needs more than a hundred Earth rates and a large r to be seen.
+    """
+    r, j_h = 5e-3, 1e-3
+    found, closed, _ = tumble(session, table__ripple=r, table__ripple_cycles=1)
+    size = 2.0 * j_h * r * RATE**2 / (GAMMA**2 * math.sin(2 * PHI)) / DPH
+    assert size > 5e-4
+    for shown in (found, closed):
+        assert shown["D_IO"] == pytest.approx(size, rel=0.01)
+        assert max(abs(v) for n, v in shown.items() if n != "D_IO") < 0.01 * size
+
+
+def test_rate_ripple_with_a_tilted_input_axis(session: Session) -> None:
+    """An input axis tilted by eps towards the output axis sees eps W_t r sin(theta), with opposite sign in the mounts,
+    as the spin axis's Z: -eps W_t r/(gamma cos phi) in D_S of the closed formulas, besides what the tilt itself does.
+    """
+    eps, r = 3e-4, 5e-3
+    _, plain, _ = tumble(session, gyro__mount=towards_output(eps))
+    _, closed, _ = tumble(session, gyro__mount=towards_output(eps), table__ripple=r, table__ripple_cycles=1)
+    shift = {n: closed[n] - plain[n] for n in closed}
+    size = eps * RATE * r / (GAMMA * C) / DPH
+    assert shift.pop("D_S") == pytest.approx(-size, rel=0.01)
+    assert shift.pop("D_IO") == pytest.approx(2.0e-3 * r * RATE**2 / (GAMMA**2 * math.sin(2 * PHI)) / DPH, rel=0.01)
+    assert max(map(abs, shift.values())) < 0.01 * size
