@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter
-from gyrobench.math import cos, fabs, pi, sin
+from gyrobench.math import cos, fabs, pi, sin, where
 
 
 class DecouplerT2(Component):
@@ -17,7 +17,7 @@ class DecouplerT2(Component):
         k cos(a + offset),    k (1 + imbalance) sin(a + offset + quadrature)
 
     An offset costs as much phase margin as it has degrees and a crosstalk of its sine.  The secant is that of the
-    middle angle up to theta_f_max; beyond it, it is held at that value and `saturated` is 1.
+    middle angle up to theta_f_max; nearer to 90 deg its size is held and `saturated` is 1.  Beyond 90 deg it is negative.
 
     T2 decouples where the three channels are alike: drives normalized by the inertia of their axes, |f| < 90 deg.
 
@@ -57,9 +57,9 @@ class DecouplerT2(Component):
         y = sa * self.u[0] + ca * self.u[1]
         middle = self.theta[0] if self.mount == 0.0 else self.theta[1]
         c = cos(middle)
-        over = fabs(middle) > self.theta_f_max
+        over = fabs(c) < self.least
         if over:
-            c = self.least
+            c = where(c < 0.0, -self.least, self.least)
         self.u_axes[0] = x if self.mount == 0.0 else x / c
         self.u_axes[1] = y / c if self.mount == 0.0 else y
         self.u_axes[2] = self.u[2]

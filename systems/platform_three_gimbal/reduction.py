@@ -9,12 +9,13 @@ import numpy as np
 
 from gyrobench.reduction.gimbals import DEG, Flight, lock_table, over_time, spans
 from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import cross_axis, drift, response
+from gyrobench.reduction.loops import Gate, cross_axis, drift, response
 from gyrobench.reduction.result import Result
 from gyrobench.system.record import Record
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
+REST = "drift"  # label of the drift hold; the other phases without excitation are legs
 COUPLING = 4.0  # Hz, where the coupling between the axes is shown
 DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z of the platform
 
@@ -31,7 +32,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     summary = _flight(found)
     return found.result(
         title="Three-gimbal platform with two gyros",
-        method="Load steps, sine sweeps of the loops, commanded rate, drift hold, and a flight of the base",
+        method="A flight of the base; load steps, sine sweeps of the loops, commanded rate, drift hold",
         sources=["PLATFORM-3GIMBAL-2DOF; 004_a44a05c7e88249d1.txt ch. 5.2.1 (no equations there; spec d4, 8)"],
         equation="[bold(a)_o space bold(a)_m space bold(a)_i] (dot(o), dot(m), dot(i))^T = "
         "T_1 bold(s) - bold(omega)_b, quad det = cos m, quad bold(u)_A = R(i) bold(u)",
@@ -47,6 +48,10 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     )  # fmt: skip
 
 
+def _rest(found: LoopFindings) -> list[Gate]:
+    return [g for g in found.of("hold") if g.label == REST]
+
+
 def _loads(found: LoopFindings) -> None:
     """The servo yields by M / (drag feedback) when the channel has no integral; drag and lag are the platform's."""
     p = found.record.meta["parameters"]
@@ -55,7 +60,7 @@ def _loads(found: LoopFindings) -> None:
     for gate in found.of("torque", shape="step"):
         axis = AXES[gate.axis - 1]
         output = f"platform.theta[{gate.axis}]"
-        own = drift(found.of("hold")[0].t, found.of("hold")[0][output]).rate if found.of("hold") else 0.0
+        own = next((drift(g.t, g[output]).rate for g in _rest(found)), 0.0)
         step = found.step(gate, output, scale=ARCSEC, unit="″", y_name=f"{axis} gimbal", drift=own)
         closed = drag * feedback if drag and feedback and not p.get("pitch.integral") else None
         if step.change and closed:
@@ -81,9 +86,8 @@ def _coupling(found: LoopFindings) -> None:
 
 def _command(found: LoopFindings) -> None:
     """Less the drift that the hold showed."""
-    holds = found.of("hold")[:1]
     for gate in found.of("command", shape="step"):
-        own = drift(holds[0].t, holds[0][f"platform.attitude[{gate.axis}]"]).rate if holds else 0.0
+        own = next((drift(g.t, g[f"platform.attitude[{gate.axis}]"]).rate for g in _rest(found)), 0.0)
         late = gate.t > gate.t[0] + 0.3 * (gate.t[-1] - gate.t[0])
         y = gate[f"platform.attitude[{gate.axis}]"][late]
         got = drift(gate.t[late], y)
@@ -93,7 +97,7 @@ def _command(found: LoopFindings) -> None:
 
 
 def _drift(found: LoopFindings) -> None:
-    for gate in found.of("hold")[:1]:
+    for gate in _rest(found):
         for axis, k, name in zip("xyz", (1, 2, 3), DRIFTS, strict=True):
             got = drift(gate.t, gate[f"platform.attitude[{k}]"])
             truth = float(np.mean(gate[name])) / DPH if name in gate.channels else None
@@ -110,11 +114,10 @@ def _drift(found: LoopFindings) -> None:
 
 def _flight(found: LoopFindings) -> list[str]:
     """What the flight did: errors, gimbal rates, lock."""
-    holds = found.of("hold")  # the drift hold, and the legs
-    legs = holds[1:]
+    legs = [g for g in found.of("hold") if g.label != REST]
     if not legs:
         return []
-    flight = Flight(legs, "platform.attitude", holds[0])
+    flight = Flight(legs, "platform.attitude", next(iter(_rest(found)), None))
     mount = int(found.record.meta["options"].get("mount", 1))
     middle = flight[f"platform.theta[{2 if mount else 1}]"]
     end, most = float(flight.error[-1]), float(flight.error.max())
@@ -133,7 +136,7 @@ def _flight(found: LoopFindings) -> list[str]:
     ]  # fmt: skip
     if any(np.any(flight[f"{g}.saturated"] > 0.5) for g in ("gyro_a", "gyro_b")):
         found.warnings.append(
-            "A pickoff of the gyros was saturated in the flight: the platform has left them; they must be caged."
+            "A pickoff of the gyros was saturated in the flight: the platform had left them; real ones reach their stops."
         )
     if not locked:
         return [f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."]
@@ -143,7 +146,10 @@ def _flight(found: LoopFindings) -> list[str]:
     if b < flight.t.size - 1:
         text += f", to t = {flight.t[b]:.4g} s"
     found.warnings.insert(0, f"{text}.")
-    return [f"{text}: the platform turned by {end / DEG:.5g}° and by {float(flight.error[a]) / DEG:.2g}° before it."]
+    before = float(flight.error[: a + 1].max()) / DEG
+    return [
+        f"{text}: the platform was dragged along by up to {most / DEG:.5g}°; until then it was kept to {before:.2g}°."
+    ]
 
 
 def _legs(flight: Flight, middle: np.ndarray) -> dict[str, object]:

@@ -66,8 +66,9 @@ class PlatformThreeGimbal(System):
 
         L(s) = feedback / (s (lag s + 1))      for each axis, with the resolver at every azimuth
 
-    First load steps, sweeps of the three loops, a commanded rate and a drift hold at rest, then the flight: a roll, by
-    default to 90 deg and so into gimbal lock, and a yaw.  [PLATFORM-3GIMBAL-2DOF; 004_a44a05c7e88249d1.txt ch. 5.2.1]
+    First the flight: a roll, by default to 90 deg and so into gimbal lock, a yaw, and the way back.  Then, at rest,
+    load steps, sweeps of the three loops, a commanded rate and a drift hold.
+    [PLATFORM-3GIMBAL-2DOF; 004_a44a05c7e88249d1.txt ch. 5.2.1]
     """
 
     title = "Three-gimbal platform with two gyros"
@@ -97,6 +98,7 @@ class PlatformThreeGimbal(System):
         "yaw_rate": Option("10deg/s", "rad/s", "rate of the yaw", 1e-3),
         "mount": Option(1, int, "outer gimbal, 0: roll (lock at pitch 90 deg), 1: pitch (lock at roll 90 deg)", 0, 1),
         "allow_lock": Option(True, bool, "go on in gimbal lock; false: the platform ends the run there"),
+        "rate_max": Option("60deg/s", "rad/s", "largest rate of a gimbal", 0.1),
         "azimuth": Option(0.0, "rad", "azimuth joint angle at the start"),
         "resolver_offset": Option(0.0, "rad", "error of the resolver's zero"),
         "feedback": Option(40.0, "1/s", "rate of a servo for an angle of the platform", 1.0),
@@ -121,7 +123,7 @@ class PlatformThreeGimbal(System):
     channel_period = 2e-3
 
     def at_rest(self) -> list[LoopPhase]:
-        """Steps, sweeps, command and hold, before the flight; 7 / feedback = 0.18 s lets the loops settle."""
+        """Steps, sweeps, command and hold, after the flight; 7 / feedback = 0.18 s lets the loops settle."""
         wait = 14.0 / self["feedback"]
         phases = []
         for k, axis in enumerate(AXES, 1):
@@ -134,26 +136,28 @@ class PlatformThreeGimbal(System):
         return [*phases, LoopPhase("drift", "hold", settle=2 * wait, dwell=self["hold"])]
 
     def legs(self) -> list[Leg]:
-        """The flight; whole steps, so that the angles are exact."""
+        """The flight and the way back; whole steps, so that the angles are exact."""
         found = []
-        for name in ("roll", "yaw"):
-            steps = max(1, round(abs(self[name]) / self[f"{name}_rate"] / self.step))
-            time = steps * self.step
-            if self[name] != 0.0:
-                label = f"{name} {math.degrees(self[name]):.4g}°"
-                found.append(Leg(label, time, **{name: self[name] / time}))
+        for name, way in (("roll", 1.0), ("yaw", 1.0), ("yaw", -1.0), ("roll", -1.0)):
+            angle = way * self[name]
+            time = max(1, round(abs(angle) / self[f"{name}_rate"] / self.step)) * self.step
+            if angle != 0.0:
+                back = " back" if way < 0.0 else ""
+                found.append(Leg(f"{name} {math.degrees(self[name]):.4g}°{back}", time, **{name: angle / time}))
         return found
 
     def plan(self) -> LoopPlan:
-        return LoopPlan([*self.at_rest(), *flight.phases(self.legs())])
+        """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
+        return LoopPlan([*flight.phases(self.legs()), *self.at_rest()])
 
     def parameters(self) -> dict[str, Any]:
         found: dict[str, Any] = {
             **self.plan().parameters(),
-            **flight.parameters(self.legs(), len(self.at_rest())),
+            **flight.parameters(self.legs()),
             "motion.earth_rate?": 0.0,
             "platform.mount?": self["mount"],
             "platform.allow_lock?": int(self["allow_lock"]),
+            "platform.rate_max": self["rate_max"],
             "platform.theta_0[3]": self["azimuth"],
             "decoupler.form?": 1,
             "decoupler.mount?": self["mount"],

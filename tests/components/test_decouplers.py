@@ -110,8 +110,9 @@ def test_secant_is_held_beyond_its_limit(mount):
         (1.0, 1 / math.cos(1.0), 0),
         (1.2, 2.0, 1),
         (-1.2, 2.0, 1),
-        (1.6, 2.0, 1),
-        (3.0, 2.0, 1),
+        (1.6, -2.0, 1),  # turned over: cos is below 0
+        (-2.0, -2.0, 1),
+        (3.0, 1 / math.cos(3.0), 0),
     ):
         found = matrix(part, **{("pitch", "roll")[mount]: angle})
         assert found[1 - mount, 1 - mount] == pytest.approx(secant, rel=1e-12)

@@ -16,9 +16,9 @@ Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 NAME = "platform_three_gimbal"
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_platform.toml"
-#: the same truth in both, given in SI; a lag of 4 ms lets the integrators differ
+#: the same truth in both, given in SI; phases of whole samples; a lag of 4 ms lets the integrators differ
 SAME = {
-    **STILL, "roll": 60 * DEG, "azimuth": 0.4, "hold": 2.0,
+    **STILL, "roll": 72 * DEG, "azimuth": 0.4, "hold": 2.0,
     "platform.rate_gain": 0.8, "platform.lag": 4e-3, "platform.drag": 150.0, "platform.rate_max": 4.0,
 }  # fmt: skip
 

@@ -145,14 +145,20 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
 
 
 def test_three_gimbals_in_the_launch() -> None:
-    """The same flight with three gimbals passes near lock and loses > 2 deg at the same rate limit (4.0 deg by the
-    part's test with ideal feedback)."""
+    """The same flight with three gimbals passes near lock and loses > 2 deg at the same rate limit: 4.0 deg, as the
+    part with ideal feedback."""
     legs = load_system(NAME).with_values({"flight": "launch"}).flown().legs
-    rest = [LoopPhase("drift", "hold", settle=0.1, dwell=1.0)]
+    rest = [LoopPhase("drift", "hold", settle=1.0, dwell=1.0)]
     with session("platform_three_gimbal", list(legs), at_rest=lambda self: rest) as s:
-        values = {**STILL, "mounting": 0.0, "motion.start_angle[1]": "90deg", "platform.theta_0[1]": "-90deg"}
+        values = {
+            **STILL,
+            "mounting": 0.0,
+            "motion.start_angle[1]": "90deg",
+            "platform.theta_0[1]": "-90deg",
+            "rate_max": 5.0,
+        }
         result = s.system.reduce(s.run(values))
-    assert measures(result)["platform error"] > 2.0
+    assert measures(result)["platform error"] == pytest.approx(4.0, rel=0.05)
     assert table(result, "Gimbal lock")["rows"]
 
 

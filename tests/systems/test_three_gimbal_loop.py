@@ -29,7 +29,7 @@ def by_hand(feedback: float = 40.0, lag: float = 2e-3) -> tuple[float, float]:
 
 @pytest.fixture(scope="module")
 def quick() -> Iterator[Session]:
-    """The flight alone, behind a hold."""
+    """The flight, and a hold after it."""
     with session(NAME, at_rest=lambda self: REST) as s:
         yield s
 
@@ -49,10 +49,11 @@ def test_lock_table(m: float) -> None:
     rate = 0.01 * DEG
     leg = Leg("normal", 0.05, pitch=rate * math.cos(m * DEG), yaw=-rate * math.sin(m * DEG))
     with session(NAME, [leg], at_rest=lambda self: REST) as s:
-        record = s.run({**EXACT, "platform.theta_0[2]": m * DEG})
+        record = s.run({**EXACT, "rate_max": 5.0, "platform.theta_0[2]": m * DEG})
         result = s.system.reduce(record)
     c = record.channels
-    rates = np.abs([c[f"platform.theta_dot[{k}]"][-2] for k in (1, 2, 3)])
+    late = int(np.searchsorted(c["time"], 0.04))
+    rates = np.abs([c[f"platform.theta_dot[{k}]"][late] for k in (1, 2, 3)])
     known = {0.0: 1.0, 60.0: 2.0, 80.0: 5.76, 89.0: 57.3, 89.9: 573.0}[m]
     assert rates.max() / rate == pytest.approx(known, rel=2e-3)
     assert table(result, "Legs of the flight")["rows"][0][4] == pytest.approx(1.0 / math.cos(m * DEG), rel=2e-3)
@@ -65,21 +66,21 @@ def test_roll_to_exactly_90_then_50_of_yaw(quick: Session) -> None:
     result = quick.system.reduce(quick.run(EXACT))
     c = measures(result)
     assert c["platform error"] == pytest.approx(50.0, rel=1e-3)
-    assert c["error at the end"] == pytest.approx(50.0, rel=1e-3)
+    assert c["error at the end"] < 0.01  # dragged along on the way back, too
     (row,) = table(result, "Gimbal lock")["rows"]
     what, leg, begin, end, angle, _, before, worst = row
     assert (what, leg) == ("lock", "roll 90°")
-    start = result.provenance["plan"][0]["settle"] + result.provenance["plan"][0]["dwell"]
-    assert begin == pytest.approx(start + 85.0 / 36.0, abs=4e-3) and end > start + 7.4
+    assert begin == pytest.approx(85.0 / 36.0, abs=4e-3)
+    assert end == pytest.approx(15.0 - 85.0 / 36.0, abs=4e-3)  # roll and yaw, 7.5 s, there and back
     assert angle == pytest.approx(-85.0, abs=0.15)
     assert before < 1e-6 and worst == pytest.approx(50.0, rel=1e-3)
-    assert any("Gimbal lock from t = 3.4" in w and "-85.0" in w for w in result.warnings)
+    assert any("Gimbal lock from t = 2.36" in w and "-85.0" in w for w in result.warnings)
     assert [r.name for r in result.responses] == ["platform error", "gimbal angles"]
 
 
 def test_without_allow_lock_the_platform_ends_the_run(quick: Session) -> None:
-    """|cos m| < 1e-3 at 89.943 deg, 89.943 / 36 s = 2.498 s after 1.1 s."""
-    with pytest.raises(RunError, match=r"gimbal lock.*t = 3\.59"):
+    """|cos m| < 1e-3 at 89.943 deg, after 89.943 / 36 = 2.498 s."""
+    with pytest.raises(RunError, match=r"gimbal lock.*t = 2\.49"):
         quick.run({**EXACT, "allow_lock": False})
 
 
