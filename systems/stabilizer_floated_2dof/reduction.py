@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction import margins
+from gyrobench.reduction import margins, uncertainty
 from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops import Drift, Gate, Point, drift
 from gyrobench.reduction.result import Result
@@ -55,7 +55,7 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     )  # fmt: skip
     _isolation(found, base, loop, parameters)
     if hold is not None:
-        found.drift(hold, ANGLE, truth=_truth(parameters), walk=float(parameters.get("gyro.white_x", 0.0)))
+        _drift(found, hold, parameters)
     said = _blow(found)
     result = found.result(
         title="Stabilizer with a floated two-degree-of-freedom gyro",
@@ -70,13 +70,40 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     return result
 
 
-def _truth(p: Mapping[str, Any]) -> float | None:
-    """Static drift of the x channel at rest, where f = (0, 0, g): X = Y = 0, Z = -1."""
-    names = ("gyro.Dx_0", "gyro.Dx_z", "gyro.Dx_zz")
-    if any(n not in p for n in names) or p.get("motion.preset"):
+def _truth(p: Mapping[str, Any], angle: float) -> float | None:
+    """Static drift of the x channel, rad/s, on a platform turned by ``angle`` from level: Y = -sin, Z = -cos."""
+    names = ("0", "y", "z", "yy", "zz", "yz")
+    if any(f"gyro.Dx_{n}" not in p for n in names) or p.get("motion.preset"):
         return None
-    constant, along, squared = (float(p[n]) for n in names)
-    return constant - along + squared
+    constant, y, z, yy, zz, yz = (float(p[f"gyro.Dx_{n}"]) for n in names)
+    Y, Z = -math.sin(angle), -math.cos(angle)
+    return constant + y * Y + z * Z + yy * Y * Y + zz * Z * Z + yz * Y * Z
+
+
+def _drift(found: LoopFindings, gate: Gate, p: Mapping[str, Any]) -> None:
+    """Drift rate, and the random walk N beside the pickoff's noise, which the loop follows: dev2 tau = N2 + a/tau.
+
+    The slope of -1/2 alone does not show N here: noise of the angle, a/tau2 in the variance of the rate, lies over it
+    up to some seconds.  Weighted least squares over averaging times from 0.5 s on.
+    """
+    found.drift(gate, ANGLE, truth=_truth(p, float(np.mean(gate[ANGLE]))))  # the command has turned it
+    found.coefficients = [c for c in found.coefficients if c.name != "N"]
+    if not found.allan:
+        return
+    tau, dev, low, high = (np.array(found.allan[n], float) for n in ("tau", "dev", "lo", "hi"))
+    wide = tau >= 0.5
+    if np.count_nonzero(wide) < 3:
+        return
+    tau, dev, low, high = (x[wide] for x in (tau, dev, low, high))
+    y, u = dev**2 * tau, dev * tau * (high - low) / uncertainty.NORMAL
+    columns = np.column_stack([np.ones(tau.size), 1.0 / tau]) / u[:, None]
+    cov = np.linalg.inv(columns.T @ columns)
+    square = float((cov @ columns.T @ (y / u))[0])
+    if square > 0.0:
+        walk = math.sqrt(square) / 60.0  # °/h √s -> °/√h
+        spread = math.sqrt(cov[0, 0]) / (2.0 * math.sqrt(square)) / 60.0
+        true = math.degrees(float(p["gyro.white_x"])) * 60.0 if p.get("gyro.white_x") else None
+        found.measure("N", "angle random walk", "°/√h", walk, spread, truth=true)
 
 
 def _load(found: LoopFindings, gate: Gate, loop: Loop | None, own: Drift | None, quiet: Gate | None) -> None:
@@ -149,8 +176,8 @@ def _forms(loop: Loop, values: Mapping[str, tuple[float, float]]) -> dict[str, A
         rows.append(["gain limit, share of K", at[1], values.get("lower" if at[1] < 1.0 else "upper", (None,))[0], "1"])
     return {
         "title": "Closed forms of the loop",
-        "caption": "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The measured "
-        "loop has them.",
+        "caption": "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The "
+        "measured loop has them.",
         "columns": ["of the loop", "closed form", "measured", "unit"],
         "rows": rows,
     }

@@ -110,9 +110,9 @@ class StabilizerFloated2dof(System):
         settle = 3.0  # s: the slowest pole of the default loop, -4.96 1/s, leaves exp(-7) in the second half
         phases = [
             LoopPhase("load step", "torque", "step", 1, self["load"], settle=1.0, dwell=3.0),
-            LoopPhase("command step", "command", "step", 1, self["command"], settle=settle, dwell=3.0),
+            LoopPhase("command step", "command", "step", 1, self["command"], settle=5.0, dwell=3.0),
             *sweep("loop", "test", TEST, lambda f: self["test"] * max(1.0, 15.0 / f) ** 1.5, settle=settle),
-            *sweep("base", "motion", MOTION, lambda f: self["base"] / max(1.0, f * f), settle=settle, dwell=2.0),
+            *sweep("base", "motion", MOTION, lambda f: self["base"] / max(1.0, f), settle=settle, dwell=2.0),
             LoopPhase("drift", "hold", settle=settle, dwell=self["hold"]),
         ]
         if self["blow"] != 0.0:
