@@ -124,6 +124,8 @@ WIRES = """
 """
 NOISES = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "table.rumble")
 INDEX_RATE = 5e-3  # rad/s: the cage holds the float up to 8.3e-3
+#: rad/s (8 Hz): brushes hold a turning table M / (J capture_rate2) from null, and must let it within capture_angle
+CAPTURE_RATE = 50.0
 SHARED = {"H": "H_g", "J": "J_g", "C": "C_g", "K_sg": "K_g"}  # of the gyro -> what the table is told of it
 
 
@@ -169,6 +171,7 @@ def parameters(system: System) -> dict[str, Any]:
         "stand.base": np.eye(3),
         "table.base": BASE,
         "table.index_rate": INDEX_RATE,
+        "table.capture_rate": CAPTURE_RATE,
         **{told[n]: v for n, v in system.overrides.items() if n in told},
     }
 

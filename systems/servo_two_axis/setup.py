@@ -26,8 +26,6 @@ FACE = "gyro x, y, z along X, Y, Z at 0, 0"
 NEXT = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 #: what a servo table is told of a free rotor, which neither lags nor pulls at the table: H/C = 1, hardly any inertia
 FREE = {"H_g": 1e-6, "C_g": 1e-6, "J_g": 1e-12, "network": 1}
-#: rad/s (8 Hz): brushes hold the turning table M / (J capture_rate2) from null, and must let it within capture_angle
-CAPTURE = 50.0
 
 COUPLING = Socket(
     "AxisCoupling",
@@ -129,7 +127,7 @@ def parameters(system: System, mounts: Sequence[int]) -> dict[str, Any]:
     placed = {
         f"stand.mounts[{2 * k + i},{j + 1}]": MOUNTS[m][j] for k, m in enumerate(mounts) for i in (1, 2) for j in (0, 1)
     }
-    table = {**FREE, "base": NEXT, "index_rate": servo.INDEX_RATE, "capture_rate": CAPTURE}
+    table = {**FREE, "base": NEXT, "index_rate": servo.INDEX_RATE, "capture_rate": servo.CAPTURE_RATE}
     gains = {
         f"{slot}.K_g": system.overrides[name]
         for slot, name in (("outer", "gyro.K_sg_x"), ("inner", "gyro.K_sg_y"))
