@@ -136,7 +136,7 @@ def _flight(found: LoopFindings) -> list[str]:
     ]  # fmt: skip
     if any(np.any(flight[f"{g}.saturated"] > 0.5) for g in ("gyro_a", "gyro_b")):
         found.warnings.append(
-            "A pickoff of the gyros was saturated in the flight: the platform had left them; real ones reach their stops."
+            "A pickoff of the gyros was saturated in the flight: the platform had left them; real ones reach a stop."
         )
     if not locked:
         return [f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,9 @@ Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 NAME = "platform_three_gimbal"
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_platform.toml"
-#: the same truth in both, given in SI; phases of whole samples; a lag of 4 ms lets the integrators differ
+#: the same truth in both, given in SI; a lag of 4 ms lets the integrators differ
 SAME = {
-    **STILL, "roll": 72 * DEG, "azimuth": 0.4, "hold": 2.0,
+    **STILL, "roll": 60 * DEG, "azimuth": 0.4, "hold": 2.0,
     "platform.rate_gain": 0.8, "platform.lag": 4e-3, "platform.drag": 150.0, "platform.rate_max": 4.0,
 }  # fmt: skip
 
@@ -45,13 +46,15 @@ def test_the_vendors_platform_does_what_ours_does(both: Any) -> None:
     """The same plan on both, the whole run: they differ by what the integration explains, and by that.
 
     The vendor's servos are exact; ours are RK4, whose last stage, where the rates are read, has 1 - x + x2/2 - x3/4 for
-    exp(-x), x = h / lag = 1/8: x3/12 + x4/24 of what a step changes, and 50 N.m change the rate by 50/150 rad/s.  The
-    angles differ by less than 1e-6 rad in 1 rad, by the midpoint rule and a delay of that rate: with h2.
+    exp(-x), x = h / lag = 1/8: x3/12 + x4/24 of what a step changes, and 50 N.m change the rate by 50/150 rad/s; it
+    dies away with the lag, and up to 4 steps lie between the step and the next sample.  The angles differ by less than
+    1e-6 rad in 1 rad, by the midpoint rule and a delay of that rate: with h2.
     """
     ours, theirs = (both[k][0].channels for k in ("ours", "vendor"))
     assert theirs["time"] == pytest.approx(ours["time"])
-    assert apart(both, "platform.theta_dot") == pytest.approx((1.0 / 8**3 / 12 + 1.0 / 8**4 / 24) / 3.0, rel=0.02)
-    assert apart(both, "platform.theta_dot") / apart(both, "platform.theta_dot", 2) == pytest.approx(8.0, rel=0.1)
+    at_once = (1.0 / 8**3 / 12 + 1.0 / 8**4 / 24) / 3.0
+    assert math.exp(-4.0 / 8.0) * at_once < apart(both, "platform.theta_dot") < 1.02 * at_once
+    assert apart(both, "platform.theta_dot", 2) < apart(both, "platform.theta_dot") / 5.0
     for name in ("platform.theta", "platform.attitude"):
         assert apart(both, name) < 1e-6
         assert apart(both, name) / apart(both, name, 2) == pytest.approx(4.0, rel=0.1)
