@@ -23,13 +23,13 @@ DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z
 def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
+    summary = _flight(found)
     _loads(found)
     for k, axis in enumerate(AXES, 1):
         found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
     _coupling(found)
     _command(found)
     _drift(found)
-    summary = _flight(found)
     return found.result(
         title="Three-gimbal platform with two gyros",
         method="A flight of the base; load steps, sine sweeps of the loops, commanded rate, drift hold",
@@ -104,7 +104,8 @@ def _drift(found: LoopFindings) -> None:
             rate, u = got.rate / DPH, got.u / DPH
             found.measure(f"drift {axis}", f"of the platform about {axis}", "°/h", rate, u, truth=truth)
             if axis == "x":
-                found.allan = got.allan
+                scale = {k: [v / DPH for v in got.allan[k]] for k in ("dev", "lo", "hi") if k in got.allan}
+                found.allan = {**got.allan, **scale, "unit": "°/h"} if got.allan else {}
         scale = float(found.record.meta["parameters"].get("gyro_a.K_sg_y", 10.0))
         apart = drift(gate.t, (gate["gyro_b.u_x"] - gate["gyro_a.u_y"]) / scale)
         truth = float(np.mean(gate["gyro_a.drift_y"] - gate["gyro_b.drift_x"])) / DPH

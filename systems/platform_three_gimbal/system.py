@@ -143,7 +143,9 @@ class PlatformThreeGimbal(System):
             time = max(1, round(abs(angle) / self[f"{name}_rate"] / self.step)) * self.step
             if angle != 0.0:
                 back = " back" if way < 0.0 else ""
-                found.append(Leg(f"{name} {math.degrees(self[name]):.4g}°{back}", time, **{name: angle / time}))
+                rest = 0.0 if found else self.channel_period  # the gates open on samples of the record
+                label = f"{name} {math.degrees(self[name]):.4g}°{back}"
+                found.append(Leg(label, time, rest=rest, **{name: angle / time}))
         return found
 
     def plan(self) -> LoopPlan:
