@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.loop_result import LoopFindings
+from gyrobench.reduction.loop_result import DPH, LoopFindings
 from gyrobench.reduction.loops import Gate
 from gyrobench.reduction.method import ReductionError
 from gyrobench.reduction.result import Response, Result
@@ -57,6 +57,8 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
                       gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
     late = math.degrees(p.M * float(meta["step"]) / p.H) / 3**0.5
     found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
+    _drift(found, p, kind, free)
+    _command(found, p, kind, free)
     found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
                 caption="Angle of the platform over that of the base.")  # fmt: skip
@@ -211,6 +213,46 @@ def _rate(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: floa
     total = p.K * p.J0 + p.H**2
     found.measure("slope", "line beside the parabola, C H² M/(K J0 + H²)²", "arcmin/s", x[1] / ARCMIN,
                   math.hypot(u[1], slide) / ARCMIN, closed=p.C * p.H**2 * p.M / total**2 / ARCMIN)  # fmt: skip
+
+
+def _slope(p: Axis, t: Array, a: Array) -> tuple[float, float]:
+    """Rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
+    x, u = least_squares(np.column_stack([t - t[0], np.ones(t.size), p.transient(t - t[0])]), a)
+    return float(x[0]), float(u[0])
+
+
+def _drift(found: LoopFindings, p: Axis, kind: str, free: bool) -> None:
+    """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
+    q = found.record.meta["parameters"]
+    names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
+    for gate in found.of("hold") if kind != "rate" else ():
+        r, u = _slope(p, gate.t, gate["platform.attitude"])
+        closed_form = None
+        if free and all(n in q for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1)
+            fixed, along, squared = (float(q[n]) for n in names)
+            closed_form = (fixed - along + squared) / float(np.mean(np.cos(gate["gyro.b"]))) / DPH
+        found.measure("drift", "rate of the axis after the load", "°/h", r / DPH, u / DPH, closed=closed_form)
+
+
+def _command(found: LoopFindings, p: Axis, kind: str, free: bool) -> None:
+    """Change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c = cos(b).
+
+    Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
+    da'/(k i) = H2 c / (H2 c2 + J0 (K + H a' sin b)).
+    """
+    spin = float(found.record.meta["parameters"]["gyro.H"])
+    for gate in found.of("command", 1, "step"):
+        angle = found.record.channels["platform.attitude"]
+        before, u_before = _slope(p, found.record.channels["time"][gate.before], angle[gate.before])
+        after, u = _slope(p, gate.t, gate["platform.attitude"])
+        b = float(np.mean(gate["gyro.b"]))
+        spring = p.K + spin * before * math.sin(b) if kind == "rate" else 0.0
+        c = math.cos(b)
+        wanted = spin**2 * c / ((spin * c) ** 2 + p.J0 * spring) if free else None
+        u_share = math.hypot(u, u_before) / abs(gate.amplitude)
+        found.measure("rate gain", "change of rate over rate commanded", "1", (after - before) / gate.amplitude,
+                      u_share, closed=wanted)  # fmt: skip
+        found.step(gate, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
 
 
 def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from .closed import Axis
 
 Specification = Mapping[str, tuple[float | None, float | None]]
 KINDS = ("integrating", "rate-integrating", "rate")
+TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
 LIGHT = 0.3  # damping up to which 5-34 may be taken
 SWEEP = (0.05, 0.1, 0.2, 0.5, 1.0)  # Hz
 
@@ -43,6 +44,7 @@ class StabilizerSdf(System):
         exciter.motion_acceleration -> motion.motion_acceleration
         exciter.torque -> load.torque
         exciter.test[1] -> stabilizer.test
+        exciter.command[1] -> gyro.i
         motion.omega -> platform.omega_b
         motion.alpha -> platform.alpha_b
         motion.f -> platform.f_b
@@ -55,11 +57,13 @@ class StabilizerSdf(System):
         gyro.u -> stabilizer.u
         stabilizer.v -> platform.v
     """
+    factors = {"exciter.command[1] -> gyro.i": 1.0 / TORQUER}
     loops = {"stabilizer": "stabilizer.u"}
     options = {
         "kind": Option("rate-integrating", str, f"kind of gyro: {', '.join(KINDS)}"),
         "M": Option(10.0, "N.m", "disturbance torque"),
         "time": Option(100.0, "s", "how long it acts"),
+        "command": Option(1e-5, "rad/s", "rate commanded by the gyro's torquer; 0: none"),
         "J0": Option(1e6, "kg.m2", "inertia of the axis without the gyro"),
         "J": Option(10.0, "kg.m2", "inertia of the gyro's float about its output axis"),
         "H": Option(1e4, "N.m.s", "spin angular momentum"),
@@ -73,8 +77,8 @@ class StabilizerSdf(System):
     done = "exciter.done"
     step = 1e-3
     channels = (
-        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.test[1]", "exciter.motion_angle[1]",
-        "platform.attitude", "platform.omega[1]", "gyro.b", "stabilizer.e",
+        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "exciter.test[1]",
+        "exciter.motion_angle[1]", "platform.attitude", "platform.omega[1]", "gyro.b", "stabilizer.e",
     )  # fmt: skip
     channel_period = 1e-2
 
@@ -86,11 +90,14 @@ class StabilizerSdf(System):
         return Axis(self["J0"], self["J"], self["H"], c, k, self["M"])
 
     def plan(self) -> LoopPlan:
-        """The torque and the time after it; base motion where there is friction, test sines where there is a motor."""
+        """Torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
         phases = [
             LoopPhase("load", "torque", "step", amplitude=self["M"], settle=0.1, dwell=self["time"]),
-            LoopPhase("after the load", dwell=0.2 * self["time"]),
+            LoopPhase("drift", settle=0.05 * self["time"], dwell=0.15 * self["time"]),
         ]
+        if self["command"] != 0.0:
+            rest = 0.1 * self["time"]
+            phases.append(LoopPhase("command step", "command", "step", 1, self["command"], settle=rest, dwell=2 * rest))
         if self["viscous"] > 0.0:
             phases += sweep("base", "motion", SWEEP, 0.02, periods=4)
         if self["offload"] > 0.0:
@@ -113,6 +120,7 @@ class StabilizerSdf(System):
             "gyro.K": p.K,
             "gyro.stop": self["float_stop"],
             "gyro.reaction": True,
+            "gyro.k": TORQUER,
             "gyro.K_sg": 1.0,
             "gyro.u_max": 1e3,
             "gyro.step?": 1.0,

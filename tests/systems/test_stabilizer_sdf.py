@@ -178,6 +178,33 @@ def test_reduction_finds_the_figures(session, kind, name, wanted):
     assert found.closed == pytest.approx(wanted * scale, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    "kind, M, share",
+    [
+        ("integrating", 1e-3, 1.0),
+        ("rate-integrating", 1e-3, 1.0),
+        ("rate", 1e-3, 1e8 / (1e8 + 100.0 * 1e6)),  # the float leans by -J0 a'/H, the spring gives H2/(H2 + K J0) back
+        ("rate-integrating", 10.0, 1.0 / math.cos(5.7 * DEG)),  # behind the load the float stands at 5.7 deg
+    ],
+)
+def test_command_turns_the_axis(session, kind, M, share):
+    """Torque H k i on the float's axis: without spring the axis precesses with k i / cos(b)."""
+    record = run(session, 2e-3, kind=kind, M=M, time="100s", command=2e-5)
+    gain = next(c for c in session.system.reduce(record).coefficients if c.name == "rate gain")
+    assert gain.estimate == pytest.approx(share, rel=2e-4)
+    assert gain.closed == pytest.approx(share, rel=2e-4)
+
+
+def test_axis_drifts_with_its_gyro(session):
+    """D_F = 2, D_S = 0.5 deg/h per g: at rest omega_d = D_F - D_S; the axis follows with omega_d / cos(b)."""
+    dph = DEG / 3600.0
+    values = {"gyro.D_F": 2.0 * dph, "gyro.D_S": 0.5 * dph}
+    record = run(session, 2e-3, kind="rate-integrating", **values)
+    drift = next(c for c in session.system.reduce(record).coefficients if c.name == "drift")
+    assert drift.estimate == pytest.approx(1.5 / math.cos(5.7 * DEG), rel=1e-4)
+    assert drift.closed == pytest.approx(1.5 / math.cos(5.7 * DEG), rel=1e-4)
+
+
 def test_motor_takes_the_load_off_the_float(session):
     """M_motor = -offload b: the float comes to rest at M / offload, and the loop measured is that of the model."""
     record = run(session, 2e-3, kind="rate-integrating", offload="2000N.m/rad", time="60s")
