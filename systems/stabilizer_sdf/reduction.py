@@ -57,8 +57,11 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
                       gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
     late = math.degrees(p.M * float(meta["step"]) / p.H) / 3**0.5
     found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
-    _drift(found, p, kind, free)
-    _command(found, p, kind, free)
+    if free:  # a motor brings a slow pole in that is not in the fit beside the nutation
+        _drift(found, p, kind)
+        _command(found, p, kind)
+    for step in found.of("command", 1, "step"):
+        found.step(step, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
     found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
                 caption="Angle of the platform over that of the base.")  # fmt: skip
@@ -85,7 +88,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         result.summary = [
             f"After {t[-1]:.4g} s of {p.M:g} N.m the platform leans by {ends.estimate:.4g} arcmin{beside}.",
             f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°.",
-            SAID[kind](p),
+            *([SAID[kind](p)] if free else []),
         ]
     return result
 
@@ -221,20 +224,20 @@ def _slope(p: Axis, t: Array, a: Array) -> tuple[float, float]:
     return float(x[0]), float(u[0])
 
 
-def _drift(found: LoopFindings, p: Axis, kind: str, free: bool) -> None:
+def _drift(found: LoopFindings, p: Axis, kind: str) -> None:
     """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
     q = found.record.meta["parameters"]
     names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
     for gate in found.of("hold") if kind != "rate" else ():
         r, u = _slope(p, gate.t, gate["platform.attitude"])
         closed_form = None
-        if free and all(n in q for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1)
+        if all(n in q for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1)
             fixed, along, squared = (float(q[n]) for n in names)
             closed_form = (fixed - along + squared) / float(np.mean(np.cos(gate["gyro.b"]))) / DPH
         found.measure("drift", "rate of the axis after the load", "°/h", r / DPH, u / DPH, closed=closed_form)
 
 
-def _command(found: LoopFindings, p: Axis, kind: str, free: bool) -> None:
+def _command(found: LoopFindings, p: Axis, kind: str) -> None:
     """Change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c = cos(b).
 
     Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
@@ -248,11 +251,10 @@ def _command(found: LoopFindings, p: Axis, kind: str, free: bool) -> None:
         b = float(np.mean(gate["gyro.b"]))
         spring = p.K + spin * before * math.sin(b) if kind == "rate" else 0.0
         c = math.cos(b)
-        wanted = spin**2 * c / ((spin * c) ** 2 + p.J0 * spring) if free else None
+        wanted = spin**2 * c / ((spin * c) ** 2 + p.J0 * spring)
         u_share = math.hypot(u, u_before) / abs(gate.amplitude)
         found.measure("rate gain", "change of rate over rate commanded", "1", (after - before) / gate.amplitude,
                       u_share, closed=wanted)  # fmt: skip
-        found.step(gate, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
 
 
 def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
