@@ -20,12 +20,17 @@ class UsageError(Exception):
     """The user asks for something that does not exist or does not fit; the text says what would."""
 
 
+MANY = 30  # names that nobody reads in a message
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Names like ``name`` (a misprint), else all there are, as the end of a message."""
     known = list(known)
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.85)
     near = near or difflib.get_close_matches(name, known, n=3, cutoff=0.5) or [k for k in known if name and name in k]
-    return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known) or 'none'}"
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    return f"gyrobench list shows all {len(known)}" if len(known) > MANY else f"there are: {', '.join(known) or 'none'}"
 
 
 def short(path: Path) -> str:

@@ -23,7 +23,8 @@ def measuring(name: str) -> Any:
     if isinstance(system, Suite):
         raise UsageError(f"{name} compares runs: reduce each record by its own test, then give it their folders")
     if not hasattr(system, "measured"):
-        raise UsageError(f"{system.name} has no reduction of measured data")
+        known = [other for other in Bench.find().systems() if hasattr(load(other), "measured")]
+        raise UsageError(f"{system.name} has no reduction of measured data; there is one for {', '.join(known)}")
     return system
 
 

@@ -126,8 +126,10 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
             failed[name] = " ".join(line.strip(" -") for line in str(error).splitlines()[:2])
             note(f"{about}: no result: {error}")
             continue
-        if done.stopped:
+        if isinstance(done.stopped, Interrupted):
             raise Interrupted(f"{name}: {done.stopped}\nthe suite goes on with the same command and --resume")
+        if done.stopped:
+            note(f"{about}: {done.stopped}")
         if done.result is None:
             failed[name] = "it has no reduction"
             continue

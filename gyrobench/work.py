@@ -20,7 +20,7 @@ from gyrobench.system.suite import Suite
 from gyrobench.system.system import System, load_system
 from gyrobench.system.values import ValueProblem, parse
 
-HINTS = {"rad": "deg", "rad/s": "deg/h"}
+HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
 Limits = Mapping[str, tuple[float | None, float | None]]
 
 
@@ -96,9 +96,9 @@ def load(name: str, values: Mapping[str, Any] | None = None, step: float | None 
 def _bare(system: System, key: str, value: Any) -> str:
     """A hint for a number that was given without its unit."""
     option = system.options.get(key)
-    if option is None or not isinstance(option.unit, str) or option.unit == "1" or str(value)[-1:].isalpha():
+    if option is None or option.unit not in HINTS or str(value)[-1:].isalpha():
         return ""
-    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS.get(option.unit, '')}"
+    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS[option.unit]}"
 
 
 def check_fmus(parts: Mapping[str, str]) -> None:
@@ -146,14 +146,14 @@ def limits_of(spec: Path | None) -> Limits | None:
 @dataclass(frozen=True)
 class Done:
     """A run: where it is kept, and its result and report (none of a system without reduction).  stopped: what the user
-    stopped after the run itself.
+    stopped, or what failed, after the run itself.
     """
 
     folder: Path
     record: Record
     result: Result | None = None
     paths: Mapping[str, Path] = field(default_factory=dict)
-    stopped: str = ""
+    stopped: WorkError | None = None
 
 
 def run(job: Job, as_json: bool = False) -> str:
@@ -169,7 +169,7 @@ def run(job: Job, as_json: bool = False) -> str:
         return no_reduction(done.record, done.folder, as_json)
     show_paths(done.paths, None if as_json else telling.answer(done.result))
     if done.stopped:
-        raise Interrupted(done.stopped)
+        raise done.stopped
     return done.result.verdict
 
 
@@ -202,7 +202,7 @@ def perform(job: Job, system: System, step: float | None) -> Done:
             raise RunError(more, error.record) from None
         record.save(folder)
         keeper.done()
-        stopped = ""
+        stopped: WorkError | None = None
         try:
             if not reduces(system):
                 return Done(folder, record)
@@ -211,7 +211,11 @@ def perform(job: Job, system: System, step: float | None) -> Done:
                 try:
                     result.step_check = step_check(session, system, result, job.seed, h)
                 except RunInterrupted as error:
-                    stopped = f"step check {error}; the report is without it"
+                    stopped = Interrupted(f"step check {error}; the report is without it")
+                except Exception as error:
+                    if not ours(error):
+                        raise
+                    stopped = WorkError(f"step check: {error}\nthe report is without it")
             return Done(folder, record, result, publish(result, folder, record, spec), stopped)
         except Exception as error:
             if not ours(error):
@@ -300,9 +304,25 @@ def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
     results = []
     for folder, name in zip(runs, labels(runs), strict=True):
         results.append((name, reports.load((folder / "result.json").read_text(encoding="utf-8"))))
+    _comparable(results)
     digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
     target = out or Bench.find().out / "comparison" / digest
     show_paths(reports.compare(results, target, bench=Bench.find().folder), None if as_json else "")
+
+
+def _comparable(results: list[tuple[str, Result]]) -> None:
+    """Raises UsageError for a run that has nothing in common with the baseline; a note where systems differ."""
+    (first, base), *others = results
+    known = {c.name for c in base.coefficients}
+    for name, result in others:
+        if known.isdisjoint(c.name for c in result.coefficients):
+            raise UsageError(
+                f"{name} ({result.system}) and {first} ({base.system}) have no coefficient in common: "
+                "nothing to compare"
+            )
+    systems = dict.fromkeys(r.system for _, r in results)
+    if len(systems) > 1:
+        note(f"note: runs of different systems ({', '.join(systems)}): equal names may not mean equal quantities")
 
 
 # -------------------------------------------------------------------------------------------- export

@@ -87,6 +87,8 @@ def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = (
             axes[1, 0].plot(curve["x"], [p + shift for p in curve["phase"]], dashes, color=colour, linewidth=1.0)
     for ax in axes[:, 0]:
         ax.set_xscale("log")
+    if top.dataLim.height < 1e-6:  # a ratio of 1 and its rounding errors
+        top.set_ylim(top.dataLim.y0 - 1.0, top.dataLim.y0 + 1.0)
     unit = first["y_unit"]
     top.set_ylabel(axis_label(first["y_name"], "dB" if unit in ("", "1") else f"dB re {unit}"))
     if phases:

@@ -128,7 +128,7 @@ def coefficients(doc: Json) -> list[Any]:
     columns += [Column("limit"), Column("verdict")] if limits else []
     groups = unit_groups(doc["coefficients"])
     if not groups:
-        columns.insert(2, Column("unit"))
+        columns.insert(4, Column("unit"))
     rows: list[Row] = []
     for unit, members in groups or [("", list(range(len(doc["coefficients"]))))]:
         rows += [heading(f"in {unit}")] if groups else []
@@ -138,9 +138,9 @@ def coefficients(doc: Json) -> list[Any]:
             cells = [
                 text_cell(c["name"], "strong"),
                 text_cell(c["meaning"]),
-                *([] if groups else [text_cell(c["unit"])]),
                 number_cell(doc, (*path, "estimate"), u),
                 number_cell(doc, (*path, "u"), u),
+                *([] if groups else [text_cell(c["unit"])]),
                 number_cell(doc, (*path, "interval", 0), u),
                 number_cell(doc, (*path, "interval", 1), u),
             ]
@@ -162,6 +162,19 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _shown(record: Mapping[str, Any], units: Mapping[str, str], most: int = 6) -> list[str]:
+    """The channels to draw: the first ones, those that do not move and counters and flags after the others."""
+    names = [n for n in record if n != "time"]
+
+    def dull(name: str) -> bool:
+        values = [float(v) for v in record[name]]
+        whole = units.get(name) == "1" and all(v.is_integer() for v in values)
+        return whole or not values or min(values) == max(values)
+
+    chosen = sorted(names, key=dull)[:most] if len(names) > most else names
+    return [n for n in names if n in chosen]
+
+
 def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
     curves = [s for s in doc["series"] if plots.is_curve(s)]
     blocks: list[Any] = responses.blocks(doc)
@@ -180,8 +193,8 @@ def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
             )
             alt = f"Points and fitted curve with residuals: {both}"
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
-    names = [n for n in record if n != "time"][:6]
     units = doc["provenance"].get("units") or {}
+    names = _shown(record, units)
     caption = (
         "The run in time: recorded channels, one above the other. Long records are drawn by the smallest and largest "
         "value of each stretch."

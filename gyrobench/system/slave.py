@@ -28,8 +28,12 @@ class PartFailure(Exception):
         self.slot, self.call, self.status, self.time = slot, call, status, time
         self.messages = list(messages)
         when = "" if time is None else f" at t = {time:.12g} s"
-        said = "".join(f"\n  {slot} said: {m}" for m in self.messages)
-        super().__init__(f"{slot}: {call} failed{when}: {status}{said}")
+        said = [m.removeprefix(f"{slot}: ") for m in self.messages]
+        if said and time is None:  # what the part refuses first: the names of calls mean nothing to most
+            text = "\n".join([f"{slot} does not start: {said[0]}", *(f"  {m}" for m in said[1:])])
+            super().__init__(f"{text}\n  ({call}: {status})")
+        else:
+            super().__init__(f"{slot}: {call} failed{when}: {status}" + "".join(f"\n  {slot} said: {m}" for m in said))
 
 
 class Slave(Protocol):

@@ -82,6 +82,8 @@ def read_ssp(path: Path, step: float) -> System:
     from fmpy import read_model_description
 
     path = Path(path)
+    if not path.is_file():
+        raise RefusedError(path.name, ["no such file"])
     try:
         folder = _unpack(path)
         root = ET.parse(folder / "SystemStructure.ssd").getroot()

@@ -110,6 +110,7 @@ class System:
     spec: ClassVar[tuple[str, ...]] = ()
     slots: ClassVar[Mapping[str, Slot]] = {}
     wires: ClassVar[str] = ""
+    open: ClassVar[tuple[str, ...]] = ()  # "slot.input" left at its start value on purpose: no note says so
     factors: ClassVar[Mapping[str, float]] = {}  # of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too)
     raw: ClassVar[Mapping[str, Any]] = {}  # "slot.variable" -> start value in the FMU's own unit
     options: ClassVar[Mapping[str, Option]] = {}

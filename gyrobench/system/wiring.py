@@ -82,8 +82,9 @@ def _elements(ports: Mapping[str, Bound], name: str) -> dict[str, Bound]:
 
 
 class _Layer:
-    def __init__(self, system: System, bindings: Mapping[str, Binding]) -> None:
+    def __init__(self, system: System, bindings: Mapping[str, Binding], usual: set[str]) -> None:
         self.system, self.bindings = system, bindings
+        self.usual = usual  # slots that hold the part of the system itself
         self.problems: list[str] = []
         self.notes: list[str] = []
         self.connections: list[Connection] = []
@@ -100,7 +101,8 @@ class _Layer:
         if found:
             return found
         if name.split("[")[0] in binding.absent:
-            self.notes.append(f"{wire}: {slot} has no '{name}' (optional); not connected")
+            if slot not in self.usual:  # the part the system is made with: its author knows
+                self.notes.append(f"{wire}: {slot} has no '{name}' (optional); not connected")
         else:
             names = dict.fromkeys(e.split("[")[0] for e in ports)
             self.problems.append(f"{wire}: {slot} has no {causality} '{name}'; {causality}s: {', '.join(names)}")
@@ -143,7 +145,10 @@ class _Layer:
             free = [
                 c.name
                 for c in binding.socket.connectors
-                if c.causality == "input" and not c.optional and not any((slot, e) in self.taken for e in c.elements)
+                if c.causality == "input"
+                and not c.optional
+                and not any((slot, e) in self.taken for e in c.elements)
+                and f"{slot}.{c.name}" not in self.system.open
             ]
             if free:
                 self.notes.append(f"{slot}: not connected, at start values: {', '.join(free)}")
@@ -170,7 +175,7 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
             raise WiringError(system.name, [f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 co-simulation"])
         descriptions[slot] = d
         bindings[slot] = fit(socket(declared.socket), d, load_mapping(maps.get(slot)), slot)
-    layer = _Layer(system, bindings)
+    layer = _Layer(system, bindings, {slot for slot, s in system.slots.items() if Path(paths[slot]).stem == s.part})
     for wire in parse_wires(system.wires):
         layer.lay(*wire)
     if layer.problems:

@@ -82,6 +82,7 @@ class OpenLoopDrift(System):
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
     windows = Windows.of("sampler")
+    open = ("gyro.i",)
     done = "sequencer.done"
     channels = ("gyro.u", "gyro.drift", "table.angle")
     channel_period = 1.0

@@ -90,6 +90,7 @@ class PickoffScaleFactor(System):
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
     step = 1e-4  # s: the rate of a move of 0.2 s reaches the gyro as held values, wrong by acceleration step2/4 at most
     windows = Windows.of("sampler")
+    open = ("gyro.i",)
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "gyro.drift")
     channel_period = 0.01

@@ -53,6 +53,7 @@ class StabilizerPower2dof(System):
         load.M[2] -> gyro.M_y
     """
     loops = {"stabilizer": "stabilizer.u"}
+    open = ("gyro.i_x", "gyro.i_y")
     step = 1e-4
     channel_period = 1e-3
     done = "exciter.done"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from typing import Any
 
 import jsonschema
@@ -19,6 +20,7 @@ from gyrobench.report.document import document
 from gyrobench.report.responses import draw
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
+from gyrobench.report.view import _shown
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 
 PLAN = LoopPlan(
@@ -128,6 +130,26 @@ def test_units_of_a_loop_stand_in_a_column(tmp_path: Any) -> None:
     loop.coefficients += [dataclasses.replace(first, name=f"further {unit}", unit=unit) for unit in ("Hz", "s", "V")]
     html = Written(report.write(loop, tmp_path)).paths["html"].read_text(encoding="utf-8")
     assert ">in Hz<" in html and ">in s<" in html
+
+
+def test_a_ratio_of_one_is_no_figure_of_rounding_errors() -> None:
+    ratio = dataclasses.asdict(responses(1.0)[1])
+    n = len(ratio["x"])
+    flat, rounded = ({**ratio, "y": [1.0 - k * 1e-16 * (i % 3) for i in range(n)], "u": [0.0] * n} for k in (0, 1))
+    with styled():
+        one, other = (
+            re.sub(r"f-p\w+", "", draw([("measured", r)], "f")) for r in (flat, rounded)
+        )  # without clip names
+    assert one == other
+
+
+def test_channels_that_tell_nothing_give_way() -> None:
+    moving = {f"gyro.{n}": [0.1, 0.2] for n in "abcdef"}
+    record = {"time": [0.0, 1.0], "exciter.phase": [1.0, 2.0], "gyro.still": [0.5, 0.5], **moving}
+    units = {"exciter.phase": "1", "gyro.still": "rad"}
+    assert _shown(record, units) == list(moving)
+    few = {k: record[k] for k in ("time", "exciter.phase", "gyro.still", "gyro.a")}
+    assert _shown(few, units) == ["exciter.phase", "gyro.still", "gyro.a"]
 
 
 def test_one_unit_or_few_units_of_many_rows_are_groups() -> None:

@@ -174,7 +174,7 @@ def test_per_g_coefficient_and_array_values(small: System) -> None:
 
 
 def test_part_refuses_its_parameter(small: System) -> None:
-    with pytest.raises(RunError, match=r"gyro: \w+ failed: status 3 \(Error\)\n  gyro said: .*H"):
+    with pytest.raises(RunError, match=r"gyro does not start: .*H.*\n  \(\w+: status 3 \(Error\)\)"):
         run(small, values={"gyro.H": -1.0})
 
 

@@ -1,0 +1,108 @@
+"""Mistakes of those who come with a platform, a stabilizer or an estimator: what is said, that nothing is lost."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench import cli
+
+Call = Callable[..., tuple[int, str, str]]
+BENCH = ["run", "estimator_bench", "--set", "samples=13000"]
+PLATFORM = ["run", "platform_single_axis"]
+POWER = ["run", "stabilizer_power_2dof"]
+
+
+@pytest.fixture
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """Runs a command in an empty folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
+        capsys.readouterr()
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return code, *capsys.readouterr()
+
+    return run
+
+
+PROFILES = {
+    "unsorted": "time [s],roll [deg]\n0,0\n1,1\n0.5,2\n",
+    "gap": "time [s],roll [deg]\n0,0\n1,\n2,2\n",
+    "bare": "time,roll\n0,0\n1,1\n2,2\n",
+    "metre": "time [s],roll [m]\n0,0\n1,1\n2,2\n",
+}
+REFUSED = [
+    (
+        [*POWER, "--set", "K_m=2000"],
+        "stabilizer does not start: K_m = ratio k_u k_i k_m = 2000 N.m/rad is at or beyond",
+    ),
+    ([*POWER, "--set", "K_m=-5"], "K_m = -5: must be >= 0 N.m/rad\n"),
+    ([*POWER, "--set", "profile=unsorted.csv"], "row 4: time = 0.5 s does not come after 1 s (row 3)"),
+    ([*POWER, "--set", "profile=gap.csv"], "row 3, column 'roll': '' is no finite number"),
+    ([*POWER, "--set", "profile=bare.csv"], "column 'time': no unit; write 'time [s]'"),
+    ([*POWER, "--set", "profile=metre.csv"], "column 'roll': wrong unit [m]: units that fit: rad"),
+    ([*PLATFORM, "--set", "platform.J=0"], "platform does not start: parameter J = 0 kg.m2 must be > 0"),
+    ([*PLATFORM, "--set", "hold=-60s"], "hold = -60: must be >= 10 s"),
+    ([*PLATFORM, "--set", "hold=60deg"], "units that fit: s, ms"),
+    ([*PLATFORM, "--part", "stabilizer=estimator_none"], "does not fit socket Stabilizer"),
+    ([*PLATFORM, "--part", "gyro=gyro_2dof"], "i: missing (input, A: torquer current)"),
+    ([*PLATFORM, "--part", "estimator=xyz"], "no part 'xyz'; gyrobench list shows all"),
+    ([*PLATFORM, "--step", "0"], "step = 0.0 s: must be > 0"),
+    ([*BENCH, "--part", "estimator=estimator_kalman_ar", "--set", "estimator.phi=[1.2,0.3,0.1]"], "not stationary"),
+    ([*BENCH, "--part", "estimator=estimator_sage_husa", "--set", "estimator.b=1.5"], "parameter b = 1.5 "),
+    (["run", "nothing.ssp"], "nothing.ssp refuses to run:\n  - no such file"),
+    (["run", "vertical_gyro", "--set", "phases=erection rst"], "'rst' is none of erection"),
+    (["run", "stabilizer_sdf", "--set", "J0=0kg.m2"], "J0 = 0 kg.m2: must be > 0"),
+    (["reduce", "platform_single_axis", "--template"], "no reduction of measured data; there is one for acc"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED, ids=[" ".join(w[1:]) for w, _ in REFUSED])
+def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str) -> None:
+    for name, text in PROFILES.items():
+        (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
+    code, out, err = gyrobench(*words)
+    assert code == 2 and message in err and "Traceback" not in err
+    assert out == "" and "note:" not in err, "notes that nobody can act on hide the message"
+
+
+def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) -> None:
+    """The standard stabilizer has no i_motor either: that is the system's own choice, and no news."""
+    assert "note:" not in gyrobench("show", "platform_single_axis")[1]
+    assert gyrobench("init", "own", "--copy", "stabilizer_lead_lag")[0] == 0
+    source = Path("own/components/stabilizer_lead_lag")
+    source.rename("own/components/mine")
+    code, out, err = gyrobench("build", "stabilizer_lead_lag", "--out", ".")
+    assert code == 0, err
+    Path("stabilizer_lead_lag.fmu").rename("mine.fmu")
+    out = gyrobench("show", "platform_single_axis", "--part", "stabilizer=mine.fmu")[1]
+    assert "stabilizer has no 'i_motor' (optional); not connected" in out
+
+
+def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_common(gyrobench: Call) -> None:
+    """The bench of estimators has one step only, that of its readings."""
+    code, out, err = gyrobench(*BENCH, "--check-step", "--out", "a")
+    assert code == 3 and "step check: " in err and "the report is without it" in err
+    assert "a/report.html" in out and Path("a/report.html").is_file()
+
+    document = json.loads(Path("a/result.json").read_text(encoding="utf-8"))
+    for folder, system, rename in (("b", "vertical_gyro", "of b: "), ("c", "other", "")):
+        changed = [{**c, "name": rename + c["name"]} for c in document["coefficients"]]
+        Path(folder).mkdir()
+        text = json.dumps({**document, "system": system, "coefficients": changed})
+        Path(folder, "result.json").write_text(text, encoding="utf-8")
+    code, _, err = gyrobench("compare", "a", "b")
+    assert code == 2
+    assert "b (vertical_gyro) and a (estimator_bench) have no coefficient in common: nothing to compare" in err
+    code, _, err = gyrobench("compare", "a", "c")
+    assert code == 0 and "runs of different systems (estimator_bench, other)" in err
