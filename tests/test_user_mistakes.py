@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -106,3 +108,10 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     assert "b (vertical_gyro) and a (estimator_bench) have no coefficient in common: nothing to compare" in err
     code, _, err = gyrobench("compare", "a", "c")
     assert code == 0 and "runs of different systems (estimator_bench, other)" in err
+
+
+def test_python_dash_m(tmp_path: Path) -> None:
+    path = str(Path(cli.__file__).parents[1])
+    words = [sys.executable, "-m", "gyrobench", "show", "nothing"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 2 and done.stderr.startswith("gyrobench: no system 'nothing'")

@@ -1,0 +1,8 @@
+"""``python -m gyrobench``: the commands, where no ``gyrobench`` is on the path."""
+
+from __future__ import annotations
+
+from gyrobench.cli import main
+
+if __name__ == "__main__":
+    main()
