@@ -62,6 +62,11 @@ class Flight:
             raise ReductionError(f"the record has no channel {name}; it has {', '.join(self.channels)}")
         return self.channels[name][self.first : self.last]
 
+    def u(self, step: float) -> float:
+        """Standard uncertainty of the largest error, rad: the noise, and what the platform turns in a step at most."""
+        moves = float(np.abs(np.gradient(self.error, self.t)).max()) * step if self.t.size > 1 else 0.0
+        return math.hypot(self.noise, moves / math.sqrt(12.0))
+
     def leg(self, gate: Gate) -> slice:
         """Where a phase lies in the arrays of the flight."""
         return slice(gate.inside.start - self.first, gate.inside.stop - self.first)

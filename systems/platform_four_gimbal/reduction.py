@@ -53,11 +53,17 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
 def _flight(found: LoopFindings, flight: Flight) -> list[str]:
     error, travel = flight.error / DEG, float(np.ptp(flight[OUTER])) / DEG
     g2 = np.abs(flight[INNER]) / DEG
-    u = flight.noise / DEG
+    u = flight.u(float(found.record.meta["step"])) / DEG
     found.measure("platform error", "largest in the flight, drift taken off", "°", float(error.max()), u)
-    found.measure("error at the end", "of the flight", "°", float(error[-1]), u)
-    found.measure("ring 4 travel", "largest less smallest angle of the fourth gimbal", "°", travel, u)
-    found.measure("g2 max", "largest inner roll", "°", float(g2.max()), u)
+    found.measure("error at the end", "of the flight", "°", float(error[-1]), flight.noise / DEG)
+    found.measure(
+        "ring 4 travel",
+        "largest less smallest angle of the fourth gimbal",
+        "°",
+        travel,
+        _moved(found, flight["platform.theta_4_dot"]),
+    )
+    found.measure("g2 max", "largest inner roll", "°", float(g2.max()), _moved(found, flight["platform.theta_dot[2]"]))
     steep = np.abs(np.cos(flight[PITCH])) < STEEP
     held = _held(flight)
     kinds = {"fourth gimbal locked": held, "pitch within 5° of the vertical": steep & (held < 0.5)}
@@ -83,6 +89,11 @@ def _flight(found: LoopFindings, flight: Flight) -> list[str]:
     if top and fast >= float(top) * (1.0 - 1e-9):
         found.warnings.append(f"A gimbal was at its largest rate, {float(top) / DEG:.4g}°/s, in the flight.")
     return _said(flight, error, travel, steep & (held < 0.5))
+
+
+def _moved(found: LoopFindings, rate: np.ndarray) -> float:
+    """Standard uncertainty of a ring's angle, deg: what it moves in a step at its fastest, rectangular."""
+    return float(np.abs(rate).max()) * float(found.record.meta["step"]) / math.sqrt(12.0) / DEG
 
 
 def _held(flight: Flight) -> np.ndarray:

@@ -122,7 +122,8 @@ def _flight(found: LoopFindings) -> list[str]:
     mount = int(found.record.meta["options"].get("mount", 1))
     middle = flight[f"platform.theta[{2 if mount else 1}]"]
     end, most = float(flight.error[-1]), float(flight.error.max())
-    found.measure("platform error", "largest in the flight, drift taken off", "°", most / DEG, flight.noise / DEG)
+    u = flight.u(float(found.record.meta["step"]))
+    found.measure("platform error", "largest in the flight, drift taken off", "°", most / DEG, u / DEG)
     found.measure("error at the end", "of the flight", "°", end / DEG, flight.noise / DEG)
     found.tables.append(_legs(flight, middle))
     locked = spans(flight["platform.lock"])
