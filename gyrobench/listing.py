@@ -90,8 +90,11 @@ def init_bench(folder: Path, copies: list[str]) -> list[str]:
     (folder / "README.md").write_text(README.format(name=folder.resolve().name), encoding="utf-8")
     (folder / ".gitignore").write_text("fmus/\nreports/out/\n", encoding="utf-8")
     lines = [f"{folder}: a new bench; cd {folder} and gyrobench list"]
-    for name in dict.fromkeys(copies):
-        room, source = ("components", parts[name]) if name in parts else ("systems", systems[name])
+    found = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
+    for room, name in found:  # a part and a system may have the same name: then both
+        source = (parts if room == "components" else systems).get(name)
+        if source is None:
+            continue
         target = folder / room / name
         shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
         if room == "components":

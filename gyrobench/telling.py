@@ -73,6 +73,21 @@ def suite_answer(result: Result) -> str:
     return "\n".join([answer(result), *table, "", *said])
 
 
+def ranking(found: Mapping[str, Any]) -> str:
+    """Runs of a comparison in the order of the measure that ranks them; empty where none does."""
+    from gyrobench.report.numbers import write_number
+
+    ranked = found["ranking"]
+    if not ranked:
+        return ""
+    rows = [["", "run", ranked["name"], "u", "unit", "over the best"]]
+    for place, entry in enumerate(ranked["order"], 1):
+        value, u = (write_number(entry[k], entry["u"]).text for k in ("value", "u"))
+        over = write_number(entry["over_best"], significant=3).text
+        rows.append([str(place), found["runs"][entry["run"]]["name"], value, u, ranked["unit"], over])
+    return "\n".join([*columns(rows, {0, 1, 4}), ""])
+
+
 # ------------------------------------------------------------------------------------------- systems
 def system(found: Mapping[str, Any]) -> str:
     """The description of a system (:func:`gyrobench.system.describe.describe`)."""

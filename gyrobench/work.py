@@ -199,7 +199,7 @@ def perform(job: Job, system: System, step: float | None) -> Done:
             more = f"{error}\nthe record until then is kept in {short(kept)}"
             if isinstance(error, RunInterrupted):
                 raise Interrupted(f"{more} (gyrobench report says what it lacks)") from None
-            raise RunError(more, error.record) from None
+            raise WorkError(more) from None
         record.save(folder)
         keeper.done()
         stopped: WorkError | None = None
@@ -307,7 +307,12 @@ def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
     _comparable(results)
     digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
     target = out or Bench.find().out / "comparison" / digest
-    show_paths(reports.compare(results, target, bench=Bench.find().folder), None if as_json else "")
+    paths = reports.compare(results, target, bench=Bench.find().folder)
+    if as_json:
+        show_paths(paths, None)
+    else:
+        found = json.loads(paths["json"].read_text(encoding="utf-8"))
+        show_paths(paths, telling.ranking(found))
 
 
 def _comparable(results: list[tuple[str, Result]]) -> None:

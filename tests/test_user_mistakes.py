@@ -108,6 +108,22 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     assert "b (vertical_gyro) and a (estimator_bench) have no coefficient in common: nothing to compare" in err
     code, _, err = gyrobench("compare", "a", "c")
     assert code == 0 and "runs of different systems (estimator_bench, other)" in err
+    code, out, err = gyrobench("compare", "c", "a")
+    assert code == 0 and [line.split()[:2] for line in out.splitlines()[1:3]] == [["1", "c"], ["2", "a"]]
+
+
+def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Call) -> None:
+    code, out, _ = gyrobench("init", "own", "--copy", "vertical_gyro")
+    assert code == 0 and "change its model.py" in out and "change its system.py" in out
+    assert Path("own/components/vertical_gyro/model.py").is_file()
+    assert Path("own/systems/vertical_gyro/system.py").is_file()
+
+
+def test_a_run_that_breaks_off_says_once_where_its_record_is(gyrobench: Call) -> None:
+    values = ["--set", "float_stop=0.01deg", "--set", "time=5s"]
+    code, _, err = gyrobench("run", "stabilizer_sdf", *values, "--out", "a")
+    assert code == 3 and "the float" in err and err.count("the record until then is kept in a") == 1
+    assert Path("a/run.json").is_file()
 
 
 def test_python_dash_m(tmp_path: Path) -> None:
