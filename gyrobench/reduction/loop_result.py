@@ -126,7 +126,7 @@ class LoopFindings:
             rows.append(found.row(label))
             curves.append(_curve(label, span, dense))
             if found.crossover is not None:
-                self._agreement(points, m.model_response(model, at)[:, 0, 0], found, label, up_to)
+                self._agreement(points, m.model_response(model, at)[:, 0, 0], found, (label, title), up_to)
             if kind == "discrete":
                 self._conditional(title, found)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
@@ -142,7 +142,9 @@ class LoopFindings:
             self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
         return points
 
-    def _agreement(self, points: Sequence[Point], model: Any, found: m.Margins, label: str, up_to: float) -> None:
+    def _agreement(
+        self, points: Sequence[Point], model: Any, found: m.Margins, names: tuple[str, str], up_to: float
+    ) -> None:
         limit = up_to * float(found.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
@@ -151,11 +153,11 @@ class LoopFindings:
             table = {
                 "title": "Linear models against the measured loop",
                 "caption": "Largest differences of the measured points to the model, up to twice the crossover",
-                "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °"],
+                "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"],
                 "rows": [],
             }
             self.tables.append(table)
-        table["rows"].append([label, limit, count, db, degrees])
+        table["rows"].append([names[0], limit, count, db, degrees, names[1]])
 
     def _conditional(self, title: str, found: m.Margins) -> None:
         if found.lower is not None:

@@ -129,7 +129,7 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
     values = {"hold": 5.0}
     result = bench.system.with_values(values).reduce(bench.run(values, seed=5))
     rows = table(result, "Linear models against the measured loop")["rows"]
-    assert len(rows) == 6 and all(r[-2] < 0.02 and r[-1] < 0.6 for r in rows)
+    assert len(rows) == 6 and all(r[3] < 0.02 and r[4] < 0.6 for r in rows)
     c = measures(result)
     for axis in ("pitch", "roll", "azimuth"):
         assert c[f"S {axis}"] == pytest.approx(8000.0, rel=1e-3)

@@ -103,7 +103,7 @@ def test_margins_of_the_sweep_are_those_of_the_linear_parts(sessions):
     _, result, found = reduced(sessions[True], sweeps=True)
     rows = next(t for t in result.tables if t["title"].startswith("Linear models"))["rows"]
     assert len(rows) == 6  # three axes, with and without the step
-    for model, _, count, db, degrees in rows:
+    for model, _, count, db, degrees, _loop in rows:
         assert count >= 4
         assert db < (0.02 if "step" in model else 1.0) and degrees < (0.1 if "step" in model else 3.0)
     assert all(45.0 < found[f"PM {axis}"].estimate < 60.0 for axis in ("pitch", "roll", "azimuth"))

@@ -185,7 +185,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, with the gyro's noise."""
     result = load().reduce(whole)
     table = next(t for t in result.tables if t["title"].startswith("Linear models against"))
-    (exact, far, count, db, degrees), (smooth, _, _, db_c, degrees_c) = table["rows"]
+    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(31.5, abs=0.1) and count >= 14
     assert db < 0.02 and degrees < 0.15

@@ -171,7 +171,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     continuous model differs by the delay: half a step of holding and nothing else, 360 f h/2 = 0.048 deg at 2.66 Hz."""
     result = load().reduce(whole)
     table = next(t for t in result.tables if t["title"].startswith("Linear models against"))
-    (exact, far, count, db, degrees), (smooth, _, _, db_c, degrees_c) = table["rows"]
+    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(2.659, abs=0.01) and count >= 5
     assert db < 1e-3 and degrees < 5e-3
