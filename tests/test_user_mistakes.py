@@ -126,6 +126,20 @@ def test_a_run_that_breaks_off_says_once_where_its_record_is(gyrobench: Call) ->
     assert Path("a/run.json").is_file()
 
 
+def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
+    reduce = ["reduce", "torquer_scale_factor", "--data", "t.csv"]
+    head = "current [mA];rate_plus [deg/h];rate_minus [deg/h]\n"
+    for data, message in (
+        (("# operator = M\xfcller\n" + head).encode("latin-1"), "row 1: no UTF-8 text; save the table as CSV (UTF-8)"),
+        ((head + "1;17\n").encode("utf-16"), "row 1: no UTF-8 text"),
+        ((head + "1,5;17;17\n").encode(), "'1,5' is no finite number; the decimal sign is a point"),
+        ((head + "1;17\n" * 30).encode(), "row 9: 2 cells, the header has 3\n  - and 22 rows more\n"),
+    ):
+        Path("t.csv").write_bytes(data)
+        code, out, err = gyrobench(*reduce)
+        assert code == 2 and message in err and not out and "Traceback" not in err
+
+
 def test_python_dash_m(tmp_path: Path) -> None:
     path = str(Path(cli.__file__).parents[1])
     words = [sys.executable, "-m", "gyrobench", "show", "nothing"]

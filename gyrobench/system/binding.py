@@ -71,7 +71,7 @@ def load_mapping(file: Path | None) -> dict[str, Any]:
         return {}
     try:
         return tomllib.loads(Path(file).read_text("utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise MisfitError(f"mapping file {file}", [str(error)]) from None
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.system.measured import DataError
+from gyrobench.system.measured import DataError, read_lines
 from gyrobench.system.record import Record, RecordError
 
 DAY = 86400.0  # s
@@ -73,7 +73,7 @@ def read_runs(file: Path, system: str) -> Record | None:
 
     Raises DataError for folders that are no runs of ``system``, a run named twice, or fewer than two.
     """
-    lines = [t.strip() for t in Path(file).read_text("utf-8-sig").splitlines()]
+    lines = [t.strip() for t in read_lines(file)]
     lines = [t for t in lines if t and not t.startswith("#")]
     if not lines or lines[0].strip('"') != "run":
         return None

@@ -17,6 +17,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,16 @@ WINDOW_COLUMNS = (
 )
 
 
+def read_lines(file: Path) -> list[str]:
+    """The lines of a text file.  Raises DataError for one that is not UTF-8, as spreadsheets on Windows write them."""
+    data = Path(file).read_bytes()
+    try:
+        return data.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        row = data[: error.start].count(b"\n") + 1
+        raise DataError(file, [f"row {row}: no UTF-8 text; save the table as CSV (UTF-8)"]) from None
+
+
 def read_measured(
     file: Path, columns: tuple[Column, ...] = WINDOW_COLUMNS, time: str | None = "t_start"
 ) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
@@ -67,7 +78,7 @@ def read_measured(
     missing or wrong units, cells that are no finite number, doubled rows and times that do not increase, with the
     row numbers as an editor counts them.
     """
-    lines = Path(file).read_text("utf-8-sig").splitlines()
+    lines = read_lines(file)
     meta: dict[str, str] = {}
     table: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
@@ -85,11 +96,12 @@ def read_measured(
     rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
     expected = {c.name: c for c in columns}
     factors, problems = _header(header, expected)
-    problems += [f"row {n}: {len(r)} cells, the header has {len(header)}" for n, r in rows if len(r) != len(header)]
+    torn = [f"row {n}: {len(r)} cells, the header has {len(header)}" for n, r in rows if len(r) != len(header)]
+    problems += torn if len(torn) <= SHOWN else [*torn[:SHOWN], f"and {len(torn) - SHOWN} rows more"]
     if not rows:
         problems.append("no rows below the header")
     if problems:
-        raise DataError(file, problems[: 4 * SHOWN])
+        raise DataError(file, problems)
     found = {}
     for name, (k, factor, offset) in factors.items():
         values, bad = _numbers(name, [(n, r[k]) for n, r in rows], expected[name].whole)
@@ -131,7 +143,9 @@ def _header(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str
     for c in expected.values():
         if c.required and c.name not in known:
             unit = f" [{c.unit}]" if c.unit != "1" else ""
-            problems.append(f"column '{c.name}{unit}' is missing ({c.meaning}); there are: {', '.join(header)}")
+            problems.append(
+                f"column '{c.name}{unit}' is missing ({c.meaning}); there are: {shorten(', '.join(header), 200)}"
+            )
     return found, problems
 
 
@@ -143,7 +157,8 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
         except ValueError:
             x = math.nan
         if not math.isfinite(x):
-            bad.append(f"row {n}, column '{name}': '{text}' is no finite number")
+            comma = "; the decimal sign is a point" if re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text) else ""
+            bad.append(f"row {n}, column '{name}': '{text}' is no finite number{comma}")
         elif whole and x != math.floor(x):
             bad.append(f"row {n}, column '{name}': {text} must be an integer")
         values.append(x)
