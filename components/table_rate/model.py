@@ -22,8 +22,9 @@ class TableRate(Component):
 
         angle = x + (r / n) sin n x     rate = v (1 + r cos n x)     acc = a (1 + r cos n x) - r n v2 sin n x
 
-    angle_read is the angle rounded to the quantum.  With B = tilted base (rows: table axes in ENU at angle 0,
-    the axis is the third), Rz = passive rotation by the angle, w = Rz B omega_local:
+    angle_read = angle + a_1 sin(angle + p_1) + a_2 sin(2 angle + p_2), rounded to the quantum.  With B = tilted base
+    (rows: table axes in ENU at angle 0, the axis is the third), Rz = passive rotation by the angle,
+    w = Rz B omega_local:
 
         f     = face Rz B f_local
         omega = face (w + (0, 0, rate))
@@ -46,6 +47,8 @@ class TableRate(Component):
     rate_max = Parameter(10.0, "rad/s", "largest rate that may be asked for", above=0.0)
     ripple = Parameter(0.0, "1", "rate ripple, relative amplitude r", min=-0.1, max=0.1)
     ripple_cycles = Parameter(36, int, "ripple cycles per turn n", min=1, max=100000)
+    encoder_amplitude = Parameter([0.0, 0.0], "rad", "encoder error of orders 1 and 2")
+    encoder_phase = Parameter([0.0, 0.0], "rad", "their phases at angle 0")
     quantum = Parameter(0.0, "rad", "quantum of angle_read; 0: none", min=0.0)
 
     f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
@@ -56,7 +59,7 @@ class TableRate(Component):
 
     angle = Output("rad", "table angle, cumulative")
     rate = Output("rad/s", "table rate relative to its base")
-    angle_read = Output("rad", "table angle rounded to the quantum")
+    angle_read = Output("rad", "table angle as the encoder reads it")
     omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
     alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
     f = Output("m/s2", "specific force, face axes", shape=(3,))
@@ -182,8 +185,11 @@ class TableRate(Component):
             rate = self.v * (1.0 + rc)
             acc = self.a * (1.0 + rc) - n * self.v * self.v * rs
         read = angle
+        for k in range(2):
+            if self.encoder_amplitude[k] != 0.0:
+                read = read + self.encoder_amplitude[k] * sin((k + 1) * angle + self.encoder_phase[k])
         if self.quantum > 0.0:
-            read = self.quantum * floor(angle / self.quantum + 0.5)
+            read = self.quantum * floor(read / self.quantum + 0.5)
         c = cos(angle)
         s = sin(angle)
         e = [0.0, 0.0, 0.0]  # Earth rate and specific force in base axes, at angle 0

@@ -4,7 +4,8 @@ A source changes what the reduction believes (geometry: regressors X and input-a
 With gain G (estimates = G y) the change of the estimates is G (dy - dX a).  For the ideal geometry this gives the
 known sensitivities: input axis tilted towards the output axis by eps: eps W sin(phi)/gamma in D_O and nothing else
 [TUM1-SENS-IA]; table axis off the pole by delta: W delta/(gamma cos phi) in D_I or 2 W delta/(gamma^2 sin 2 phi) in
-D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, axis wobble, temperature.
+D_OS [TUM1-SENS-AXIS].  Not modelled: an independent tilt of each mount, wobble and encoder errors
+of other orders, temperature.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import frames
+from gyrobench import drift, frames
 from gyrobench.reduction import attitude
 from gyrobench.reduction.method import Effect, Findings
 
@@ -62,6 +63,13 @@ def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found
     def read(di: Array) -> Array:
         return found.change(-setup.k * di)
 
+    def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+        cases = []
+        for wave in (np.sin, np.cos):
+            start, end = (a + SMALL * wave(n * a) for a in (turning.angle_start, turning.angle_end))
+            cases.append(geometry(setup.base, replace(turning, angle_start=start, angle_end=end)))
+        return np.array(cases)
+
     full = float(np.max(np.abs(current))) or 1.0
     one = np.ones_like(current)
     along_i, along_o, along_s = np.eye(3)
@@ -71,6 +79,9 @@ def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found
         Effect(TOWARDS_OUTPUT, setup.u_mount, "rad", mount(along_s)),
         Effect("input axis towards spin axis", setup.u_mount, "rad", mount(-along_o)),
         Effect("gyro turned about its input axis", setup.u_mount, "rad", mount(along_i)),
+        Effect("wobble of the table axis, twice a turn", setup.u_wobble, "rad", _wobble(setup, turning, found)),
+        Effect("angle error, once a turn", setup.u_angle1, "rad", angles(1), "encoder"),
+        Effect("angle error, twice a turn", setup.u_angle2, "rad", angles(2), "encoder"),
         Effect("torquer scale factor", setup.u_scale_factor, "1", read(current), "relative, the same for all currents"),
         Effect(
             "torquer nonlinearity", setup.u_nonlinearity, "1", read(current * np.abs(current) / full),
@@ -79,3 +90,34 @@ def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found
         Effect("offset of the current reading", setup.u_current, "A", read(one)),
         Effect("resolution of the current reading", setup.quantum / 12.0**0.5, "A", read(one), "as if never dithered"),
     ]  # fmt: skip
+
+
+def _wobble(setup: TumbleSetup, turning: attitude.Turning, found: Findings) -> Array:
+    """Changes (2, p) by a table that goes round a cone twice a turn, per rad: q = (cos a, sin a, 0) in table axes at
+    angle 0, a = 2 theta and 2 theta + 90 degrees, as of the part axis_wobble.
+
+    The table then sees v - q x v of a vector v, and turns with q' besides; the reduction knows of neither.
+    """
+    theta = turning.nodes()
+    c, s = np.cos(theta), np.sin(theta)
+    turn = ((turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start))[:, None]
+
+    def seen(v: Array) -> Array:  # along the gyro axes, of (n, 12, 3) in table axes at angle 0
+        x, y, z = (v[..., k] for k in range(3))
+        return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
+
+    names = found.est.names
+    terms = tuple(n for n in names if n != TILT)
+    up = np.broadcast_to(setup.base @ np.array([0.0, 0.0, -setup.gravity / frames.G0]), (*theta.shape, 3))
+    earth = setup.base @ (setup.earth_rate * frames.pole(setup.latitude))
+    still = drift.regressors(seen(up), terms)
+    changes = []
+    for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
+        q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
+        going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
+        rate = attitude.average(seen(going - np.cross(q, earth)))  # what is there and not believed
+        dX = attitude.average(still - drift.regressors(seen(up - SMALL * np.cross(q, up)), terms)) / SMALL
+        if TILT in names:
+            dX = np.column_stack([dX, rate[:, 1]])
+        changes.append(found.change(-rate[:, 0], dX))
+    return np.array(changes)

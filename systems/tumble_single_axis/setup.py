@@ -14,6 +14,9 @@ from gyrobench import drift, frames
 from gyrobench.reduction import recorded
 
 Array = NDArray[np.float64]
+SIZES = (
+    "u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_scale_factor", "u_nonlinearity", "u_current",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,9 @@ class TumbleSetup:
     specification: Mapping[str, tuple[float | None, float | None]] | None = None
     u_axis: float = 0.0
     u_mount: float = 0.0
+    u_wobble: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
     u_scale_factor: float = 0.0
     u_nonlinearity: float = 0.0
     u_current: float = 0.0
@@ -95,5 +101,5 @@ def setup_of(
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")),
+        **recorded.sizes(meta, SIZES),
     )

@@ -240,3 +240,16 @@ def test_refuses_commands(mode, target, message):
     part = started(mode=mode, target=target)
     with pytest.raises(PartError, match=message):
         part.do_step(0.0, H)
+
+
+def test_encoder_harmonics_and_quantum():
+    # read = angle + a_1 sin(angle + p_1) + a_2 sin(2 angle + p_2), to the nearest quantum; the motion stays as it is
+    wrong = {"encoder_amplitude": [3e-3, -2e-3], "encoder_phase": [0.4, 1.1]}
+    part, rounded, plain = (started(mode=2.0, target=0.5, **p) for p in (wrong, {**wrong, "quantum": 1e-4}, {}))
+    for part_ in (part, rounded, plain):
+        run(part_, 5.0)
+    x = plain.angle
+    read = x + 3e-3 * math.sin(x + 0.4) - 2e-3 * math.sin(2.0 * x + 1.1)
+    assert part.angle == x and part.rate == plain.rate and plain.angle_read == x
+    assert part.angle_read == pytest.approx(read, abs=1e-15) and abs(read - x) > 1e-3
+    assert rounded.angle_read == pytest.approx(1e-4 * round(read / 1e-4), abs=1e-15)
