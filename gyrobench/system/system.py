@@ -26,6 +26,7 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 from __future__ import annotations
 
 import importlib.util
+import math
 import sys
 import zlib
 from collections.abc import Iterable, Mapping
@@ -62,6 +63,12 @@ class Slot:
     part: str
 
 
+def _bound(value: float, unit: str) -> str:
+    """A bound with its unit; an angle in degrees too, as nobody writes a latitude in radians."""
+    shown = f"{value:g}" if unit == "1" else f"{value:g} {unit}"
+    return f"{shown} ({math.degrees(value):.6g}deg)" if unit == "rad" and value else shown
+
+
 @dataclass(frozen=True)
 class Option:
     """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type."""
@@ -80,12 +87,12 @@ class Option:
         """The SI value; raises ValueProblem for a wrong dimension or a broken bound."""
         unit = "1" if isinstance(self.unit, type) else self.unit
         number = parse(name, value, unit, self.kind)
-        shown = "" if unit == "1" else f" {unit}"
         if not isinstance(number, str | list):
+            given = value.strip() if isinstance(value, str) else f"{number:g}"
             if self.min is not None and not number >= self.min:
-                raise ValueProblem(f"{name} = {number:g}: must be >= {self.min:g}{shown}")
+                raise ValueProblem(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
             if self.max is not None and not number <= self.max:
-                raise ValueProblem(f"{name} = {number:g}: must be <= {self.max:g}{shown}")
+                raise ValueProblem(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
         return number
 
 

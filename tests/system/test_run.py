@@ -149,7 +149,7 @@ def test_values_are_refused_with_a_hint(small: System) -> None:
     for values, words in (
         ({"lattitude": 1}, "lattitude: no such option of smalltumble; options: latitude"),
         ({"latitude": "45 km"}, "'km' \\(m\\) does not convert to 'rad'"),
-        ({"latitude": "100deg"}, "latitude = 1.74533: must be <= 1.5708 rad"),
+        ({"latitude": "100deg"}, "latitude = 100deg: must be <= 1.5708 rad"),
         ({"gyro.D_X": 1}, "gyro.D_X: gyro has no parameter 'D_X'; nearest: D_"),
         ({"gyro.H": "3 V"}, "gyro.H"),
         ({"gyro.mount": 3}, "gyro.mount: is an array"),
