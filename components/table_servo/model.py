@@ -328,8 +328,8 @@ class TableServo(Component):
                     self.x_s[k] = x
                     self.v_s[k] = goal
                     self.a_s[k] = 0.0
-                if self.mode == 1.0 and self.target != x:
-                    way = fabs(self.target - x)
+                way = fabs(self.target - x)
+                if self.mode == 1.0 and way * self.acceleration > 0.0:  # an angle that died away may be 1e-320
                     s = sign(self.target - x)
                     peak = minimum(self.index_rate, sqrt(way * self.acceleration))
                     ramp = peak / self.acceleration
