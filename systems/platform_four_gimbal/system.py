@@ -73,6 +73,7 @@ class PlatformFourGimbal(System):
     }
     wires = _wires()
     loops = {axis: f"{axis}.u" for axis in AXES}
+    open = ("gyro_a.i_x", "gyro_a.i_y", "gyro_b.i_x", "gyro_b.i_y")  # left at their start values
     options = {
         "flight": Option("crossing", str, f"what is flown: {', '.join(FLIGHTS)}"),
         "law": Option("sign", str, f"gain of the fourth servo: {', '.join(LAWS)}"),

@@ -47,6 +47,7 @@ class ServoTwoAxis(System):
         "sampler_y": Slot("Sampler", "sampler"),
     }
     wires = setup.WIRES
+    open = ("outer.face",)  # left at their start values
     options = {
         "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
         "height": Option(0.0, "m", "height above the ellipsoid"),
