@@ -17,7 +17,7 @@ class DecouplerT2(Component):
         k cos(a + offset),    k (1 + imbalance) sin(a + offset + quadrature)
 
     An offset costs as much phase margin as it has degrees and a crosstalk of its sine.  The secant is that of the
-    middle angle up to theta_f_max; nearer to 90 deg its size is held and `saturated` is 1.  Beyond 90 deg it is negative.
+    middle angle up to theta_f_max; nearer to 90 deg its size is held, `saturated` is 1.  Beyond 90 deg it is negative.
 
     T2 decouples where the three channels are alike: drives normalized by the inertia of their axes, |f| < 90 deg.
 

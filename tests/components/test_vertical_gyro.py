@@ -216,7 +216,7 @@ def test_measured_angles_are_those_of_the_vehicle(ring):
 
 
 def test_manoeuvre_is_the_rotation_of_its_rates():
-    """Turn in ENU axes, pitch, roll and yaw in vehicle axes, for 2 s, against rotations of scipy; f and omega with it."""
+    """Turn in ENU axes, pitch, roll and yaw in vehicle axes, for 2 s, against rotations of scipy; f and omega too."""
     given = {**row(turn=0.3, pitch=-0.5, roll=0.8, yaw=0.4, forward=1.0, right=2.0), "speed": 10.0, "earth_rate": 0.01}
     part = Manoeuvre(**given, start_angle=[0.2, -0.4, 1.1], latitude=0.5)
     part.gate = 1.0
