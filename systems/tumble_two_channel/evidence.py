@@ -85,6 +85,13 @@ def effects(s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turni
     def mounted(direction: Array) -> Array:
         return geometric(s.base, replace(turning, face=frames.rotation(direction, SMALL) @ turning.face))
 
+    def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+        cases = []
+        for wave in (np.sin, np.cos):
+            start, end = (a + SMALL * wave(n * a) for a in (turning.angle_start, turning.angle_end))
+            cases.append(geometric(s.base, replace(turning, angle_start=start, angle_end=end)))
+        return np.array(cases)
+
     k, full = s.k[OTHER[c]], float(np.max(np.abs(current))) or 1.0
     quantum = s.quantum.get(OTHER[c], 0.0)
     one = np.ones_like(current)
@@ -95,6 +102,8 @@ def effects(s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turni
             Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
             for n, d in zip("xyz", np.eye(3), strict=True)
         ),
+        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder"),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder"),
         Effect(
             "torquer scale factor", s.u_scale_factor, "1", found.change(-k * current),
             "relative, the same for all currents",

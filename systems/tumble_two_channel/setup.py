@@ -17,7 +17,7 @@ from . import geometry
 
 Array = NDArray[np.float64]
 Limits = Mapping[str, tuple[float | None, float | None]]
-SIZES = ("u_axis", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
+SIZES = ("u_axis", "u_mount", "u_angle1", "u_angle2", "u_scale_factor", "u_nonlinearity", "u_current")
 OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about the other axis
 
 
@@ -47,6 +47,8 @@ class TwoChannelSetup:
     specification: Limits | None = None
     u_axis: float = 0.0
     u_mount: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
     u_scale_factor: float = 0.0
     u_nonlinearity: float = 0.0
     u_current: float = 0.0

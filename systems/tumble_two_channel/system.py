@@ -91,6 +91,8 @@ class TumbleTwoChannel(System):
         ),
         "u_axis": Option(0.0, "rad", "standard uncertainty of the table axis against the pole", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the gyro axes against the fixture", 0.0),
+        "u_angle1": Option(0.0, "rad", "error of the angle readings once a turn, standard unc.", 0.0),
+        "u_angle2": Option(0.0, "rad", "error of the angle readings twice a turn, standard unc.", 0.0),
         "u_scale_factor": Option(0.0, "1", "relative standard uncertainty of the torquer scale factors", 0.0),
         "u_nonlinearity": Option(0.0, "1", "relative torquer nonlinearity at the largest current, standard unc.", 0.0),
         "u_current": Option(0.0, "A", "standard uncertainty of the zero of the current meters", 0.0),

@@ -128,3 +128,21 @@ def test_set_up_errors_shift_as_the_budget_predicts(session: Session, source: st
         assert abs(b.estimate - a.estimate) == pytest.approx(lines.get(a.name, 0.0), rel=0.1, abs=0.05 * largest), (
             a.name
         )
+
+
+@pytest.mark.parametrize(("order", "row"), [(1, 0), (1, 1), (2, 0), (2, 1)])
+def test_encoder_harmonic_shifts_as_the_budget_predicts(session: Session, order: int, row: int) -> None:
+    """The table's angle read too large by E sin(n theta) or E cos(n theta): the coefficients move, with sign, by what
+    the budget of the run without it says, to 10 % of the largest; a coefficient of 1 deg/h/g by some E times it.
+    White noise of 3e-10 rad/s in a window keeps the weights as they are.
+    """
+    error = 1e-5
+    values = {**SHORT, **quiet(load()), **gyro(np.random.default_rng(4)), "gyro.white_x": 1e-9, "gyro.white_y": 1e-9}
+    system = load().with_values({**values, f"u_angle{order}": error})
+    wrong = {f"table.encoder_amplitude[{order}]": error, f"table.encoder_phase[{order}]": row * np.pi / 2.0}
+    plain, off = (system.reduce(session.run({**values, f"u_angle{order}": error, **v})) for v in ({}, wrong))
+    source = f"angle error, {('once', 'twice')[order - 1]} a turn"
+    told = np.sum([b["changes"][row] for b in plain.type_b if source in b["source"]], axis=0)  # one for each channel
+    shift = np.array([b.estimate - a.estimate for a, b in zip(plain.coefficients, off.coefficients, strict=True)])
+    assert 0.1 * error < np.max(np.abs(told)) < 10.0 * error
+    assert np.max(np.abs(shift - told)) < 0.1 * np.max(np.abs(told)), (shift, told)
