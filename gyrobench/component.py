@@ -14,7 +14,7 @@ Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut
     ``A = df/dx`` (exact when f is linear in x) or by RK4 with declared substeps;
 3.  the ``@sampled`` methods whose turn it is run, with ``self.t`` at the end of the internal step.
 
-After the last one ``outputs`` is evaluated and everything is checked to be finite.
+After the last one ``outputs`` is evaluated and all is checked to be finite but large discrete arrays (memories).
 """
 
 from __future__ import annotations
@@ -103,8 +103,10 @@ class Component:
         cls.noises = [d for d in found.values() if isinstance(d, Noise)]
         cls.ticks = [(n, m._every) for n, m in methods.items()]
         cls._by_name = {s.name: s for s in cls.layout}
+        cls._watched = [s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory]
 
     _by_name: ClassVar[dict[str, Scalar]] = {}
+    _watched: ClassVar[list[Scalar]] = []  # must be finite after each step
 
     def __init__(self, name: str = "", **parameters: Any) -> None:
         self.instance = name or type(self).__name__
@@ -299,11 +301,10 @@ class Component:
             raise PartError(f"{self.instance}: {e} in {where}") from e
 
     def _finite(self) -> None:
-        for s in self.layout:
-            if s.section in ("state", "output", "discrete"):
-                x = self._at(s)
-                if not math.isfinite(x):
-                    raise PartError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
+        for s in self._watched:
+            x = self._at(s)
+            if not math.isfinite(x):
+                raise PartError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:

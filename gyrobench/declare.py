@@ -103,6 +103,7 @@ class Noise(Parameter):
         self.per = per
 
 
+MEMORY = 64  # elements; a larger discrete array is a memory
 SECTIONS = ("parameter", "input", "output", "state", "derivative", "discrete")
 
 
@@ -116,6 +117,11 @@ class Scalar:
     decl: Declaration
     reference: int
     start: float
+
+    @property
+    def is_memory(self) -> bool:
+        """An element of a large discrete array: what is stored there is not looked at until it comes out again."""
+        return self.section == "discrete" and math.prod(self.decl.shape) > MEMORY
 
 
 def _flat(x: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], float]]:

@@ -239,8 +239,10 @@ static int told_finite(Part *p, int from, int n, const char *what) {
     return 1;
 }
 
-static int tell_finite(Part *p) { /* all that the equations write */
-    return told_finite(p, Y0, N_Y, "output") && told_finite(p, X0, N_X, "state") && told_finite(p, Q0, N_Q, "discrete");
+static int tell_finite(Part *p) { /* all that the equations write, but for memories */
+    int k, ok = told_finite(p, Y0, N_Y, "output") && told_finite(p, X0, N_X, "state");
+    for (k = 0; ok && k < N_WATCHED; k++) ok = told_finite(p, watched[k].from, watched[k].n, "discrete");
+    return ok;
 }
 
 /* The outputs, unless all that they follow from is as it was: 1 when they were made anew. */
@@ -344,5 +346,6 @@ static void do_step(Part *p, double t, double step) {
     p->n.dirty = 0.0;
     if (p->failed) return;
     if (anew && !all_finite(value(p) + Y0, DX0 - Y0)) tell_finite(p); /* outputs and states */
-    if (!all_finite(value(p) + Q1, N_REFERENCES - Q1)) tell_finite(p);
+    for (k = 0; k < N_STEPPED; k++)
+        if (!all_finite(value(p) + stepped[k].from, stepped[k].n)) tell_finite(p);
 }

@@ -58,6 +58,17 @@ def _bounds(s: Scalar) -> list[str]:
     return [f"{{{s.reference}, {k}, {b!r}}}" for k, b in enumerate(limits) if b is not None]
 
 
+def _runs(references: list[int]) -> list[tuple[int, int]]:
+    """Rising numbers as runs of consecutive ones: (first, how many)."""
+    found: list[tuple[int, int]] = []
+    for r in references:
+        if found and sum(found[-1]) == r:
+            found[-1] = found[-1][0], found[-1][1] + 1
+        else:
+            found.append((r, 1))
+    return found
+
+
 def c_source(cls: type[Component], guid: str) -> str:
     """model.c of a part.  Raises SubsetError where an equation leaves the subset."""
     source = Source(cls)
@@ -74,6 +85,9 @@ def c_source(cls: type[Component], guid: str) -> str:
         if names_followed is None
         else [str(s.reference) for n in names_followed for s in layout if s.decl.name == n]
     )
+    discrete = [s for s in layout if s.section == "discrete" and not s.is_memory]
+    watched = _runs([s.reference for s in discrete])
+    stepped = _runs([s.reference for s in discrete if s.decl.name in changing])
     ports = [f"{{{param[n.name]}, {samples + i}, {PER[n.per]}}}" for i, n in enumerate(cls.noises)]
     defines = {
         "MODEL_GUID": f'"{guid}"',
@@ -82,16 +96,13 @@ def c_source(cls: type[Component], guid: str) -> str:
         "Y0": first_of(cls, "output"),
         "X0": first_of(cls, "state"),
         "DX0": first_of(cls, "derivative"),
-        "Q0": first_of(cls, "discrete"),
         "N_U": counts.get("input", 0),
         "N_Y": counts.get("output", 0),
         "N_X": counts.get("state", 0),
-        "N_Q": counts.get("discrete", 0),
         "N_PORTS": len(ports),
         "N_BOUNDS": len(bounds),
-        "Q1": min(
-            (s.reference for s in layout if s.section == "discrete" and s.decl.name in changing), default=len(layout)
-        ),
+        "N_WATCHED": len(watched),
+        "N_STEPPED": len(stepped),
         "N_FOLLOWED": -1 if follow is None else len(follow),
         "NONLINEAR": f"(p->n.v.{cls.nonlinear} != 0.0)" if isinstance(cls.nonlinear, str) else int(cls.nonlinear),
         "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
@@ -109,6 +120,9 @@ def c_source(cls: type[Component], guid: str) -> str:
         "/* kind of bound: 0 >=, 1 <=, 2 >, 3 <.  per: 0 start, 1 internal step, 2 second */",
         _table("static const struct { int reference, kind; double limit; } bounds[]", bounds, "{-1, 0, 0.0}"),
         _table("static const struct { int parameter, sample, per; } ports[]", ports, "{0, 0, 0}"),
+        "/* discrete values but for memories, and those that steps change: first reference and number */",
+        _table("static const struct { int from, n; } watched[]", [f"{{{a}, {n}}}" for a, n in watched], "{0, 0}"),
+        _table("static const struct { int from, n; } stepped[]", [f"{{{a}, {n}}}" for a, n in stepped], "{0, 0}"),
         "/* what the outputs follow from, where that is inputs and discretes alone */",
         _table("static const int followed[]", follow or [], "0"),
         '#include "core.h"',

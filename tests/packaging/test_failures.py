@@ -154,6 +154,20 @@ def test_what_became_not_finite(instance: Callable) -> None:
     assert everywhere(instance, tell, "raiser") == "slot: output y is inf at t = 0.002 s"
 
 
+def test_a_memory_is_looked_at_when_it_comes_out(instance: Callable) -> None:
+    """A discrete array of more than 64 elements: what is stored there is no failure, what comes out is."""
+
+    def tell(one: Any, form: str) -> str:
+        one.initialize()
+        for k, u in enumerate((5.0, 0.0)):
+            one.set({"u": u})
+            one.step(k * 1e-3, 1e-3)
+        one.set({"u": 6.0})
+        return refused(form, one.step, 0.002, 1e-3)
+
+    assert everywhere(instance, tell, "raiser") == "slot: output y is inf at t = 0.003 s"
+
+
 def test_arithmetic_fails(instance: Callable) -> None:
     """Python stops at log(-1) and says where; in C it becomes NaN and is found at the end of the step."""
     for form in STATUS:
