@@ -25,6 +25,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     found = LoopFindings(record)
     summary = [_coupling(found), _isolation(found), _ride(found)]
     _loads(found)
+    _command(found)
     for k, axis in enumerate(AXES, 1):
         found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
     _drift(found)
@@ -82,7 +83,8 @@ def _coupling(found: LoopFindings) -> str:
 def _isolation(found: LoopFindings) -> str:
     """What the platform takes over of the base: the whole angle, not only that about the base's axis."""
     worst = 0.0
-    for gate in found.of("motion", shape="sine"):
+    slowest = {g.axis: g for g in sorted(found.of("motion", shape="sine"), key=lambda g: -g.f)}
+    for gate in (slowest[axis] for axis in sorted(slowest)):
         base = gate[f"motion.angle[{gate.axis}]"]
         taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
         worst = max(worst, taken)
@@ -90,6 +92,10 @@ def _isolation(found: LoopFindings) -> str:
         if taken:
             size = 20.0 * math.log10(taken)
             found.measure(f"isolation {XYZ[gate.axis - 1]}", meaning, "dB", size, 20.0 / math.log(10.0) * u / taken)
+    found.ratio(
+        "attitude over base angle", "motion", 1, ANGLES[0], "exciter.motion_angle[1]",
+        caption="Isolation: platform about x over base about x.",
+    )  # fmt: skip
     return f"Of a swinging base it takes over at most {20.0 * math.log10(worst):.1f} dB." if worst else ""
 
 
@@ -140,10 +146,22 @@ def _loads(found: LoopFindings) -> None:
         found.step(gate, ANGLES[main], scale=ARCSEC, unit="″", y_name=f"attitude about {XYZ[main]}", quiet=quiet)
 
 
+def _command(found: LoopFindings) -> None:
+    """A commanded rate: by how much the slope of the angle, in the last half of the step, differs from that before."""
+    for gate in found.of("command", shape="step"):
+        half = gate.t.size // 2
+        t, y = gate.t[half:], gate[ANGLES[gate.axis - 1]][half:]
+        (slope, _), cov = np.polyfit(t - t[0], y, 1, cov=True)
+        before = gate.rest(ANGLES[gate.axis - 1])
+        (own, _), cov_own = np.polyfit(np.arange(before.size) * float(t[1] - t[0]), before, 1, cov=True)
+        share, u = (slope - own) / gate.amplitude, math.sqrt(cov[0, 0] + cov_own[0, 0]) / abs(gate.amplitude)
+        found.measure("rate gain", "rate reached over rate commanded, command step", "1", share, u, closed=1.0)
+
+
 def _drift(found: LoopFindings) -> None:
     """Each axis turns with the drift of its gyro, for the specific force that the element sees at rest."""
     for gate in (g for g in found.of("hold") if g.label == "drift"):
-        up = _up([gate.channels[f"platform.theta[{k}]"][0] for k in (1, 2, 3)])
+        up = _up([gate[f"platform.theta[{k}]"].mean() for k in (1, 2, 3)])  # the commands have turned it
         parameters = found.record.meta.get("parameters", {})
         for name, axis in zip(ANGLES, XYZ, strict=True):
             truth, slot = None, f"gyro_{axis}"

@@ -27,6 +27,7 @@ MOUNTS = {
 }
 GYROS = tuple(MOUNTS)
 GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2, "k": TORQUER}  # [GYRO-SDF-EOM]
+COMMAND = 1e-3  # rad/s, of the command step
 MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current: 1 N.m a volt, no back EMF
 
 
@@ -100,6 +101,7 @@ class PlatformThreeAxis(System):
         "exciter.gate",
         *(f"exciter.command[{k}]" for k in (1, 2, 3)),
         *(f"exciter.test[{k}]" for k in (1, 2, 3)),
+        "exciter.motion_angle[1]",
         *(f"motion.angle[{k}]" for k in (1, 2, 3)),
         *(f"platform.attitude[{k}]" for k in (1, 2, 3)),
         *(f"platform.theta[{k}]" for k in (1, 2, 3)),
@@ -112,7 +114,7 @@ class PlatformThreeAxis(System):
     channel_period = 1e-3
 
     def plan(self) -> LoopPlan:
-        """Load steps, commanded sines, base sines at 0.5, 0.7, 0.9 Hz, test sines of each axis, drift."""
+        """Load steps, commands, base sines at 0.5, 0.7, 0.9 Hz and a sweep about x, test sines of each axis, drift."""
         f, fc = self["frequency"], self["crossover"]
         if self["profile"]:
             return LoopPlan([LoopPhase("ride", dwell=self["hold"])])
@@ -123,6 +125,10 @@ class PlatformThreeAxis(System):
         ]
         for k, axis in enumerate("xyz" if self["swing"] else "", 1):
             phases += sweep(f"command {axis}", "command", [f], rate, axis=k, settle=6.0, periods=4)
+        if self["swing"]:
+            phases.append(LoopPhase("command step", "command", "step", 1, COMMAND, settle=6.0, dwell=4.0))
+            size = self["swing"]
+            phases += sweep("base x", "motion", [1.0, 2.0, 5.0], lambda f: size / (4.0 * f * f), settle=6.0, dwell=4.0)
         for k, (axis, hertz) in enumerate(zip("xyz", (0.5, 0.7, 0.9), strict=True) if self["swing"] else (), 1):
             phases += sweep(f"base {axis}", "motion", [hertz], self["swing"], axis=k, settle=6.0, periods=4)
         if self["sweeps"]:

@@ -95,6 +95,7 @@ def test_command_turns_the_platform_its_way(sessions):
         phase = next(p["phase"] for p in record.meta["plan"] if p["label"].startswith(f"command {axis}"))
         inside = (record.channels["exciter.phase"] == phase) & (record.channels["exciter.gate"] > 0.5)
         rate = np.gradient(record.channels[f"platform.attitude[{k}]"][inside], 1e-3)
+        assert found["rate gain"].estimate == pytest.approx(1.0, abs=1e-4)
         assert np.corrcoef(rate, record.channels[f"exciter.command[{k}]"][inside])[0, 1] > 0.999
 
 
