@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gyrobench.cli import main
+from gyrobench.commands.cli import main
 
 if __name__ == "__main__":
     main()

@@ -29,7 +29,7 @@ SHOWN = {
 def figure(system: str) -> str:
     """The SVG of one figure of a system's report, a file of its own."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "gyrobench.cli", "run", system, "--out", folder, "--force"]
+        command = [sys.executable, "-m", "gyrobench", "run", system, "--out", folder, "--force"]
         subprocess.run(command, check=True, capture_output=True, cwd=HERE.parent)
         page = (Path(folder) / "report.html").read_text(encoding="utf-8")
     svg = next(picture for picture, caption in FIGURE.findall(page) if SHOWN.get(system, "") in caption)

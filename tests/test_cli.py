@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 
-from gyrobench import cli, progress
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.system.loop import Status
-from gyrobench.system.record import Record
-from gyrobench.work import tell
+from gyrobench.commands import cli, progress_display
+from gyrobench.commands.run_system import tell
+from gyrobench.engine.run_driver import Status
+from gyrobench.record.record import Record
 
 Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
@@ -49,8 +49,8 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with a run ``a`` (checked step, judged) and a run ``b`` of a worse gyro."""
     folder = tmp_path_factory.mktemp("runs")
-    base = [sys.executable, "-m", "gyrobench.cli", "run", NAME, *QUICK, "--spec", "floated_gyro", "--strict"]
-    env_path = str(Path(cli.__file__).parents[1])
+    base = [sys.executable, "-m", "gyrobench", "run", NAME, *QUICK, "--spec", "floated_gyro", "--strict"]
+    env_path = str(Path(cli.__file__).parents[2])
     for name, more, code in (("a", ["--check-step"], 0), ("b", ["--set", "gyro.D_I=3deg/h/g"], 1)):
         done = subprocess.run(
             [*base, *more, "--out", name],
@@ -90,12 +90,12 @@ def test_list_and_help_load_nothing_heavy() -> None:
     for words in (["list"], ["--help"], ["run", "--help"]):
         code = (
             f"import sys; sys.argv = ['gyrobench', *{words!r}]\n"
-            "from gyrobench.cli import main\n"
+            "from gyrobench.commands.cli import main\n"
             "try: main()\nexcept SystemExit: pass\n"
             f"print(sorted(set({heavy!r}) & set(sys.modules)), file=sys.stderr)"
         )
         done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(cli.__file__).parents[1]
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(cli.__file__).parents[2]
         )
         assert done.stderr.strip() == "[]", words
 
@@ -265,11 +265,11 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.Meter, status: Status) -> None:
         if status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress.Meter, "__call__", interrupt)
+    monkeypatch.setattr(progress_display.Meter, "__call__", interrupt)
     run = ["run", NAME, "--set", "rate=2deg/s", "--set", "windows=36", "--out", "r"]
     code, out, err = gyrobench(*run)
     assert code == 130 and out == ""
@@ -287,7 +287,7 @@ def test_interrupt_does_not_replace_a_whole_record(
 ) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run)[0] == 0
-    monkeypatch.setattr(progress.Meter, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(progress_display.Meter, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT))
     code, _, err = gyrobench(*run)
     assert code == 130 and "is kept in r-incomplete" in err
     assert Record.load(tmp_path / "r").complete and not Record.load(tmp_path / "r-incomplete").complete
@@ -296,11 +296,11 @@ def test_interrupt_does_not_replace_a_whole_record(
 def test_interrupted_step_check_still_gives_the_report(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.Meter, status: Status) -> None:
         if "step check" in self.label:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress.Meter, "__call__", interrupt)
+    monkeypatch.setattr(progress_display.Meter, "__call__", interrupt)
     code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r")
     assert code == 130
     assert "r/report.html" in out and "the report is without it" in err
@@ -349,8 +349,8 @@ def test_faults_of_a_part_are_shown_with_file_and_line(gyrobench: Call, tmp_path
 def test_progress_in_lines_where_there_is_no_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "PAUSE", 0.0)
-    with progress.Meter("tumble") as meter:
+    monkeypatch.setattr(progress_display, "PAUSE", 0.0)
+    with progress_display.Meter("tumble") as meter:
         meter(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
     # 250 of 1000 s are done after 2.5 s: 7.5 s are left; 250,000 steps in 2.5 s
     assert capsys.readouterr().err == "tumble: 25 %, t = 250 of 1,000 s, 0.10 M steps/s, 8 s left\n"
@@ -367,7 +367,7 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
     monkeypatch.setenv("COLUMNS", "120")
-    with progress.Meter("tumble") as meter:
+    with progress_display.Meter("tumble") as meter:
         meter(Status(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
         assert meter.bar is None  # short runs stay silent
         meter(Status(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
@@ -378,7 +378,7 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_spans_of_time() -> None:
-    assert [progress.span(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
+    assert [progress_display.span(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
         "0 s", "1 min 15 s", "2 h 01 min", "unknown",
     ]  # fmt: skip
 

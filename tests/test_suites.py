@@ -14,11 +14,11 @@ from typing import Any
 import jsonschema
 import pytest
 
-from gyrobench import cli, progress
 from gyrobench.bench import standard_folder
-from gyrobench.system.loop import Status
-from gyrobench.system.record import Record
-from gyrobench.system.run import run
+from gyrobench.commands import cli, progress_display
+from gyrobench.engine.run_driver import Status
+from gyrobench.engine.session import run
+from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import load_system
 
@@ -73,7 +73,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "u_latitude=1arcsec",
     ]
     made = subprocess.run(
-        [sys.executable, "-m", "gyrobench.cli", "run", NAME, *words(*PLANS), *more, "--seed", "3", "--out", "s"],
+        [sys.executable, "-m", "gyrobench", "run", NAME, *words(*PLANS), *more, "--seed", "3", "--out", "s"],
         cwd=folder, capture_output=True, text=True, check=False, env=_env(),
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
@@ -84,7 +84,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _env() -> dict[str, str]:
     import os
 
-    return {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1])}
+    return {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[2])}
 
 
 def result(folder: Path) -> dict[str, Any]:
@@ -203,12 +203,12 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
-    def interrupt(self: progress.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.Meter, status: Status) -> None:
         if self.label == "tumble_single_axis" and status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
     with monkeypatch.context() as patch:
-        patch.setattr(progress.Meter, "__call__", interrupt)
+        patch.setattr(progress_display.Meter, "__call__", interrupt)
         code, _, err = gyrobench(*run)
     assert code == 130 and "the suite goes on with the same command and --resume" in err
     assert not Path("s/result.json").exists() and not Record.load(Path("s/tumble_single_axis")).complete

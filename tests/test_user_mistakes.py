@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gyrobench import cli
+from gyrobench.commands import cli
 
 Call = Callable[..., tuple[int, str, str]]
 BENCH = ["run", "estimator_bench", "--set", "samples=13000"]
@@ -142,7 +142,7 @@ def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
 
 
 def test_python_dash_m(tmp_path: Path) -> None:
-    path = str(Path(cli.__file__).parents[1])
+    path = str(Path(cli.__file__).parents[2])
     words = [sys.executable, "-m", "gyrobench", "show", "nothing"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 2 and done.stderr.startswith("gyrobench: no system 'nothing'")

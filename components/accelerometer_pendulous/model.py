@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import clip, exp, fabs, floor, sqrt
+from gyrobench.component.math import clip, exp, fabs, floor, sqrt
 
 G0 = 9.80665  # m/s2
 UG = 1e-6  # in units of g0

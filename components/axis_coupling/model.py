@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output, Parameter
-from gyrobench.math import cos, fabs
+from gyrobench.component.math import cos, fabs
 
 
 class AxisCoupling(Component):

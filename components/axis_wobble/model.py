@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import cos, index, sin
+from gyrobench.component.math import cos, index, sin
 
 ZERO = [0.0, 0.0, 0.0]
 

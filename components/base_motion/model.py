@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import cos, floor, index, log, pi, sin, sqrt
+from gyrobench.component.math import cos, floor, index, log, pi, sin, sqrt
 
 DEG = pi / 180.0
 LINES = 8  # sines of a preset, for each angle and for the heave

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.math import clip
+from gyrobench.component.math import clip
 
 SERVO = 3.0  # mode of the table in which the gyro holds it
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter
-from gyrobench.math import cos, fabs, pi, sin, where
+from gyrobench.component.math import cos, fabs, pi, sin, where
 
 
 class DecouplerT2(Component):

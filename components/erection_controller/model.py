@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output, Parameter, sampled
-from gyrobench.math import clip, fabs, pi, sign, sqrt
+from gyrobench.component.math import clip, fabs, pi, sign, sqrt
 
 DEG = pi / 180.0
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import fabs, floor
+from gyrobench.component.math import fabs, floor
 
 
 class EstimatorAlphaBetaGamma(Component):

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import fabs, floor, index, maximum
+from gyrobench.component.math import fabs, floor, index, maximum
 
 ZERO = [0.0, 0.0, 0.0, 0.0, 0.0]
 PRIOR = 1.0  # form

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import fabs, floor, index, maximum, sign, sqrt
+from gyrobench.component.math import fabs, floor, index, maximum, sign, sqrt
 
 # rings of the largest bank (db4, 6 levels), one after the other in `lines`: of a_j, 7 2^j + 1 readings each, from 0;
 # of r_{j+1}, as long; of w_j, 7 (64 - 2^j) + 1 readings each

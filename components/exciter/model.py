@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Output, Parameter, sampled
-from gyrobench.math import clip, cos, floor, index, pi, sin
+from gyrobench.component.math import clip, cos, floor, index, pi, sin
 
 HOLD, TORQUE, COMMAND, TEST, MOTION = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds
 CONSTANT, STEP, SINE = 0.0, 1.0, 2.0  # shapes

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, exp, fabs, pi, sin, sqrt
+from gyrobench.component.math import clip, cos, exp, fabs, pi, sin, sqrt
 
 DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]

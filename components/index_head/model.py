@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.math import cos, exp, fabs, floor, index, pi, sign, sin
+from gyrobench.component.math import cos, exp, fabs, floor, index, pi, sign, sin
 
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 

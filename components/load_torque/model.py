@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, sampled
-from gyrobench.math import pi, sin
+from gyrobench.component.math import pi, sin
 
 ZEROS = [0.0, 0.0, 0.0]
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import asin, atan2, clip, cos, index, pi, sin, sqrt
+from gyrobench.component.math import asin, atan2, clip, cos, index, pi, sin, sqrt
 
 NONE = [0.0] * 99
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, pi, sign, sin, where
+from gyrobench.component.math import clip, cos, fabs, pi, sign, sin, where
 
 NONE = [0.0, 0.0, 0.0]
 PITCH, ROLL, AZ = 0, 1, 2  # the A order

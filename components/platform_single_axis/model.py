@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, sin, sqrt
+from gyrobench.component.math import clip, cos, fabs, sin, sqrt
 
 
 class PlatformSingleAxis(Component):

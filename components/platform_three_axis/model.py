@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, minimum, pi, sin, sqrt
+from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt
 
 ONES = [1.0, 1.0, 1.0]
 NONE = [0.0, 0.0, 0.0]

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, pi, sin
+from gyrobench.component.math import clip, cos, fabs, pi, sin
 
 NONE = [0.0, 0.0, 0.0]
 PITCH, ROLL, AZ = 0, 1, 2  # the A order

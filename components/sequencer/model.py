@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import fabs, floor, index
+from gyrobench.component.math import fabs, floor, index
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 MOVE, SETTLE, OPEN, CLOSE, DONE = 0.0, 1.0, 2.0, 3.0, 4.0  # stages of a phase

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import clip, floor
+from gyrobench.component.math import clip, floor
 
 
 class ServoThreeLoop(Component):

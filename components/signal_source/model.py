@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Noise, Output, Parameter, sampled
-from gyrobench.math import exp, index, pi, sin, sqrt
+from gyrobench.component.math import exp, index, pi, sin, sqrt
 
 
 class SignalSource(Component):

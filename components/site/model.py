@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Output, Parameter
-from gyrobench.math import cos, pi, sin, sqrt
+from gyrobench.component.math import cos, pi, sin, sqrt
 
 A = 6378137.0  # WGS84 semi-major axis, m
 F = 1.0 / 298.257223563  # flattening

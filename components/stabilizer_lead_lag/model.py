@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output, Parameter, State
-from gyrobench.math import clip
+from gyrobench.component.math import clip
 
 
 class StabilizerLeadLag(Component):

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter
-from gyrobench.math import clip
+from gyrobench.component.math import clip
 
 
 class StabilizerPower(Component):

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import clip, cos, fabs, floor, index, maximum, minimum, pi, sign, sin, sqrt, tanh
+from gyrobench.component.math import clip, cos, fabs, floor, index, maximum, minimum, pi, sign, sin, sqrt, tanh
 
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.math import cos, fabs, floor, index, maximum, minimum, sign, sin, sqrt
+from gyrobench.component.math import cos, fabs, floor, index, maximum, minimum, sign, sin, sqrt
 
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import asin, atan2, clip, cos, fabs, maximum, sign, sin, sqrt
+from gyrobench.component.math import asin, atan2, clip, cos, fabs, maximum, sign, sin, sqrt
 
 
 class VerticalGyro(Component):

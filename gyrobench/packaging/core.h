@@ -2,7 +2,7 @@
  *
  * model.c defines `Vars` (every variable of the part, all double, in the order of the value references),
  * the counts and the tables used here, includes this file, and goes on with the equations.  Each operation below
- * stands in the same order in gyrobench/component.py and numerics.py: the two targets agree bit for bit.
+ * stands in the same order in gyrobench/component/component.py and numerics.py: the two targets agree bit for bit.
  */
 #include <math.h>
 #include <stdarg.h>
@@ -83,7 +83,7 @@ static inline double f_maximum(double a, double b) { return a > b ? a : b; }
 static inline double f_clip(double x, double lo, double hi) { return x < lo ? lo : (x > hi ? hi : x); }
 static inline double f_sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
-/* A value and its derivative along one direction: see Dual in gyrobench/math.py. */
+/* A value and its derivative along one direction: see Dual in gyrobench/component/math.py. */
 typedef struct { double v, d; } dual;
 static inline dual d_con(double x) { dual r = {x, 0.0}; return r; }
 static inline dual d_of(double v, double d) { dual r = {v, d}; return r; }

@@ -6,7 +6,7 @@ import ast
 from dataclasses import dataclass
 
 from gyrobench.component import State
-from gyrobench.math import FUNCTIONS
+from gyrobench.component.math import FUNCTIONS
 from gyrobench.packaging.source import Source, local, member
 
 OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
@@ -191,10 +191,10 @@ class Expressions:
             text = ast.unparse(e.func)
             if text.removeprefix("math.") in FUNCTIONS:
                 name = text.removeprefix("math.")
-                raise self.source.refuse(e, f"write {name}(...) with `from gyrobench.math import {name}`")
+                raise self.source.refuse(e, f"write {name}(...) with `from gyrobench.component.math import {name}`")
             if text in ("int", "round", "abs", "min", "max"):
                 write = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
-                raise self.source.refuse(e, f"no {text}(): write {write[text]}, from gyrobench.math")
+                raise self.source.refuse(e, f"no {text}(): write {write[text]}, from gyrobench.component.math")
             raise self.source.refuse(e, f"{text!r} is not callable in equations; these are: {known}")
         self.count(e, name, ARGUMENTS.get(name, 1))
         if name == "where":

@@ -16,7 +16,7 @@ from types import ModuleType
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
-from gyrobench.packaging import compiler, native, python_target
+from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description
 from gyrobench.packaging.description3 import build_description, model_description3
 
@@ -74,7 +74,7 @@ def _tool_text() -> str:
     here = Path(__file__).parent
     after = ("__init__", "instance", "reference", "validate")  # these run what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
-    files += [here.parent / f"{n}.py" for n in (*python_target.RUNTIME, "units")]
+    files += [*sorted(python_target.RUNTIME.rglob("*.py")), here.parent / "units.py"]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 
 
@@ -95,7 +95,7 @@ def _zip(path: Path, entries: dict[str, bytes]) -> None:
 def _native_entries(
     cls: type[Component], guid: str, name: str, platforms: tuple[str, ...], fmi: int
 ) -> dict[str, bytes]:
-    files = native.source_files(cls, guid, fmi)
+    files = native_target.source_files(cls, guid, fmi)
     entries = {f"sources/{n}": t.encode() for n, t in files.items()}
     with tempfile.TemporaryDirectory() as folder:
         for n, t in files.items():

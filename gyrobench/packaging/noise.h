@@ -1,6 +1,6 @@
 /* The noise of a native component: counter-based, so that a number depends on seed, port and count alone.
  *
- * Included by core.h.  The numbers are those of gyrobench/numerics.py bit for bit; they are made AHEAD at a time,
+ * Included by core.h.  The numbers are those of gyrobench/component/numerics.py bit for bit; they are made AHEAD at a time,
  * because the rare branch of the quantile would stop the processor at each one.
  */
 static uint64_t mix(uint64_t z) { /* SplitMix64 output function */

@@ -1,4 +1,4 @@
-"""The Python target: the part's own class behind pythonfmu, with a runtime of four files.
+"""The Python target: the part's own class behind pythonfmu, with a copy of the package gyrobench.component.
 
 pythonfmu shares ``sys.modules`` between the FMUs of a process: every file in ``resources`` therefore
 carries a name that is unique to the part and its content.  Our modelDescription replaces pythonfmu's.
@@ -16,8 +16,7 @@ from pathlib import Path
 
 from gyrobench.component import Component
 
-PACKAGE = Path(__file__).parent.parent
-RUNTIME = ("component", "declare", "numerics", "math")
+RUNTIME = Path(__file__).parent.parent / "component"
 
 SLAVE = '''\
 """Python FMU of {cls} {version}: the plain part behind the FMI calls."""
@@ -111,8 +110,7 @@ class {cls}(Fmi2Slave):
 
 def renamed(text: str, unique: str) -> str:
     """Imports of gyrobench become imports of the FMU's own runtime package."""
-    text = re.sub(r"^from gyrobench import", f"from {unique} import", text, flags=re.M)
-    return re.sub(r"^(from|import) gyrobench\.", rf"\1 {unique}.", text, flags=re.M)
+    return re.sub(r"^(\s*)(from|import) gyrobench\b", rf"\1\2 {unique}", text, flags=re.M)
 
 
 def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
@@ -120,13 +118,13 @@ def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
     unique = f"gb_{cls.__name__.lower()}_{guid.replace('-', '')[:12]}"
     model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
     for module in re.findall(r"^(?:from|import) gyrobench\.([\w.]+)", model, flags=re.M):
-        if module not in RUNTIME:
+        if module.split(".")[0] != "component":
             raise ValueError(
-                f"{inspect.getfile(cls)} imports gyrobench.{module}: a part uses gyrobench.component and "
-                "gyrobench.math only, so that its Python FMU can carry them"
+                f"{inspect.getfile(cls)} imports gyrobench.{module}: a part uses gyrobench.component "
+                "only, so that its Python FMU can carry it"
             )
-    runtime = {n: (PACKAGE / f"{n}.py").read_text(encoding="utf-8") for n in RUNTIME}
-    files = {f"{unique}/{n}.py": renamed(t, unique) for n, t in {**runtime, "model": model}.items()}
+    texts = {f"component/{f.relative_to(RUNTIME)}": f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.py")}
+    files = {f"{unique}/{n}": renamed(t, unique) for n, t in {**texts, "model.py": model}.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"
     files[f"{module}.py"] = SLAVE.format(cls=cls.__name__, version=cls.version, unique=unique)

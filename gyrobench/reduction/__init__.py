@@ -1,0 +1,1 @@
+"""Reductions: from a record to a result with uncertainties."""

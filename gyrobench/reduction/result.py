@@ -141,7 +141,9 @@ class Result:
     provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
     ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
     responses: list[Response] = field(default_factory=list)  # of loops
-    suite: dict[str, Any] = field(default_factory=dict)  # of several tests: see gyrobench.reduction.suite
+    suite: dict[str, Any] = field(
+        default_factory=dict
+    )  # of several tests: see gyrobench.reduction.suite.method_comparison
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)

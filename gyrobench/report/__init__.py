@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .content import content_dir
-from .document import load, report_id
-from .specification import SpecificationError, check_units, load_specification
+from gyrobench.report.assets import content_dir
+from gyrobench.report.result_json import load, report_id
+from gyrobench.report.specification import SpecificationError, check_units, load_specification
 
 if TYPE_CHECKING:
     from gyrobench.reduction.result import Result
@@ -44,7 +44,7 @@ def write(
     Raises ValueError for an unknown format and :class:`ReportError`, after all others were written, when a
     format fails.
     """
-    from .writing import write_all
+    from gyrobench.report.report_files import write_all
 
     return write_all(result, Path(folder), formats, record, bench)
 
@@ -61,7 +61,7 @@ def compare(
     ``baseline`` is the index of the run the others are compared with.  Raises ValueError for fewer than two
     results, repeated names or an unknown baseline; otherwise as :func:`write`.
     """
-    from .writing import compare_all
+    from gyrobench.report.report_files import compare_all
 
     return compare_all(results, Path(folder), formats, baseline, bench)
 

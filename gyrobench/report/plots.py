@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .numbers import superscript
-from .style import (
+from gyrobench.report.numbers import superscript
+from gyrobench.report.style import (
     BLUE,
     CYCLE,
     GREEN,
@@ -247,7 +247,7 @@ def plain_log(ax: Any, ratio: float) -> None:
     """Decades as plain numbers or powers of ten; 2 and 5 between them where the axis is short."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    from .numbers import write_number
+    from gyrobench.report.numbers import write_number
 
     low, high = ax.get_xlim()
     for axis, span in ((ax.xaxis, high / low), (ax.yaxis, ratio)):

@@ -8,9 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .blocks import Equation, Page, walk
-from .content import read_content
-from .style import clean_svg, themed
+from gyrobench.report.assets import read_content
+from gyrobench.report.page_model import Equation, Page, walk
+from gyrobench.report.style import clean_svg, themed
 
 
 def equations(page: Page) -> None:

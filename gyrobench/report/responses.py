@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from .blocks import Column, Fold, Picture, Row, Table, number_cell, pictures
-from .plots import finite, short
-from .style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
+from gyrobench.report.page_model import Column, Fold, Picture, Row, Table, number_cell, pictures
+from gyrobench.report.plots import finite, short
+from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 
 Json = Mapping[str, Any]
 LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their order
@@ -157,7 +157,7 @@ def _phase_axis(ax: Any) -> None:
 def _frequency_axis(ax: Any) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    from .numbers import write_number
+    from gyrobench.report.numbers import write_number
 
     low, high = ax.get_xlim()
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 300 else (1.0, 2.0, 5.0), numticks=12))

@@ -6,9 +6,9 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .blocks import Cell, Column, Fold, Items, Row, Table, Text, number_cell, text_cell
-from .document import look
-from .numbers import write_number
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import Cell, Column, Fold, Items, Row, Table, Text, number_cell, text_cell
+from gyrobench.report.result_json import look
 
 # endings of names that tell the unit, longest first
 _UNITS = {

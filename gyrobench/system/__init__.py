@@ -1,1 +1,1 @@
-"""Systems of FMUs: sockets, wiring, order, engines, record, run, SSP."""
+"""What a system is: slots, sockets, binding, wires, order, options, plan."""

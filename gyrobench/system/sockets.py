@@ -11,7 +11,7 @@ Conventions of the connectors: SI units; vectors along I, O, S (gyro), face axes
 from __future__ import annotations
 
 from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, out
-from gyrobench.system.sockets_loops import LOOPS
+from gyrobench.system.loop_sockets import LOOPS
 
 __all__ = ["SOCKETS", "Connector", "Shape", "Socket", "element_names", "socket"]
 

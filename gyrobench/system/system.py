@@ -41,7 +41,7 @@ from gyrobench.system.sockets import Socket
 from gyrobench.system.values import ValueProblem, flatten, parse
 
 if TYPE_CHECKING:
-    from gyrobench.system.record import Record
+    from gyrobench.record.record import Record
 
 
 class RefusedError(Exception):
@@ -125,7 +125,9 @@ class System:
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
     channel_period: float = 1.0  # s
-    loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.system.linear
+    loops: ClassVar[
+        Mapping[str, str]
+    ] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear.linear_model
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
     name: str = ""

@@ -9,7 +9,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
-from gyrobench.system.order import Link, Order, execution_order, feedthrough
+from gyrobench.system.execution_order import Link, Order, execution_order, feedthrough
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System
 

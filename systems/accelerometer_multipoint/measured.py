@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 from .geometry import FACES
 

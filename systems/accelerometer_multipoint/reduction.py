@@ -20,10 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.frames import G0
-from gyrobench.reduction import recorded
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 from . import closed
 from .geometry import zero_angle
@@ -57,7 +65,8 @@ SOURCES = [
 
 
 def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
-    """Coefficients with uncertainties from the windows of a record (columns as in gyrobench.reduction.checks, SI).
+    """Coefficients with uncertainties from the windows of a record (columns as in gyrobench.reduction.window_checks,
+    SI).
 
     Raises ReductionError with everything that is wrong with setup or record.
     """
@@ -300,18 +309,18 @@ def setup_of(
 ) -> Setup:
     """The setup a run.json describes.  Truth only where the accelerometer has the coefficients."""
     options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     measured = bool(meta.get("measured", False))
-    plan = recorded.phases(meta, ("a", "b"))
+    plan = run_metadata.phases(meta, ("a", "b"))
     mounts = {p: str(r["face"]) for p, r in plan.items()}
-    truth = recorded.truth_of(meta, KS, "accelerometer")
+    truth = run_metadata.truth_of(meta, KS, "accelerometer")
     zeros = None
     if truth is not None and set(truth) == set(KS):
         axes = parameters.get("accelerometer.mount", np.eye(3))
         zeros = {m: zero_angle(m, axes) for m in sorted(set(mounts.values()))}
     return Setup(
         gravity=site.gravity,
-        scale=recorded.number(meta, "scale", "accelerometer.scale", "scale λ"),
+        scale=run_metadata.number(meta, "scale", "accelerometer.scale", "scale λ"),
         mounts=mounts,
         truth=truth if zeros is not None else None,
         zeros=zeros,
@@ -319,10 +328,10 @@ def setup_of(
         quantum=float(parameters.get("accelerometer.resolution", 0.0)),
         instrument=str(meta.get("instrument", "")),
         site={"gravity / (m/s²)": site.gravity} if measured else site.shown(),
-        **recorded.sizes({"options": options}, ("u_scale", "u_current", "u_gravity", "u_angle")),
+        **run_metadata.sizes({"options": options}, ("u_scale", "u_current", "u_gravity", "u_angle")),
     )
 
 
 def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
-    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
-    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
+    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.method import Effect, Findings
+from gyrobench.reduction.estimation.fit_result import Effect, Findings
 
 from . import model, positions
 

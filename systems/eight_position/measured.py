@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gyrobench.system.days import read_runs
-from gyrobench.system.laboratory import TEXTS, read_record
-from gyrobench.system.measured import Column, DataError
-from gyrobench.system.record import Record
+from gyrobench.record.csv_reader import Column, DataError
+from gyrobench.record.multi_day_record import read_runs
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import TEXTS, read_record
 
 from . import positions
 

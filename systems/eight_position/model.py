@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import frames, units
-from gyrobench.reduction import regression
-from gyrobench.reduction.findings import Estimates
-from gyrobench.reduction.method import Findings, Quantity, ReductionError
+from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation.fit_result import Findings, Quantity, ReductionError
+from gyrobench.reduction.estimation.linear_fit import Estimates
 
 from . import positions
 

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
-from gyrobench.reduction import recorded, repeats, series
-from gyrobench.reduction.checks import window_problems
-from gyrobench.reduction.merge import merge
-from gyrobench.reduction.method import Group, Limits, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import repeatability, residual_series
+from gyrobench.reduction.estimation.fit_result import Group, Limits, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.result import Coefficient, Result
+from gyrobench.reduction.window_checks import window_problems
 
 from . import budget, model, positions, refusals, tables
 from .model import Setup
@@ -125,8 +126,8 @@ def _short_term(
         off[position == n] = -k * (current[position == n] - np.mean(current[position == n])) / DPH
     if float(np.max(np.abs(off))) < 1e-9:  # ideal data
         return
-    parts = series.stretches(t0, t1, off)
-    allan, psd = series.allan(parts), series.spectrum(parts)
+    parts = residual_series.stretches(t0, t1, off)
+    allan, psd = residual_series.allan(parts), residual_series.spectrum(parts)
     r.allan = {**allan, "unit": "°/h"} if allan else {}
     r.psd = {**psd, "unit": "(°/h)²/Hz"} if psd else {}
 
@@ -167,7 +168,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
         conventions=_conventions(setup),
         effects=effects,
         specification=setup.specification,
-        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
         instrument=setup.instrument,
         simulated=setup.truth is not None,
         closed_caption="Mean of the readings of each position in the corrected formulas 3-10, 3-11",
@@ -219,7 +220,7 @@ def _shown(c: Coefficient) -> str:
 def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Setup:
     """The setup that a run.json describes: options and the parameters of the parts (slot.name, SI)."""
     options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     known = all(f"gyro.{n}" in parameters for n in ("Dx_0", "Dy_0"))
     return Setup(
         latitude=site.latitude,
@@ -227,11 +228,11 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Se
         earth_rate=site.earth_rate,
         terms=int(options.get("terms", 6)),
         sigma=bool(options.get("sigma", True)),
-        truth=recorded.truth_of(meta, model.TRUE) if known else None,
+        truth=run_metadata.truth_of(meta, model.TRUE) if known else None,
         specification=specification,
         quantum={c: float(parameters.get(f"rebalance_{c}.resolution", 0.0)) for c in "xy"},
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, ("u_attitude", "u_mount", "u_latitude", "u_current", "u_nonlinearity")),
+        **run_metadata.sizes(meta, ("u_attitude", "u_mount", "u_latitude", "u_current", "u_nonlinearity")),
     )
 
 
@@ -240,7 +241,7 @@ def days_of(record: Any) -> dict[str, dict[str, Array]]:
 
     Raises ReductionError for a face that is no position.
     """
-    plan = recorded.phases(record.meta, positions.NUMBERS)
+    plan = run_metadata.phases(record.meta, positions.NUMBERS)
     day, place, turn = {}, {}, {}
     seen: dict[tuple[str, int], int] = {}
     for phase, r in plan.items():
@@ -272,5 +273,5 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
             each[name] = reduce(windows, setup)
         except ReductionError as error:
             raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
-    result = next(iter(each.values())) if len(each) == 1 else repeats.together(each, specification=specification)
-    return recorded.finish(result, record)
+    result = next(iter(each.values())) if len(each) == 1 else repeatability.together(each, specification=specification)
+    return run_metadata.finish(result, record)

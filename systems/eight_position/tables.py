@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
-from gyrobench.reduction import repeats
+from gyrobench.reduction.estimation import repeatability as repeats
 from gyrobench.reduction.result import Result
 
 from . import model, positions

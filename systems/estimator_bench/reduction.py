@@ -1,4 +1,5 @@
-"""Reduction of the estimator bench: the measures of gyrobench.reduction.estimates over the record, and its picture."""
+"""Reduction of the estimator bench: the measures of gyrobench.reduction.loops.estimator_result over the record, and
+its picture."""
 
 from __future__ import annotations
 
@@ -9,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction import estimates, recorded, uncertainty
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.reduction.estimates import Measures, Signals
-from gyrobench.reduction.method import plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import plus_minus
+from gyrobench.reduction.loops import estimator_result
+from gyrobench.reduction.loops.estimator_result import Measures, Signals
 from gyrobench.reduction.result import Response, Result, Series
+from gyrobench.reduction.window_checks import ReductionError
 
 from .benchmarks import BENCHMARKS
 
@@ -34,9 +37,9 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     sine = float(p.get("source.amplitude", 0.0)) != 0.0
     random = any(float(p.get(f"source.{n}", 0.0)) != 0.0 for n in ("p", "walk", "markov"))
     frequency = float(p["source.frequency"]) if sine and not random else None
-    m = estimates.measure(s, frequency, true_variance(p, s.time))
-    return recorded.finish(_result(m, s, known.title, str(meta.get("parts", {}).get("estimator", {}).get("name", "")),
-                                   specification or {}), record)  # fmt: skip
+    m = estimator_result.measure(s, frequency, true_variance(p, s.time))
+    name = str(meta.get("parts", {}).get("estimator", {}).get("name", ""))
+    return run_metadata.finish(_result(m, s, known.title, name, specification or {}), record)
 
 
 def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
@@ -75,7 +78,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
     for c in m.coefficients:
         c.limit = limits.get(c.name)
         c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
-    error, re_raw = m.named(estimates.RANKED), m.named("error re raw")
+    error, re_raw = m.named(estimator_result.RANKED), m.named("error re raw")
     gain, noise, delay = (m.named(n) for n in ("gain", "noise re raw", "delay"))
     return Result(
         system="estimator_bench",
@@ -116,7 +119,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
         decision_rule=uncertainty.DECISION_RULE,
         verdict=uncertainty.overall(c.verdict for c in m.coefficients),
         instrument=name,
-        ranked_by=estimates.RANKED,
+        ranked_by=estimator_result.RANKED,
         responses=[last_second(s)],
     )
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.connectors import Socket, out
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 from gyrobench.system.values import ValueProblem
 

@@ -3,7 +3,7 @@
     omega_d = omega_IA - k i,   omega_IA = W I . (0, cos phi, sin phi)
 
 mean over the readings under a noise model estimated from them.  One attitude: no coefficient can be told from another.
-Repeats on several days are reduced day by day and then together (gyrobench.reduction.repeats).
+Repeats on several days are reduced day by day and then together (gyrobench.reduction.estimation.repeatability).
 [TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2; RED-GLS]
 
 Not modelled: drift slower than the record beyond what the trend test shows, change of the attitude under load.
@@ -19,11 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import recorded, repeats
-from gyrobench.reduction.axes import parse
-from gyrobench.reduction.checks import window_problems
-from gyrobench.reduction.method import Effect, Group, Limits, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift.attitude_parser import parse
+from gyrobench.reduction.estimation import repeatability
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Group,
+    Limits,
+    Quantity,
+    ReductionError,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.window_checks import window_problems
 
 from . import refusals
 
@@ -111,7 +121,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
         conventions=_conventions(setup),
         effects=_effects(setup, found, i),
         specification=setup.specification,
-        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
         instrument=setup.instrument,
         simulated=setup.truth is not None,
         closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
@@ -181,7 +191,7 @@ def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, A
 def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Setup:
     """The setup that a run.json describes."""
     options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     try:
         attitude = parse(str(options.get("attitude", "")), site.latitude)
     except ValueError as error:
@@ -191,12 +201,12 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Se
         gravity=site.gravity,
         earth_rate=site.earth_rate,
         attitude=attitude,
-        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
-        truth=recorded.truth_of(meta, drift.NAMES),
+        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
+        truth=run_metadata.truth_of(meta, drift.NAMES),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
+        **run_metadata.sizes(meta, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
     )
 
 
@@ -213,5 +223,5 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
             each[name] = reduce(mine, setup)
         except ReductionError as error:
             raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
-    result = next(iter(each.values())) if len(each) == 1 else repeats.together(each, specification=specification)
-    return recorded.finish(result, record)
+    result = next(iter(each.values())) if len(each) == 1 else repeatability.together(each, specification=specification)
+    return run_metadata.finish(result, record)

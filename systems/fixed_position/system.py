@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.reduction.axes import parse
+from gyrobench.record.record import Record
+from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 from . import measured, refusals

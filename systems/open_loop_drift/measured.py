@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.measured import Column
-from gyrobench.system.record import Record
+from gyrobench.record.csv_reader import Column
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System

@@ -27,11 +27,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import recorded
-from gyrobench.reduction.axes import parse
-from gyrobench.reduction.checks import window_problems
-from gyrobench.reduction.method import Effect, Group, Limits, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift.attitude_parser import parse
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Group,
+    Limits,
+    Quantity,
+    ReductionError,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.window_checks import window_problems
 
 from . import refusals
 
@@ -181,7 +190,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
         ],
         effects=_effects(setup, found, t, coupled),
         specification=setup.specification,
-        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
         instrument=setup.instrument,
         simulated=setup.truth is not None,
         closed_caption="Least squares under the noise model; closed: angle between first and last null over the time",
@@ -253,7 +262,7 @@ def _float_gain(meta: Mapping[str, Any]) -> float:
 def from_record(record: Any, specification: Limits | None = None) -> Result:
     """:func:`reduce` of a record with its run.json as provenance."""
     meta = record.meta
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     try:
         attitude = parse(str(meta.get("options", {}).get("attitude", "")), site.latitude)
     except ValueError as error:
@@ -266,9 +275,9 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         float_gain=_float_gain(meta),
         wait=next((float(r["settle"]) for r in meta.get("plan", []) if "settle" in r), None),
         reach=refusals.case_range(meta.get("parameters", {})),
-        truth=recorded.truth_of(meta, drift.NAMES),
+        truth=run_metadata.truth_of(meta, drift.NAMES),
         specification=specification,
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
+        **run_metadata.sizes(meta, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
     )
-    return recorded.finish(reduce(record.windows, setup), record)
+    return run_metadata.finish(reduce(record.windows, setup), record)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
-from gyrobench.reduction import uncertainty
+from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.result import Coefficient, Series
 
 Array = NDArray[np.float64]

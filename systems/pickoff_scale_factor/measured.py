@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.measured import WINDOW_COLUMNS
-from gyrobench.system.record import Record
+from gyrobench.record.csv_reader import WINDOW_COLUMNS
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System

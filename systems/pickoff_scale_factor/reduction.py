@@ -23,10 +23,19 @@ from numpy.typing import NDArray
 
 from gyrobench import drift as drift_model
 from gyrobench import units
-from gyrobench.reduction import recorded, uncertainty
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.result import Coefficient, Result
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 from .levels import Levels
 from .refusals import drift_problems, record_problems
@@ -187,15 +196,15 @@ def _warnings(both: bool, bound: float, span: float) -> list[str]:
 def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> PickoffSetup:
     """The setup a run.json describes: options and the parameters of the gyro."""
     options = meta.get("options", {})
-    site = recorded.Site.of(meta)
-    known = recorded.truth_of(meta, ("H", "C", "K_sg"))
+    site = run_metadata.Site.of(meta)
+    known = run_metadata.truth_of(meta, ("H", "C", "K_sg"))
     gain = float(options.get("gain") or 0.0)
     truth: dict[str, float] | None = None
     if known is not None and set(known) == {"H", "C", "K_sg"}:
         own = known["H"] / known["C"]
         gain = gain or own
         truth = {"S": known["K_sg"] * own, "K_sg": known["K_sg"]}
-        static = recorded.truth_of(meta, drift_model.NAMES)
+        static = run_metadata.truth_of(meta, drift_model.NAMES)
         if static is not None:
             # output axis on the pole, spin axis on east x pole: X = 0, Y = -g sin, Z = -g cos of the latitude
             xyz = np.array([0.0, -site.g * math.sin(site.latitude), -site.g * math.cos(site.latitude)])
@@ -211,10 +220,10 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Pi
         specification=specification,
         instrument=str(meta.get("instrument", "")),
         site={} if measured else site.shown(),
-        **recorded.sizes(meta, ("u_gain", "u_angle", "u_voltage")),
+        **run_metadata.sizes(meta, ("u_gain", "u_angle", "u_voltage")),
     )
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
-    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
+    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)

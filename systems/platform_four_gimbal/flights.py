@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gyrobench.system.flight import Leg
+from gyrobench.system.flight_plan import Leg
 
 DEG = math.pi / 180.0
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gyrobench.reduction.gimbals import DEG, Flight, lock_table, over_time, spans
-from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import drift
+from gyrobench.record.record import Record
+from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
+from gyrobench.reduction.loops.loop_measures import drift
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.result import Result
-from gyrobench.system.record import Record
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system import flight
+from gyrobench.system import flight_plan
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
 from .flights import FLIGHTS
@@ -116,14 +116,14 @@ class PlatformFourGimbal(System):
 
     def plan(self) -> LoopPlan:
         """The flight comes last, but where it begins out of the null, which would not wait."""
-        legs = flight.phases(self.flown().legs)
+        legs = flight_plan.phases(self.flown().legs)
         return LoopPlan([*legs, self.at_rest()[-1]] if self.flown().inner else [*self.at_rest(), *legs])
 
     def parameters(self) -> dict[str, Any]:
         flown = self.flown()
         found: dict[str, Any] = {
             **self.plan().parameters(),
-            **flight.parameters(flown.legs, 0 if flown.inner else len(self.at_rest())),
+            **flight_plan.parameters(flown.legs, 0 if flown.inner else len(self.at_rest())),
             "motion.earth_rate?": 0.0,
             "motion.start_angle[1]?": flown.pitch,
             "platform.gain": LAWS.index(self["law"]) if self["law"] in LAWS else 0,

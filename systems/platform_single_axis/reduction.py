@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gyrobench.reduction.estimation import Value, rms
-from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Gate
-from gyrobench.reduction.recorded import number
+from gyrobench.record.record import Record
+from gyrobench.reduction.loops.estimator_metrics import Value, rms
+from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.result import Result
-from gyrobench.system.record import Record
+from gyrobench.reduction.run_metadata import number
 
 MRAD = 1e-3
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own

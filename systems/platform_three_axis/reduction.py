@@ -10,10 +10,10 @@ import numpy as np
 
 from gyrobench import drift as static
 from gyrobench.frames import G0
-from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Point, cross_axis, response
+from gyrobench.record.record import Record
+from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.result import Result
-from gyrobench.system.record import Record
 
 AXES = ("pitch", "roll", "azimuth")
 XYZ = "xyz"

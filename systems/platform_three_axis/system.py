@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench.record.motion_profile import read_profile
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.profile import read_profile
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
 Specification = Mapping[str, tuple[float | None, float | None]]

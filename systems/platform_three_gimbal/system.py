@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system import flight
-from gyrobench.system.flight import Leg
+from gyrobench.system import flight_plan
+from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
 Specification = Mapping[str, tuple[float | None, float | None]]
@@ -150,12 +150,12 @@ class PlatformThreeGimbal(System):
 
     def plan(self) -> LoopPlan:
         """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
-        return LoopPlan([*flight.phases(self.legs()), *self.at_rest()])
+        return LoopPlan([*flight_plan.phases(self.legs()), *self.at_rest()])
 
     def parameters(self) -> dict[str, Any]:
         found: dict[str, Any] = {
             **self.plan().parameters(),
-            **flight.parameters(self.legs()),
+            **flight_plan.parameters(self.legs()),
             "motion.earth_rate?": 0.0,
             "platform.mount?": self["mount"],
             "platform.allow_lock?": int(self["allow_lock"]),

@@ -18,8 +18,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction import harmonic, regression
-from gyrobench.reduction.servo import BOOK
+from gyrobench.reduction.drift import harmonic
+from gyrobench.reduction.drift.servo_regression import BOOK
+from gyrobench.reduction.estimation import regression
 
 Array = NDArray[np.float64]
 Amplitudes = Mapping[str, float]

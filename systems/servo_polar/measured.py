@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyrobench.system import servo
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
+from gyrobench.system.families import servo_stand
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
@@ -37,4 +37,4 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """The CSV as a record in SI.  Raises DataError, and ValueProblem for an option that does not fit."""
-    return servo.read(system, data, values, ("x east, y up", "x east, y down", *servo.POLAR))
+    return servo_stand.read(system, data, values, ("x east, y up", "x east, y down", *servo_stand.POLAR))

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift
-from gyrobench.reduction import servo
-from gyrobench.reduction.findings import Findings, Quantity
-from gyrobench.reduction.recorded import Site
+from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.estimation.linear_fit import Findings, Quantity
+from gyrobench.reduction.run_metadata import Site
 
 Array = NDArray[np.float64]
 FOUR = ("D_F", "D_I", "D_S", "D_IS")
@@ -58,9 +58,9 @@ class Model:
             gone = {"D_II"}
         return cls(names, tuple(n for n in names if n not in gone), mixed, equal)
 
-    def columns(self, held: servo.Held, site: Site) -> Array:
+    def columns(self, held: servo_regression.Held, site: Site) -> Array:
         """(n, len(fitted))"""
-        X = servo.design(held, site, self.names)
+        X = servo_regression.design(held, site, self.names)
         if self.equal:
             X[:, self.names.index("D_SS")] -= X[:, self.names.index("D_II")]
         return X[:, [self.names.index(n) for n in self.fitted]]
@@ -93,10 +93,10 @@ class Model:
 
     def words(self, name: str, book: bool = False) -> str:
         """D_F + γ² sin²φ D_II, or R + γ² sin²φ K_zx."""
-        symbol, way = servo.BOOK[name]
+        symbol, way = servo_regression.BOOK[name]
         out = [symbol if book else name]
         for n, s, k in self.mixed[name]:
-            its, other = servo.BOOK[n]
+            its, other = servo_regression.BOOK[n]
             plus = s * way * other if book else s
             out.append(f"{'+' if plus > 0 else '−'} {('', 'γ sinφ', 'γ² sin²φ')[k]} {its if book else n}")
         return " ".join(out)

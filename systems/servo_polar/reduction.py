@@ -5,7 +5,8 @@
 Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
 estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-POLAR, TEST-COMPOSITE]
 
-Not modelled: change of the coefficients with time (turns compared show it); see gyrobench.reduction.servo.
+Not modelled: change of the coefficients with time (turns compared show it); see
+gyrobench.reduction.drift.servo_regression.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
-from gyrobench.reduction import composite, harmonic, recorded, servo
-from gyrobench.reduction.method import Findings, Group, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import composite, harmonic, servo_regression
+from gyrobench.reduction.drift.turns import Turns
+from gyrobench.reduction.estimation.fit_result import Findings, Group, ReductionError, fit, linear_result, plus_minus
 from gyrobench.reduction.result import Result
-from gyrobench.reduction.turns import Turns
-from gyrobench.system.servo import ATTITUDES, POLAR, attitude
+from gyrobench.system.families.servo_stand import ATTITUDES, POLAR, attitude
 
 from . import closed, refusals
 from .model import Model
@@ -34,10 +36,10 @@ SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance",
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """Coefficients and composite drift of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     meta, windows = record.meta, record.windows
     options = dict(meta.get("options", {}))
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     route, which = str(options.get("route", "dwells")), int(options.get("terms", 9))
     labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
     if route != "dwells" or len({n for n in labels.values() if n in POLAR}) == 1:
@@ -45,7 +47,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     wrong = refusals.latitude_problems(site.latitude)
     wrong += [f"phase {p}: attitude '{n}' unknown; there are {', '.join(ATTITUDES)}" for p, n in labels.items()
               if n not in ATTITUDES]  # fmt: skip
-    wrong = wrong or servo.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
+    wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
     if wrong:
         raise ReductionError(wrong)
     every = np.asarray(windows["phase"]).astype(int)
@@ -55,8 +57,10 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
     )
     wrong = refusals.record_problems(start, end, phase, labels)
-    limit = float(options.get("tracking", servo.TRACKING))
-    wrong += servo.tracking_problems(windows, np.isin(every, list(labels)), meta.get("parameters", {}), limit)
+    limit = float(options.get("tracking", servo_regression.TRACKING))
+    wrong += servo_regression.tracking_problems(
+        windows, np.isin(every, list(labels)), meta.get("parameters", {}), limit
+    )
     mounts = [n for n in labels.values() if n in POLAR]
     dwells = {n for n in labels.values() if n not in POLAR}
     if route == "dwells" and len(set(mounts)) > 1 and dwells != {"x east, y up", "x east, y down"}:
@@ -69,12 +73,12 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     if wrong:
         raise ReductionError(wrong)
     axes = np.array([attitude(labels[p], site.latitude) for p in phase.tolist()])
-    held = servo.Held(start, end, t0, t1, axes)
+    held = servo_regression.Held(start, end, t0, t1, axes)
     model = Model.of(route, mounts, which)
-    y, X = servo.drift_rate(held, site), model.columns(held, site)
+    y, X = servo_regression.drift_rate(held, site), model.columns(held, site)
     groups = {n: np.isin(phase, [p for p, m in labels.items() if m == n]) for n in labels.values()}
     book, fits, why = closed.reduce(start, end, t1 - t0, groups, site.latitude, site.g, site.earth_rate, route)
-    truth = recorded.truth_of(meta, drift.NAMES)
+    truth = run_metadata.truth_of(meta, drift.NAMES)
     fitted, reported = model.quantities(site, truth, book)
     shown = [_group(labels, p, phase, held, site, model) for p in labels]
     found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
@@ -82,8 +86,8 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     turns.test()
     found = model.report(found, reported)
     statistics = _composite(found, labels, phase, held, site)
-    sizes = recorded.sizes(meta, SIZES)
-    effects = servo.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
+    sizes = run_metadata.sizes(meta, SIZES)
+    effects = servo_regression.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
     together = {n: model.words(n, book=True) for n in model.fitted}
     warnings = refusals.unseen(route, mounts, which)
     missing = [n for n in drift.NAMES if n not in model.names and (truth or {}).get(n, 0.0) != 0.0]
@@ -101,8 +105,11 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
             "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
             "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
         ],
-        equation=servo.equation(model.names),
-        conventions=(*servo.CONVENTIONS, "Harmonics: a cosine, b sine of θ; the book has them the other way."),
+        equation=servo_regression.equation(model.names),
+        conventions=(
+            *servo_regression.CONVENTIONS,
+            "Harmonics: a cosine, b sine of θ; the book has them the other way.",
+        ),
         effects=effects,
         specification=specification,
         site=site.shown(),
@@ -111,7 +118,9 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         no_closed=why,
         closed_caption="From the same windows; the formulas: harmonics of each mount, means of the dwells",
         tables=[
-            servo.book_table(found, together), *turns.table(), *_turn_differences(found, turns, labels, phase),
+            servo_regression.book_table(found, together),
+            *turns.table(),
+            *_turn_differences(found, turns, labels, phase),
             *composite.tables(statistics, DPH, "°/h"),
         ],
         harmonics=turns.harmonics(fits),
@@ -119,11 +128,16 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         warnings=warnings,
     )  # fmt: skip
     result.summary = _summary(result, statistics, found)
-    return recorded.finish(result, record)
+    return run_metadata.finish(result, record)
 
 
 def _group(
-    labels: Mapping[int, str], p: int, phase: NDArray[np.int_], held: servo.Held, site: recorded.Site, model: Model
+    labels: Mapping[int, str],
+    p: int,
+    phase: NDArray[np.int_],
+    held: servo_regression.Held,
+    site: run_metadata.Site,
+    model: Model,
 ) -> Group:
     """Drift against table angle in the turns, against time in a dwell."""
     mine = phase == p
@@ -134,12 +148,16 @@ def _group(
     dense = np.radians(np.arange(0.0, 361.0, 3.0))
     axes = np.broadcast_to(attitude(labels[p], site.latitude), (dense.size, 3, 3))
     zero = np.zeros_like(dense)
-    curve = model.columns(servo.Held(dense, dense, zero, zero + 1.0, axes), site)
+    curve = model.columns(servo_regression.Held(dense, dense, zero, zero + 1.0, axes), site)
     return Group(labels[p], mine, angle, "table angle", "°", (np.degrees(dense), curve))
 
 
 def _composite(
-    found: Findings, labels: Mapping[int, str], phase: NDArray[np.int_], held: servo.Held, site: recorded.Site
+    found: Findings,
+    labels: Mapping[int, str],
+    phase: NDArray[np.int_],
+    held: servo_regression.Held,
+    site: run_metadata.Site,
 ) -> dict[str, composite.Composite | str]:
     """Statistics of each phase: what the fit says to go with the angle is removed, in turns all but its constant."""
     fitted = found.y - found.est.residual
@@ -158,7 +176,7 @@ def _composite(
     return out
 
 
-def _pole(site: recorded.Site) -> Array:
+def _pole(site: run_metadata.Site) -> Array:
     return np.array([0.0, math.cos(site.latitude), math.sin(site.latitude)])
 
 

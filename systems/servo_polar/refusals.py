@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
-from gyrobench.reduction import regression, servo
-from gyrobench.reduction.recorded import Site
-from gyrobench.system.servo import POLAR, attitude
+from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.run_metadata import Site
+from gyrobench.system.families.servo_stand import POLAR, attitude
 
 from .model import ROUTES, Model
 
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
 
 
-def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo.Held, Array]:
+def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, Array]:
     """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(
@@ -28,13 +29,13 @@ def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[serv
     )
     phase = np.repeat(np.arange(len(phases)), [a.size for a in angles])
     a, t = np.concatenate(angles), np.arange(phase.size, dtype=float)
-    return servo.Held(a, a, t, t + 1.0, axes), phase
+    return servo_regression.Held(a, a, t, t + 1.0, axes), phase
 
 
 def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
     """What phases at a latitude can tell apart: rank, condition, lost combinations."""
     windows, _ = held(latitude, phases)
-    return regression.examine(servo.design(windows, Site(latitude, g * 9.80665), names), names)
+    return regression.examine(servo_regression.design(windows, Site(latitude, g * 9.80665), names), names)
 
 
 def latitude_problems(latitude: float) -> list[str]:
@@ -49,7 +50,7 @@ def latitude_problems(latitude: float) -> list[str]:
     where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
     if found.rank < 8:
         return [f"{where}rank {found.rank} of 8, the record does not see {'; '.join(found.lost)}"]
-    X = servo.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
+    X = servo_regression.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
     return [f"{where}condition {np.linalg.cond(X):.3g}, hardly seen is {found.weakest}"]
 
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system import servo
+from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 Specification = Mapping[str, tuple[float | None, float | None]]
@@ -31,13 +31,13 @@ class ServoPolar(System):
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
-        "stand": Slot(servo.STAND, "fixture"),
-        "table": Slot(servo.SERVO_TABLE, "table_servo"),
+        "stand": Slot(servo_stand.STAND, "fixture"),
+        "table": Slot(servo_stand.SERVO_TABLE, "table_servo"),
         "gyro": Slot("SdfGyro", "floated_gyro"),
-        "cage": Slot(servo.CAGE, "cage"),
+        "cage": Slot(servo_stand.CAGE, "cage"),
         "sampler": Slot("Sampler", "sampler"),
     }
-    wires = servo.WIRES
+    wires = servo_stand.WIRES
     options = {
         "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
         "height": Option(0.0, "m", "height above the ellipsoid"),
@@ -59,7 +59,7 @@ class ServoPolar(System):
         "u_unbalance": Option(0.0, "rad", "angle by unbalance of the table at 1 g over the stiffness, std. unc.", 0.0),
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
-    noises = servo.NOISES
+    noises = servo_stand.NOISES
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "gyro.drift")
@@ -75,17 +75,17 @@ class ServoPolar(System):
         holds = []
         if self["route"] == "dwells":
             window = self["dwell"] / max(1, round(self["dwell"] / self["window"]))
-            holds = [servo.Hold(f"x east, y {w}", self["dwell"], window, **common) for w in ("up", "down")]
+            holds = [servo_stand.Hold(f"x east, y {w}", self["dwell"], window, **common) for w in ("up", "down")]
         angle = 0.0
         for mount in self.mounts():
             travel = TURN * self["turns"]
             whole = travel * (1.0 + 1.2 * self["window"] / self["time"])  # the last window may be cut off
-            holds.append(servo.Hold(mount, self["time"], self["window"], start=angle, travel=whole, **common))
+            holds.append(servo_stand.Hold(mount, self["time"], self["window"], start=angle, travel=whole, **common))
             angle += travel if mount == "polar S" else -travel
-        return servo.plan(holds)
+        return servo_stand.plan(holds)
 
     def parameters(self) -> dict[str, Any]:
-        return servo.parameters(self)
+        return servo_stand.parameters(self)
 
     def check(self) -> list[str]:
         from .refusals import option_problems
@@ -95,7 +95,7 @@ class ServoPolar(System):
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         from .refusals import model_problems
 
-        return servo.problems(parameters, self.plan()) + model_problems(parameters, self["terms"])
+        return servo_stand.problems(parameters, self.plan()) + model_problems(parameters, self["terms"])
 
     def warnings(self) -> list[str]:
         from .refusals import unseen

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.measured import WINDOW_COLUMNS, Column
-from gyrobench.system.record import Record
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 from .geometry import MOUNTS
 from .windows import ANGLES

@@ -19,9 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
-from gyrobench.reduction import recorded, servo
-from gyrobench.reduction.merge import merge
-from gyrobench.reduction.method import Findings, Group, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.estimation.fit_result import (
+    Findings,
+    Group,
+    Quantity,
+    ReductionError,
+    fit,
+    linear_result,
+    plus_minus,
+)
+from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.result import Result
 
 from . import budget, closed, geometry, refusals
@@ -36,14 +45,16 @@ REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """Coefficients of both channels of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    """Coefficients of both channels of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     meta = record.meta
-    options, site = dict(meta.get("options", {})), recorded.Site.of(meta)
+    options, site = dict(meta.get("options", {})), run_metadata.Site.of(meta)
     terms = int(options.get("terms", 9))
     labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
     known = {f"mount {m}": m for m in geometry.MOUNTS}
     wrong = [f"phase {p}: '{n}' is none of the mounts {', '.join(known)}" for p, n in labels.items() if n not in known]
-    wrong = wrong or servo.window_problems(record.windows, {p: {"label": n} for p, n in labels.items()}, REQUIRED)
+    wrong = wrong or servo_regression.window_problems(
+        record.windows, {p: {"label": n} for p, n in labels.items()}, REQUIRED
+    )
     if wrong:
         raise ReductionError(wrong)
     every = np.asarray(record.windows["phase"]).astype(int)
@@ -59,7 +70,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     rates = seen.inertial(site)
     middle = seen.middle()
     book = closed.reduce(*middle, mount, site.latitude, site.g, site.earth_rate, terms)
-    truth = recorded.truth_of(meta, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
+    truth = run_metadata.truth_of(meta, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
     results: dict[str, Result] = {}
     found: dict[str, Findings] = {}
     for j, c in enumerate("xy"):
@@ -85,12 +96,12 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         " ".join(f"{c} channel: {found[c].noise_sentence()}" for c in "xy"),
     ]
-    return recorded.finish(result, record)
+    return run_metadata.finish(result, record)
 
 
 def _problems(
     windows: Mapping[str, Array], held: NDArray[np.bool_], w: Mapping[str, Array], meta: Mapping[str, Any],
-    X: Mapping[str, Array], terms: int, mounts: list[int], site: recorded.Site,
+    X: Mapping[str, Array], terms: int, mounts: list[int], site: run_metadata.Site,
 ) -> list[str]:  # fmt: skip
     """Why the rows cannot be reduced: gimbal lock, tracking, rank."""
     found = []
@@ -101,13 +112,13 @@ def _problems(
             f"gimbal lock: the inner angle reaches {math.degrees(worst):.4g}°, "
             f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; leave out the windows beyond"
         )
-    limit = float(meta.get("options", {}).get("tracking", servo.TRACKING))
+    limit = float(meta.get("options", {}).get("tracking", servo_regression.TRACKING))
     for a in "xy":
         gain = meta.get("parameters", {}).get(f"gyro.K_sg_{a}", 0.0)
         part = {k: windows[f"{k}_{a}"] for k in ("mean", "std") if f"{k}_{a}" in windows}
         if len(part) == 2:
             known = {"gyro.K_sg": gain, "gyro.H": 1.0, "gyro.C": 1.0}  # a pickoff reads the angle itself
-            found += [f"{a} axis: {text}" for text in servo.tracking_problems(part, held, known, limit)]
+            found += [f"{a} axis: {text}" for text in servo_regression.tracking_problems(part, held, known, limit)]
     for c, x in X.items():
         seen = refusals.regression.examine(x, drift.terms_2dof(c, terms))
         if seen.lost:
@@ -121,7 +132,7 @@ def _problems(
 
 
 def _channel(
-    c: str, j: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: recorded.Site,
+    c: str, j: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: run_metadata.Site,
     meta: Mapping[str, Any], terms: int, truth: Mapping[str, float] | None, specification: Limits | None,
 ) -> Result:  # fmt: skip
     names = drift.terms_2dof(c, terms)
@@ -143,7 +154,7 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=CONVENTIONS,
-        effects=budget.effects(j, found, seen, phase, site, names, recorded.sizes(meta, budget.SIZES)),
+        effects=budget.effects(j, found, seen, phase, site, names, run_metadata.sizes(meta, budget.SIZES)),
         specification=specification,
         site=site.shown(),
         instrument=str(meta.get("instrument", "")),
@@ -187,7 +198,7 @@ def _mount_test(found: Findings, phase: NDArray[np.int_]) -> None:
 
 def _mounts_table(
     phase: NDArray[np.int_], labels: Mapping[int, str], seen: Track, found: Mapping[str, Findings],
-    mount: NDArray[np.int_], site: recorded.Site,
+    mount: NDArray[np.int_], site: run_metadata.Site,
 ) -> dict[str, Any]:  # fmt: skip
     rows: list[list[Any]] = []
     for p, label in labels.items():

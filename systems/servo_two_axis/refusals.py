@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import regression
+from gyrobench.reduction.estimation import regression
 
 from . import geometry
 

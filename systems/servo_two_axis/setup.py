@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.system import servo
+from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.sockets import Connector, Socket
 
@@ -127,7 +127,7 @@ def parameters(system: System, mounts: Sequence[int]) -> dict[str, Any]:
     placed = {
         f"stand.mounts[{2 * k + i},{j + 1}]": MOUNTS[m][j] for k, m in enumerate(mounts) for i in (1, 2) for j in (0, 1)
     }
-    table = {**FREE, "base": NEXT, "index_rate": servo.INDEX_RATE, "capture_rate": servo.CAPTURE_RATE}
+    table = {**FREE, "base": NEXT, "index_rate": servo_stand.INDEX_RATE, "capture_rate": servo_stand.CAPTURE_RATE}
     gains = {
         f"{slot}.K_g": system.overrides[name]
         for slot, name in (("outer", "gyro.K_sg_x"), ("inner", "gyro.K_sg_y"))

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import frames
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system import servo
+from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import parse
 
@@ -34,15 +34,15 @@ class ServoTwoAxis(System):
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
-        "stand": Slot(servo.STAND, "fixture"),
+        "stand": Slot(servo_stand.STAND, "fixture"),
         "wobble_x": Slot(setup.WOBBLE, "axis_wobble"),
-        "outer": Slot(servo.SERVO_TABLE, "table_servo"),
+        "outer": Slot(servo_stand.SERVO_TABLE, "table_servo"),
         "wobble_y": Slot(setup.WOBBLE, "axis_wobble"),
-        "inner": Slot(servo.SERVO_TABLE, "table_servo"),
+        "inner": Slot(servo_stand.SERVO_TABLE, "table_servo"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "coupling": Slot(setup.COUPLING, "axis_coupling"),
-        "cage_x": Slot(servo.CAGE, "cage"),
-        "cage_y": Slot(servo.CAGE, "cage"),
+        "cage_x": Slot(servo_stand.CAGE, "cage"),
+        "cage_y": Slot(servo_stand.CAGE, "cage"),
         "sampler_x": Slot("Sampler", "sampler"),
         "sampler_y": Slot("Sampler", "sampler"),
     }

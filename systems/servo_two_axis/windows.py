@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from gyrobench import drift, frames
-from gyrobench.reduction.recorded import Site
+from gyrobench.reduction.run_metadata import Site
 
 from . import geometry
 

@@ -6,7 +6,7 @@ Least squares over all windows, regressors averaged over each; noise white, Gaus
 estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-VERT, TEST-SERVO-LEVEL]
 
 Not modelled: D_IO, D_OS, D_IS, which a level attitude sees by the sine of its angle (at most 1 degree); see
-gyrobench.reduction.servo.
+gyrobench.reduction.drift.servo_regression.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import composite, recorded, servo
-from gyrobench.reduction.method import Group, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import composite, servo_regression
+from gyrobench.reduction.estimation.fit_result import Group, Quantity, ReductionError, fit, linear_result, plus_minus
 from gyrobench.reduction.result import Result
-from gyrobench.system.servo import ATTITUDES, attitude
+from gyrobench.system.families.servo_stand import ATTITUDES, attitude
 
 from . import closed, refusals
 
@@ -33,14 +34,14 @@ SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """Coefficients and composite drift of a record (gyrobench.system.record.Record).  Raises ReductionError."""
+    """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     meta, windows = record.meta, record.windows
     options = dict(meta.get("options", {}))
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
     wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(ATTITUDES)}" for p, n in labels.items()
              if n not in ATTITUDES or n.startswith("polar")]  # fmt: skip
-    wrong = wrong or servo.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
+    wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
     if wrong:
         raise ReductionError(wrong)
     every = np.asarray(windows["phase"]).astype(int)
@@ -49,21 +50,23 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     start, end, t0, t1 = (
         np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
     )
-    limit = float(options.get("tracking", servo.TRACKING))
+    limit = float(options.get("tracking", servo_regression.TRACKING))
     wrong = refusals.record_problems(start, end, phase, labels)
-    wrong += servo.tracking_problems(windows, mine, meta.get("parameters", {}), limit)
+    wrong += servo_regression.tracking_problems(windows, mine, meta.get("parameters", {}), limit)
     if wrong:
         raise ReductionError(wrong)
-    held = servo.Held(start, end, t0, t1, np.array([attitude(labels[p], site.latitude) for p in phase.tolist()]))
+    held = servo_regression.Held(
+        start, end, t0, t1, np.array([attitude(labels[p], site.latitude) for p in phase.tolist()])
+    )
     seen = refusals.seen(list(labels.values()))
 
-    def columns(h: servo.Held) -> Array:
-        return servo.design(h, site, seen.names)
+    def columns(h: servo_regression.Held) -> Array:
+        return servo_regression.design(h, site, seen.names)
 
-    y, X = servo.drift_rate(held, site), columns(held)
+    y, X = servo_regression.drift_rate(held, site), columns(held)
     means = _class_means(y, t1 - t0, phase, labels)
     book = closed.formulas(means, site.g)
-    truth = recorded.truth_of(meta, drift.NAMES)
+    truth = run_metadata.truth_of(meta, drift.NAMES)
     quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
     found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings")
     statistics: dict[str, composite.Composite | str] = {}
@@ -73,8 +76,10 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
         bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
         statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
-    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **recorded.sizes(meta, SIZES)}
-    effects = [e for e in servo.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source]
+    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(meta, SIZES)}
+    effects = [
+        e for e in servo_regression.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source
+    ]
     warnings = refusals.unseen(list(labels.values()))
     both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
     worst = float(np.max(np.abs(np.concatenate([start, end])[np.tile(_level(labels, phase), 2)]), initial=0.0))
@@ -93,8 +98,8 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
             "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
             "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
         ],
-        equation=servo.equation(seen.names),
-        conventions=servo.CONVENTIONS,
+        equation=servo_regression.equation(seen.names),
+        conventions=servo_regression.CONVENTIONS,
         effects=effects,
         specification=specification,
         site=site.shown(),
@@ -103,7 +108,8 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         no_closed="" if book else "the book has formulas for class 1, for the three-term route and for complete pairs",
         closed_caption="From the same windows; the formulas take every attitude as at angle 0",
         tables=[
-            _attitudes_table(means, found.est.residual, y, phase, labels), servo.book_table(found, _book_words(seen)),
+            _attitudes_table(means, found.est.residual, y, phase, labels),
+            servo_regression.book_table(found, _book_words(seen)),
             *composite.tables(statistics, DPH, "°/h"),
         ],
         warnings=warnings,
@@ -112,7 +118,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         *(f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {plus_minus(c)}." for c in result.coefficients[:2]),
         found.noise_sentence(),
     ]
-    return recorded.finish(result, record)
+    return run_metadata.finish(result, record)
 
 
 def _class(name: str) -> str:
@@ -146,16 +152,16 @@ def _book_words(seen: refusals.Seen) -> dict[str, str]:
     """Combinations in the book's names: R + γ² K_zx."""
     out = {}
     for name in seen.names:
-        symbol, sign = servo.BOOK[name]
+        symbol, sign = servo_regression.BOOK[name]
         words = [symbol]
         for other, s, k in seen.mixed[name]:
-            its, way = servo.BOOK[other]
+            its, way = servo_regression.BOOK[other]
             words.append(f"{'+' if s * way * sign > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{its}")
         out[name] = " ".join(words)
     return out
 
 
-def _groups(labels: Mapping[int, str], phase: NDArray[np.int_], held: servo.Held) -> list[Group]:
+def _groups(labels: Mapping[int, str], phase: NDArray[np.int_], held: servo_regression.Held) -> list[Group]:
     """Drift against time, cycles of the same attitude together."""
     middle, out = (held.t_start + held.t_end) / 2.0, []
     for label in dict.fromkeys(labels.values()):

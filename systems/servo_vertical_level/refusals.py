@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift
-from gyrobench.system.servo import ATTITUDES, LEVEL, U
+from gyrobench.system.families.servo_stand import ATTITUDES, LEVEL, U
 
 Array = NDArray[np.float64]
 LIMIT = math.radians(1.0)  # of the angle in a level attitude

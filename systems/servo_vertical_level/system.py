@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import frames
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system import servo
+from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 Specification = Mapping[str, tuple[float | None, float | None]]
@@ -22,9 +22,9 @@ SIX = "x down; x up; x east, y up; x east, y down; x east, z up; x east, z down"
 SETS = {
     "three": THREE,
     "six": SIX,
-    "vertical": "; ".join(servo.VERTICAL),
-    "level": "; ".join(servo.LEVEL),
-    "all": "; ".join((*servo.VERTICAL, *servo.LEVEL)),
+    "vertical": "; ".join(servo_stand.VERTICAL),
+    "level": "; ".join(servo_stand.LEVEL),
+    "all": "; ".join((*servo_stand.VERTICAL, *servo_stand.LEVEL)),
 }
 
 
@@ -40,13 +40,13 @@ class ServoVerticalLevel(System):
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
-        "stand": Slot(servo.STAND, "fixture"),
-        "table": Slot(servo.SERVO_TABLE, "table_servo"),
+        "stand": Slot(servo_stand.STAND, "fixture"),
+        "table": Slot(servo_stand.SERVO_TABLE, "table_servo"),
         "gyro": Slot("SdfGyro", "floated_gyro"),
-        "cage": Slot(servo.CAGE, "cage"),
+        "cage": Slot(servo_stand.CAGE, "cage"),
         "sampler": Slot("Sampler", "sampler"),
     }
-    wires = servo.WIRES
+    wires = servo_stand.WIRES
     options = {
         "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
         "height": Option(0.0, "m", "height above the ellipsoid"),
@@ -62,7 +62,7 @@ class ServoVerticalLevel(System):
         "u_unbalance": Option(0.0, "rad", "angle by unbalance of the table at 1 g over the stiffness, std. unc.", 0.0),
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
-    noises = servo.NOISES
+    noises = servo_stand.NOISES
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "gyro.drift")
@@ -79,29 +79,29 @@ class ServoVerticalLevel(System):
         common = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"] / self["windows"]}
         for name in self.attitudes() * self["cycles"]:
             start = 0.0
-            if name in servo.LEVEL:
+            if name in servo_stand.LEVEL:
                 half = self["settle"] + self["dwell"] / 2.0
                 start = self.earth(name) * half
-            holds.append(servo.Hold(name, start=start, **common))
-        return servo.plan([h for h in holds if h.attitude in servo.ATTITUDES])
+            holds.append(servo_stand.Hold(name, start=start, **common))
+        return servo_stand.plan([h for h in holds if h.attitude in servo_stand.ATTITUDES])
 
     def earth(self, name: str) -> float:
         """Earth rate along the input axis, rad/s."""
         local = frames.earth_rate_local(self["latitude"])
-        return float((servo.attitude(name, self["latitude"]) @ local)[0])
+        return float((servo_stand.attitude(name, self["latitude"]) @ local)[0])
 
     def parameters(self) -> dict[str, Any]:
-        return servo.parameters(self)
+        return servo_stand.parameters(self)
 
     def check(self) -> list[str]:
         from .refusals import option_problems
 
         names = self.attitudes()
-        known = {n: self.earth(n) for n in names if n in servo.LEVEL}
+        known = {n: self.earth(n) for n in names if n in servo_stand.LEVEL}
         return option_problems(names, known, self["settle"] + self["dwell"])
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        return servo.problems(parameters, self.plan())
+        return servo_stand.problems(parameters, self.plan())
 
     def warnings(self) -> list[str]:
         from .refusals import unseen

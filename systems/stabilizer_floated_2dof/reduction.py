@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction import margins, uncertainty
-from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Drift, Gate, Point, drift
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.loops import margins
+from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.result import Result
 
 from .closed import Loop

@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System
 
 from .closed import Loop

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction import margins
-from gyrobench.reduction.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.loops import Drift, Gate, Point, drift
+from gyrobench.reduction.loops import margins
+from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.result import Result
 
 Specification = Mapping[str, tuple[float | None, float | None]]

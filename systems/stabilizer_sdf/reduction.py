@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.loop_result import DPH, LoopFindings
-from gyrobench.reduction.loops import Gate
-from gyrobench.reduction.method import ReductionError
+from gyrobench.reduction.estimation.fit_result import ReductionError
+from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.loops.loop_result import DPH, LoopFindings
 from gyrobench.reduction.result import Response, Result
 
 from . import closed

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.reduction import regression
+from gyrobench.reduction.estimation import regression
 
 from .precession import Precession
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.checks import ReductionError, window_problems
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 Array = NDArray[np.float64]
 SHARED = 0.5  # of the range turned, least part that both senses must cover

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.reduction import correlated
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.reduction.regression import RegressionError
+from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
 DEGREE = 4
@@ -34,7 +34,7 @@ class Precession:
 
     K: Array
     drift: Array
-    est: correlated.Estimate
+    est: noise_mixture_fit.Estimate
 
     def weights(self, columns: Array, of: Array | slice) -> Array:
         """(q, n) W of generalized least squares W values = c of ``values = columns c``, under their covariance."""
@@ -50,8 +50,8 @@ class Precession:
         n, J = self.K.size, np.zeros(self.est.beta.size)
         J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
         sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
-        u = min(sd, half / correlated.NORMAL)
-        return u, float(correlated.dof_of(np.array([half / u if u > 0.0 else correlated.NORMAL]))[0])
+        u = min(sd, half / noise_mixture_fit.NORMAL)
+        return u, float(noise_mixture_fit.dof_of(np.array([half / u if u > 0.0 else noise_mixture_fit.NORMAL]))[0])
 
 
 def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array) -> Precession:
@@ -70,7 +70,7 @@ def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents
     X = np.column_stack([own * i[:, None], own, shape])
     names = [f"K at {c * 1e3:g} mA" for c in currents] + [f"drift at {c * 1e3:g} mA" for c in currents]
     try:
-        est = correlated.fit(
+        est = noise_mixture_fit.fit(
             X, (a1 - a0) / (t1 - t0), [*names, *(f"P{j}" for j in range(1, DEGREE + 1))], t0, t1, readings=True
         )
     except RegressionError as error:

@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
-from gyrobench.reduction import recorded, regression, uncertainty
-from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
+from gyrobench.reduction.window_checks import ReductionError
 
 from . import marks
 from .estimates import Estimates, Number, of_table, of_windows
@@ -297,6 +298,6 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         instrument=str(record.meta.get("instrument", "")),
         simulated=truth is not None,
         truth=truth,
-        site={} if measured else recorded.Site.of(record.meta).shown(),
+        site={} if measured else run_metadata.Site.of(record.meta).shown(),
     )
-    return recorded.finish(reduce(rows, setup, found), record)
+    return run_metadata.finish(reduce(rows, setup, found), record)

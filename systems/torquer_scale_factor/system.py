@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames, units
+from gyrobench.record.csv_reader import Column, read_measured
+from gyrobench.record.record import ABOUT, Record
 from gyrobench.reduction.result import Result
-from gyrobench.system.measured import Column, read_measured
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.record import ABOUT, Record
 from gyrobench.system.sockets import SOCKETS, Connector, Socket
 from gyrobench.system.system import Option, Slot, System, Windows
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import attitude
-from gyrobench.reduction.method import Effect, Findings
+from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.estimation.fit_result import Effect, Findings
 
 from .setup import TumbleSetup
 
@@ -27,30 +27,32 @@ TOWARDS_OUTPUT = "input axis towards output axis"
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
-def design(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], base: Array | None = None) -> Array:
+def design(
+    setup: TumbleSetup, turning: window_regressors.Turning, names: tuple[str, ...], base: Array | None = None
+) -> Array:
     """Window means (n, p) of the regressors ``names``; the column of :data:`TILT` is minus the rate along O,
     rad/s.
     """
     base = setup.base if base is None else base
     terms = tuple(n for n in names if n != TILT)
-    X = attitude.regressors(turning, base, setup.gravity, terms)
+    X = window_regressors.regressors(turning, base, setup.gravity, terms)
     if TILT not in names:
         return X
-    along = attitude.axis_rate(turning, base, setup.latitude, setup.earth_rate, 1)
+    along = window_regressors.axis_rate(turning, base, setup.latitude, setup.earth_rate, 1)
     return np.column_stack([X, -along])
 
 
-def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found: Findings) -> list[Effect]:
+def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Array, found: Findings) -> list[Effect]:
     """All sources with their sensitivities; sizes come from ``setup`` and may be 0.
 
     current (n,) in A with the sign of the precession convention.
     """
     names, X = found.est.names, found.X
-    rate = attitude.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+    rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
 
-    def geometry(base: Array, turned: attitude.Turning) -> Array:
+    def geometry(base: Array, turned: window_regressors.Turning) -> Array:
         dX = design(setup, turned, names, base) - X
-        drate = attitude.axis_rate(turned, base, setup.latitude, setup.earth_rate) - rate
+        drate = window_regressors.axis_rate(turned, base, setup.latitude, setup.earth_rate) - rate
         return found.change(drate, dX) / SMALL
 
     def axis(direction: Array) -> Array:
@@ -92,7 +94,7 @@ def effects(setup: TumbleSetup, turning: attitude.Turning, current: Array, found
     ]  # fmt: skip
 
 
-def _wobble(setup: TumbleSetup, turning: attitude.Turning, found: Findings) -> Array:
+def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findings) -> Array:
     """Changes (2, p) by a table that goes round a cone twice a turn, per rad: q = (cos a, sin a, 0) in table axes at
     angle 0, a = 2 theta and 2 theta + 90 degrees, as of the part axis_wobble.
 
@@ -115,8 +117,8 @@ def _wobble(setup: TumbleSetup, turning: attitude.Turning, found: Findings) -> A
     for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
         q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
         going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
-        rate = attitude.average(seen(going - np.cross(q, earth)))  # what is there and not believed
-        dX = attitude.average(still - drift.regressors(seen(up - SMALL * np.cross(q, up)), terms)) / SMALL
+        rate = window_regressors.average(seen(going - np.cross(q, earth)))  # what is there and not believed
+        dX = window_regressors.average(still - drift.regressors(seen(up - SMALL * np.cross(q, up)), terms)) / SMALL
         if TILT in names:
             dX = np.column_stack([dX, rate[:, 1]])
         changes.append(found.change(-rate[:, 0], dX))

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gyrobench import frames
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System

@@ -20,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import attitude, correlated, recorded, regression
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.method import Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift.turns import Turns
+from gyrobench.reduction.estimation import noise_mixture_fit, regression
+from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
 from gyrobench.reduction.result import Coefficient, Result
-from gyrobench.reduction.turns import Turns
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 from . import budget, closed
 from .refusals import plan_problems, refusals, setup_problems
@@ -50,9 +52,11 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
     phase = np.asarray(windows["phase"]).astype(int)
     column = {c: np.asarray(windows[c], dtype=float) for c in ("t_start", "t_end", "angle_start", "angle_end", "mean")}
     face = np.array([np.asarray(setup.faces[p], dtype=float) for p in phase.tolist()])
-    turning = attitude.Turning(column["angle_start"], column["angle_end"], column["t_start"], column["t_end"], face)
+    turning = window_regressors.Turning(
+        column["angle_start"], column["angle_end"], column["t_start"], column["t_end"], face
+    )
     current = column["mean"] if setup.polarity == "project" else -column["mean"]
-    rate = attitude.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
+    rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
     y = rate - setup.k * current
     names = drift.terms(9 if setup.terms == 10 else setup.terms)
     if setup.tilt:
@@ -98,7 +102,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         conventions=_conventions(setup),
         effects=effects,
         specification=setup.specification,
-        site=recorded.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
+        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
         instrument=setup.instrument,
         simulated=setup.truth is not None,
         no_closed=why,
@@ -118,14 +122,14 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
     return result
 
 
-def _tilt_seen(setup: TumbleSetup, turning: attitude.Turning, names: tuple[str, ...], y: Array) -> list[str]:
+def _tilt_seen(setup: TumbleSetup, turning: window_regressors.Turning, names: tuple[str, ...], y: Array) -> list[str]:
     """A warning when the data ask for the tilt of the input axis (above four u), which these terms do not hold.
 
     It is a step between the mounts; taken for slow noise it leaks into the coefficients.
     """
     more = (*names, budget.TILT)
     try:
-        est = correlated.fit(budget.design(setup, turning, more), y, more, turning.t_start, turning.t_end)
+        est = noise_mixture_fit.fit(budget.design(setup, turning, more), y, more, turning.t_start, turning.t_end)
     except regression.RegressionError:
         return []
     tilt, u = (float(v[-1]) / units.factor("arcsec") for v in (est.beta, est.u))
@@ -151,7 +155,12 @@ def _quantity(s: TumbleSetup, name: str, book: Mapping[str, float]) -> Quantity:
 
 
 def _group(
-    s: TumbleSetup, turning: attitude.Turning, phase: NDArray[np.int_], X: Array, names: tuple[str, ...], p: int
+    s: TumbleSetup,
+    turning: window_regressors.Turning,
+    phase: NDArray[np.int_],
+    X: Array,
+    names: tuple[str, ...],
+    p: int,
 ) -> Group:
     """Drift against table angle where the table turns, against time in a dwell."""
     mine = phase == p
@@ -161,7 +170,7 @@ def _group(
     angle = np.degrees(np.mod(((turning.angle_start + turning.angle_end) / 2.0)[mine], 2.0 * math.pi))
     dense = np.radians(np.arange(0.0, 361.0, 3.0))
     face = np.broadcast_to(np.asarray(s.faces[p], dtype=float), (dense.size, 3, 3))
-    still = attitude.Turning(dense, dense, np.zeros_like(dense), np.ones_like(dense), face)
+    still = window_regressors.Turning(dense, dense, np.zeros_like(dense), np.ones_like(dense), face)
     curve = budget.design(s, still, names)
     if budget.TILT in names:
         curve[:, -1] = float(np.mean(X[mine, -1]))  # the table turns, the plotted one does not
@@ -213,5 +222,5 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
 
 
 def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
-    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
-    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
+    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import recorded
+from gyrobench.reduction import run_metadata
 
 Array = NDArray[np.float64]
 SIZES = (
@@ -82,18 +82,18 @@ def setup_of(
     Scale factor: option ``k``, else the gyro's parameter ``k``.  Truth only where the gyro part has the coefficients.
     """
     options, parameters = dict(meta.get("options", {})), dict(meta.get("parameters", {}))
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     ideal = frames.tumble_faces(site.latitude)
-    plan = recorded.phases(meta, ideal)
+    plan = run_metadata.phases(meta, ideal)
     return TumbleSetup(
         latitude=site.latitude,
         gravity=site.gravity,
-        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
+        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
         faces={p: ideal[r["face"]] for p, r in plan.items()},
         earth_rate=site.earth_rate,
         labels={p: str(r["label"]) for p, r in plan.items()},
         modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
-        truth=recorded.truth_of(meta, drift.NAMES),
+        truth=run_metadata.truth_of(meta, drift.NAMES),
         terms=int(options.get("terms", 9)),
         fold=bool(options.get("fold", False)),
         tilt=bool(options.get("tilt", False)),
@@ -101,5 +101,5 @@ def setup_of(
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, SIZES),
+        **run_metadata.sizes(meta, SIZES),
     )

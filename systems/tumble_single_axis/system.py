@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 from . import measured

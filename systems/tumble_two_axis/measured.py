@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gyrobench.system.measured import WINDOW_COLUMNS, Column
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
 
 TEMPLATE = """\
 # Two-axis tumble of a floated gyro in torque rebalance: one row for each average at rest, several rows a position.

@@ -20,10 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import recorded, regression
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 from . import closed, geometry
 from .measured import ANGLES
@@ -127,7 +136,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> Result:
         conventions=_conventions(s),
         effects=_effects(s, found, outer, inner, C, current),
         specification=s.specification,
-        site=recorded.Site(s.latitude, s.gravity, s.earth_rate).shown(),
+        site=run_metadata.Site(s.latitude, s.gravity, s.earth_rate).shown(),
         instrument=s.instrument,
         simulated=s.truth is not None,
         no_closed="; ".join(why),
@@ -338,25 +347,25 @@ def _conventions(s: TwoAxisSetup) -> list[str]:
 def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoAxisSetup:
     """The setup a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
     options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     return TwoAxisSetup(
         latitude=site.latitude,
         gravity=site.gravity,
-        k=recorded.number(meta, "k", "gyro.k", "torquer scale factor"),
+        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
         m=int(options.get("m", 5)),
         n=int(options.get("n", 1)),
         earth_rate=site.earth_rate,
         harmonic=bool(options.get("harmonic", False)),
         fold=bool(options.get("fold", False)),
-        truth=recorded.truth_of(meta, drift.NAMES),
+        truth=run_metadata.truth_of(meta, drift.NAMES),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
         polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, SIZES),
+        **run_metadata.sizes(meta, SIZES),
     )
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
-    return recorded.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
+    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import frames, units
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.record import Record
 from gyrobench.system.system import Option, Slot, System, Windows
 
 from . import geometry, measured
@@ -173,7 +173,7 @@ class TumbleTwoAxis(System):
         return measured.TEMPLATE
 
     def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        from gyrobench.system.laboratory import read_record
+        from gyrobench.system.lab_record import read_record
 
         needed = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
         return read_record(self, data, values, needed=needed, columns=measured.COLUMNS)

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.frames import G0
-from gyrobench.reduction import harmonic
-from gyrobench.reduction.regression import Fit
+from gyrobench.reduction.drift import harmonic
+from gyrobench.reduction.estimation.regression import Fit
 
 Array = NDArray[np.float64]
 Amplitudes = Mapping[str, float]

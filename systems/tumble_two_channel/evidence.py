@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction import attitude
-from gyrobench.reduction.method import Effect, Findings, Group
-from gyrobench.reduction.turns import Turns
+from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift.turns import Turns
+from gyrobench.reduction.estimation.fit_result import Effect, Findings, Group
 
 from . import geometry
 from .setup import OTHER, TwoChannelSetup, design
@@ -22,7 +22,7 @@ DPH = units.factor("deg/h")
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
-def groups(s: TwoChannelSetup, c: str, phase: Array, t: attitude.Turning, X: Array) -> list[Group]:
+def groups(s: TwoChannelSetup, c: str, phase: Array, t: window_regressors.Turning, X: Array) -> list[Group]:
     out = []
     for p in s.faces:
         rows = np.flatnonzero(phase == p)
@@ -33,14 +33,14 @@ def groups(s: TwoChannelSetup, c: str, phase: Array, t: attitude.Turning, X: Arr
         x = np.degrees(np.mod((t.angle_start[rows] + t.angle_end[rows]) / 2.0, 2.0 * math.pi))
         angle = np.radians(np.arange(0.0, 361.0, 3.0))
         face = np.broadcast_to(np.asarray(s.faces[p], dtype=float), (angle.size, 3, 3))
-        curve = design(s, c, attitude.Turning(angle, angle, np.zeros_like(angle), np.ones_like(angle), face))
+        curve = design(s, c, window_regressors.Turning(angle, angle, np.zeros_like(angle), np.ones_like(angle), face))
         if s.tilt:
             curve[:, -1] = float(np.mean(X[rows, -1]))  # the table turns, the plotted one does not
         out.append(Group(s.label(p), rows, x, "table angle", "°", (np.degrees(angle), curve)))
     return out
 
 
-def turns(s: TwoChannelSetup, found: Findings, phase: Array, t: attitude.Turning) -> Turns:
+def turns(s: TwoChannelSetup, found: Findings, phase: Array, t: window_regressors.Turning) -> Turns:
     """Tests of the harmonics that the model does not hold and of turn against turn, over theta = -angle."""
     phases = [(s.label(p), phase == p) for p in s.faces if s.turns(p)]
     out = Turns(found, phases, -t.angle_start, -t.angle_end, 1 if s.model == "simple" else 2)
@@ -49,7 +49,7 @@ def turns(s: TwoChannelSetup, found: Findings, phase: Array, t: attitude.Turning
 
 
 def left_out(
-    s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turning
+    s: TwoChannelSetup, c: str, found: Findings, turning: window_regressors.Turning
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """What simulated terms outside the model do to the coefficients: a table and a warning."""
     names = s.names(c)
@@ -60,7 +60,9 @@ def left_out(
     if not extra:
         return [], []
     assert s.truth is not None
-    more = attitude.regressors(turning, s.base, s.gravity, tuple(extra)) @ np.array([s.truth[n] for n in extra])
+    more = window_regressors.regressors(turning, s.base, s.gravity, tuple(extra)) @ np.array(
+        [s.truth[n] for n in extra]
+    )
     shift = found.gain @ more / DPH
     rows = [[q.title, float(v), q.unit] for q, v in zip(found.quantities, shift, strict=True)]
     caption = f"Predicted shift by {', '.join(extra)}, which are simulated and outside the model; likeliest noise model"
@@ -70,13 +72,15 @@ def left_out(
     ]
 
 
-def effects(s: TwoChannelSetup, c: str, found: Findings, turning: attitude.Turning, current: Array) -> list[Effect]:
+def effects(
+    s: TwoChannelSetup, c: str, found: Findings, turning: window_regressors.Turning, current: Array
+) -> list[Effect]:
     axis = geometry.AXIS[c]
-    X, rate = found.X, attitude.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis)
+    X, rate = found.X, window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis)
 
-    def geometric(base: Array, turned: attitude.Turning) -> Array:
+    def geometric(base: Array, turned: window_regressors.Turning) -> Array:
         dX = design(s, c, turned, base) - X
-        drate = attitude.axis_rate(turned, base, s.latitude, s.earth_rate, axis) - rate
+        drate = window_regressors.axis_rate(turned, base, s.latitude, s.earth_rate, axis) - rate
         return found.change(drate, dX) / SMALL
 
     def tilted(direction: Array) -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import regression
+from gyrobench.reduction.estimation import regression
 
 Array = NDArray[np.float64]
 MODELS = ("simple", "nine")

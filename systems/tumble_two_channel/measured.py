@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyrobench.system.laboratory import read_record
-from gyrobench.system.measured import WINDOW_COLUMNS, Column
-from gyrobench.system.record import Record
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import read_record
 
 from . import geometry
 
@@ -58,7 +58,7 @@ NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/m
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, see gyrobench.system.laboratory.
+    """The CSV as a record in SI, see gyrobench.system.lab_record.
 
     Raises DataError, and ValueProblem for an option that does not fit.
     """

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames, units
-from gyrobench.reduction import attitude, recorded
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.merge import merge
-from gyrobench.reduction.method import Quantity, fit, linear_result, plus_minus
-from gyrobench.reduction.regression import Fit
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.estimation.fit_result import Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.result import Result
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 from . import closed, evidence, geometry
 from .refusals import plan_problems, setup_problems
@@ -53,12 +54,15 @@ def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> Result:
     phase = np.asarray(windows["phase"]).astype(int)
     t0, t1, a0, a1 = (np.asarray(windows[c], dtype=float) for c in ("t_start", "t_end", "angle_start", "angle_end"))
     face = np.array([np.asarray(s.faces[p], dtype=float) for p in phase.tolist()])
-    turning = attitude.Turning(a0, a1, t0, t1, face)
+    turning = window_regressors.Turning(a0, a1, t0, t1, face)
     sign = 1.0 if s.polarity == "project" else -1.0
     current = {a: sign * np.asarray(windows[f"mean_{a}"], dtype=float) for a in "xy"}
     y = {}
     for c, axis in geometry.AXIS.items():
-        y[c] = attitude.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis) - s.k[OTHER[c]] * current[OTHER[c]]
+        y[c] = (
+            window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis)
+            - s.k[OTHER[c]] * current[OTHER[c]]
+        )
     book, fits, why = _closed(s, phase, turning, y)
     results = {}
     for c in "xy":
@@ -75,7 +79,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> Result:
 
 
 def _channel(
-    s: TwoChannelSetup, c: str, phase: Array, turning: attitude.Turning, y: Array, current: Array,
+    s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, y: Array, current: Array,
     book: Mapping[str, float], fits: Mapping[str, Fit], why: str,
 ) -> Result:  # fmt: skip
     names = s.names(c)
@@ -111,7 +115,7 @@ def _channel(
         conventions=_conventions(s),
         effects=evidence.effects(s, c, found, turning, current),
         specification=s.specification,
-        site=recorded.Site(s.latitude, s.gravity, s.earth_rate).shown(),
+        site=run_metadata.Site(s.latitude, s.gravity, s.earth_rate).shown(),
         instrument=s.instrument,
         simulated=s.truth is not None,
         no_closed=why,
@@ -143,7 +147,7 @@ def _quantity(s: TwoChannelSetup, c: str, name: str, book: Mapping[str, float]) 
 
 # --------------------------------------------------------------------------------------------- closed formulas
 def _closed(
-    s: TwoChannelSetup, phase: Array, turning: attitude.Turning, y: Mapping[str, Array]
+    s: TwoChannelSetup, phase: Array, turning: window_regressors.Turning, y: Mapping[str, Array]
 ) -> tuple[dict[str, float], dict[str, dict[str, Fit]], str]:
     """Coefficients by the book's formulas (SI), the harmonic fits of each channel, and why not."""
     ideal = geometry.faces(s.model, s.latitude)
@@ -232,6 +236,6 @@ def _conventions(s: TwoChannelSetup) -> list[str]:
 
 
 def from_record(record: Any, specification: Limits | None = None) -> Result:
-    """:func:`reduce` of a gyrobench.system.record.Record, with its run.json as provenance."""
+    """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     result = reduce(record.windows, setup_of(record.meta, specification))
-    return recorded.finish(result, record)
+    return run_metadata.finish(result, record)

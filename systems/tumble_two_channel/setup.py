@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import attitude, recorded
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import window_regressors
 
 from . import geometry
 
@@ -71,13 +72,13 @@ class TwoChannelSetup:
         return (*geometry.terms(self.model, channel), *((geometry.TILT[channel],) if self.tilt else ()))
 
 
-def design(s: TwoChannelSetup, channel: str, turning: attitude.Turning, base: Array | None = None) -> Array:
+def design(s: TwoChannelSetup, channel: str, turning: window_regressors.Turning, base: Array | None = None) -> Array:
     """Window means (n, p) of the regressors; the column of a tilt is minus the rate along z, rad/s."""
     base = s.base if base is None else base
-    X = attitude.regressors(turning, base, s.gravity, geometry.terms(s.model, channel))
+    X = window_regressors.regressors(turning, base, s.gravity, geometry.terms(s.model, channel))
     if not s.tilt:
         return X
-    return np.column_stack([X, -attitude.axis_rate(turning, base, s.latitude, s.earth_rate, 2)])
+    return np.column_stack([X, -window_regressors.axis_rate(turning, base, s.latitude, s.earth_rate, 2)])
 
 
 def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoChannelSetup:
@@ -86,24 +87,27 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Tw
     Scale factors: options ``k_x``, ``k_y``, else the gyro's parameters.  Truth only where the gyro has coefficients.
     """
     options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site, model = recorded.Site.of(meta), str(options.get("model", "nine"))
+    site, model = run_metadata.Site.of(meta), str(options.get("model", "nine"))
     ideal = geometry.faces(model, site.latitude)
-    plan = recorded.phases(meta, ideal)
+    plan = run_metadata.phases(meta, ideal)
     return TwoChannelSetup(
         latitude=site.latitude,
         gravity=site.gravity,
-        k={a: recorded.number(meta, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}") for a in "xy"},
+        k={
+            a: run_metadata.number(meta, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}")
+            for a in "xy"
+        },
         faces={p: ideal[r["face"]] for p, r in plan.items()},
         modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
         model=model,
         earth_rate=site.earth_rate,
         labels={p: str(r["label"]) for p, r in plan.items()},
-        truth=recorded.truth_of(meta, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
+        truth=run_metadata.truth_of(meta, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
         fold=bool(options.get("fold", False)),
         tilt=bool(options.get("tilt", False)),
         specification=specification,
         quantum={a: float(parameters.get(f"rebalance_{a}.resolution", 0.0)) for a in "xy"},
         polarity=str(meta.get("polarity", "project")),
         instrument=str(meta.get("instrument", "")),
-        **recorded.sizes(meta, SIZES),
+        **run_metadata.sizes(meta, SIZES),
     )

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.loop_result import LoopFindings
-from gyrobench.reduction.loops import Gate
+from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.result import Response, Result
 
 Array = NDArray[np.float64]

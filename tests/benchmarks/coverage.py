@@ -6,8 +6,8 @@ Each run draws true coefficients, a latitude and an instrument's noise, runs the
 or servo, sampler) on a shortened plan and reduces the record; nothing is quasi-static.  What is counted is whether the
 printed interval holds the printed truth.
 
-Noise: by default drawn from the population that the reduction takes for granted (gyrobench.reduction.noise): white
-alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windows to half the record; where data are
+Noise: by default drawn from the population that the reduction takes for granted (gyrobench.reduction.estimation.noise):
+white alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windows to half the record; where data are
 differences of readings, with errors of the readings too.  Windows are shortened, so the sizes are scaled: the parts get
 the densities that give a window the drawn shares.  ``--noise`` takes one instrument instead, a corner of the
 population; there intervals may hold the truth more or less often than 95 %.  README.md here has the figures.
@@ -29,9 +29,9 @@ import numpy as np
 from scipy import stats
 
 from gyrobench import drift, frames
-from gyrobench.reduction import correlated, noise
-from gyrobench.reduction.noise import mean_variance
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation import noise, noise_mixture_fit
+from gyrobench.reduction.estimation.noise import mean_variance
 from gyrobench.system.system import System, load_system
 
 DPH, ARCSEC, G0 = math.pi / 648000.0, math.pi / 648000.0, 9.80665
@@ -239,17 +239,17 @@ CASES = {
 def seen_windows() -> Iterator[list[tuple[Any, Any, bool]]]:
     """What the reducer gives the fit: t0, t1 and whether the data are differences of readings."""
     found: list[tuple[Any, Any, bool]] = []
-    inner = correlated.fit
+    inner = noise_mixture_fit.fit
 
     def fit(X: Any, y: Any, names: Any, t0: Any, t1: Any, limit: float = 1e3, readings: bool = False) -> Any:
         found.append((t0, t1, readings))
         return inner(X, y, names, t0, t1, limit, readings)
 
-    correlated.fit = fit
+    noise_mixture_fit.fit = fit
     try:
         yield found
     finally:
-        correlated.fit = inner
+        noise_mixture_fit.fit = inner
 
 
 @dataclass

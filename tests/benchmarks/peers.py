@@ -27,7 +27,7 @@ ORDER = ("actuator", "plant", "sensor", "controller")
 
 
 def ours(folder: Path, steps: int, engine: str = "native") -> tuple[float, float]:
-    from gyrobench.system.run import Session
+    from gyrobench.engine.session import Session
     from gyrobench.system.system import load_system
 
     with Session(load_system("loop", BENCH), bench=BENCH, engine=engine) as session:

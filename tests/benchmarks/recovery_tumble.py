@@ -19,8 +19,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from tumbling import NAMES, errors, gyro, lag, latitude, load, quiet
 
+from gyrobench.engine.session import Session
 from gyrobench.frames import EARTH_RATE
-from gyrobench.system.run import Session
 
 
 def main() -> int:

@@ -54,9 +54,9 @@ def one(name: str, folder: Path, quick: bool) -> dict[str, float] | str:
 
 def masters(quick: bool) -> None:
     """The engine against its peers, in turn, ROUNDS times; medians."""
+    from gyrobench.exchange.container import export_container
+    from gyrobench.exchange.ssp_export import export_ssp
     from gyrobench.packaging import build
-    from gyrobench.system.container import export_container
-    from gyrobench.system.ssp import export_ssp
     from gyrobench.system.system import load_system
 
     print("\nFour trivial FMUs in a loop, 1 ms step, two channels each 10 ms: microseconds a step")
@@ -109,7 +109,7 @@ def tumble(quick: bool) -> None:
         loop = folder / "tumble_loop"
         subprocess.run(["cc", "-O2", str(HERE / "tumble_loop.c"), "-o", str(loop), "-lm"], check=True)
         options = ["--force", "--out", str(folder / "run")]
-        command = [sys.executable, "-m", "gyrobench.cli", "run", "tumble_single_axis", *options]
+        command = [sys.executable, "-m", "gyrobench", "run", "tumble_single_axis", *options]
         subprocess.run([*command, "--set", "rate=2deg/s", "--set", "dwell=30s"], capture_output=True, check=True)
         whole, stepping, floor = [], [], []
         for _ in range(1 if quick else ROUNDS):
@@ -167,14 +167,14 @@ def builds() -> None:
     try:
         for what, budget in (("cold build of all native FMUs", "90 s"), ("warm build", "1 s")):
             began = time.perf_counter()
-            command = [sys.executable, "-m", "gyrobench.cli", "build", "--all", "--out", cache]
+            command = [sys.executable, "-m", "gyrobench", "build", "--all", "--out", cache]
             subprocess.run(command, capture_output=True, check=True, env=env)
             row(what, f"{time.perf_counter() - began:.2f} s", budget)
         for command in (["list"], ["--help"]):
             times = []
             for _ in range(5):
                 began = time.perf_counter()
-                subprocess.run([sys.executable, "-m", "gyrobench.cli", *command], capture_output=True, check=True)
+                subprocess.run([sys.executable, "-m", "gyrobench", *command], capture_output=True, check=True)
                 times.append(time.perf_counter() - began)
             row(f"gyrobench {command[0]}", f"{statistics.median(times):.2f} s", "0.5 s")
     finally:

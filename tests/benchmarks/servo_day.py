@@ -15,8 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from gyrobench.system.record import Record
-from gyrobench.system.run import RunError, run
+from gyrobench.engine.session import RunError, run
+from gyrobench.record.record import Record
 from gyrobench.system.system import load_system
 
 NAME = "servo_polar"

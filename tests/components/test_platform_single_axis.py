@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from wired import BENCH
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
 Platform = load_part("platform_single_axis", BENCH)

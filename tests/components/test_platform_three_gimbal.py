@@ -7,7 +7,7 @@ import pytest
 from gimbals import DEG, Three, base_rate, fly, platform_in_base
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 
 
 def stepped(inputs=None, h=1e-6, **parameters):

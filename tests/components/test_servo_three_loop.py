@@ -8,7 +8,7 @@ import pytest
 from wired import BENCH
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
 ServoThreeLoop = load_part("servo_three_loop", BENCH)

@@ -7,7 +7,7 @@ from scipy.signal import cont2discrete
 from wired import BENCH
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
 StabilizerLeadLag = load_part("stabilizer_lead_lag", BENCH)

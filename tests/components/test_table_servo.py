@@ -10,7 +10,7 @@ from servo_loop import ARCSEC, FAST, GCM, H, Loop, TableServo
 from wired import TableRate
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 
 
 def kinematic(**parameters):

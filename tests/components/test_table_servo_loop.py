@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from servo_loop import ARCSEC, FAST, FREE, GCM, SLOW, H, Loop
 
 from gyrobench.component import PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 
 
 def margins(loop):

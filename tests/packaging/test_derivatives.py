@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from toybench import PARTS, TOYS
 
-import gyrobench.math
+import gyrobench.component.math
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component, PartError
-from gyrobench.linearize import state_space
+from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 from gyrobench.packaging.reference import read_reference
 
@@ -64,7 +64,7 @@ _operators()
 
 
 def traced(name: str) -> Callable[..., Traced]:
-    plain = getattr(gyrobench.math, name)
+    plain = getattr(gyrobench.component.math, name)
     if name in ("where", "fabs", "minimum", "maximum", "clip"):
         return plain  # written with comparisons and arithmetic only
     if name in ("floor", "sign"):
@@ -80,7 +80,7 @@ def traced(name: str) -> Callable[..., Traced]:
 def trace(part: Component, monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, list[str]]:
     """d(state derivatives, outputs) / d(parameters, inputs, states), by CasADi at the part's present point."""
     module = sys.modules[type(part).__module__]
-    for name in gyrobench.math.FUNCTIONS:
+    for name in gyrobench.component.math.FUNCTIONS:
         if hasattr(module, name):
             monkeypatch.setattr(module, name, traced(name))
     real = [s for s in part.layout if s.section in ("parameter", "input", "state") and s.decl.type is float]

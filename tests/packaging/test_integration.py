@@ -13,7 +13,7 @@ import scipy.linalg
 from toybench import TOYS
 
 from gyrobench.component import PartError
-from gyrobench.numerics import phi1
+from gyrobench.component.numerics import phi1
 from gyrobench.packaging import load_part
 
 

@@ -14,8 +14,8 @@ import scipy.special
 import scipy.stats
 from toybench import TOYS
 
-from gyrobench.numerics import normal
-from gyrobench.packaging import compiler, load_part, native
+from gyrobench.component.numerics import normal
+from gyrobench.packaging import compiler, load_part, native_target
 
 N = 20000
 
@@ -24,7 +24,7 @@ N = 20000
 def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The normal numbers and the quantile of noise.h, called directly."""
     folder = tmp_path_factory.mktemp("noise")
-    for name, text in native.source_files(load_part("noisy", TOYS), "guid", 2).items():
+    for name, text in native_target.source_files(load_part("noisy", TOYS), "guid", 2).items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "ask.c").write_text(
         '#include "model.c"\n'

@@ -11,7 +11,7 @@ import pytest
 from toybench import HEAD, TOYS
 
 from gyrobench.component import Component, PartError
-from gyrobench.packaging import SubsetError, compiler, load_part, native
+from gyrobench.packaging import SubsetError, compiler, load_part, native_target
 from gyrobench.packaging.instance import make
 from gyrobench.packaging.source import Source, dependencies
 
@@ -57,7 +57,7 @@ REFUSED = {
     "for k in range(self.n):\n    self.y = 1.0": "index(expression)",
     'self.y = "a"': "equations are of numbers only",
     "self.y = True": "equations are of numbers only",
-    "self.y = math.sin(self.x)": "from gyrobench.math import sin",
+    "self.y = math.sin(self.x)": "from gyrobench.component.math import sin",
     "self.y = int(self.x)": "write floor",
     "self.y = abs(self.x)": "write fabs",
     "self.y = self.x % 2.0": "write x - y * floor(x / y)",
@@ -95,7 +95,7 @@ REFUSED = {
 def test_refused_with_file_line_and_what_to_write(written: Written, tmp_path: Path, body: str) -> None:
     cls = written("toy", DECLARED + textwrap.indent(body, " " * 8) + "\n")
     with pytest.raises(SubsetError) as e:
-        native.c_source(cls, "guid")
+        native_target.c_source(cls, "guid")
     assert REFUSED[body] in str(e.value)
     path, line = re.match(r"(.*):(\d+): ", str(e.value)).groups()
     assert path == str(tmp_path / "components/toy/model.py")
@@ -107,10 +107,10 @@ def test_methods_have_plain_arguments(written: Written) -> None:
         '    y = Output("1")\n    def rate(self, a, b=1.0):\n        return a\n    def outputs(self):\n        pass\n'
     )
     with pytest.raises(SubsetError, match="takes plain arguments without defaults"):
-        native.c_source(written("one", body), "guid")
+        native_target.c_source(written("one", body), "guid")
     body = '    y = Output("1")\n    def rate(self, a):\n        if a > 0.0:\n            return a\n'
     with pytest.raises(SubsetError, match="returns a number on every path"):
-        native.c_source(written("two", body), "guid")
+        native_target.c_source(written("two", body), "guid")
 
 
 def test_names_of_component_are_taken(written: Written) -> None:
@@ -179,7 +179,7 @@ def test_accepted_and_equal(written: Written, tmp_path: Path) -> None:
 
 def strict(cls: type[Component], folder: Path) -> None:
     for fmi in (2, 3):
-        for name, text in native.source_files(cls, "guid", fmi).items():
+        for name, text in native_target.source_files(cls, "guid", fmi).items():
             (folder / name).write_text(text, encoding="utf-8")
         platform = compiler.this_platform()
         compiler.compile_library(folder / f"fmi{fmi}.c", folder / "x.so", (folder,), platform, strict=True)

@@ -15,7 +15,7 @@ HEAD = """\
 from __future__ import annotations
 import math
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import *
+from gyrobench.component.math import *
 
 GAIN = 2.5
 class Toy(Component):

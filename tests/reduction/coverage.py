@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.reduction import correlated, noise
+from gyrobench.reduction.estimation import noise, noise_mixture_fit
 
 WINDOW = 119.67  # s: 5 degrees at ten times Earth rate
 
@@ -52,7 +52,7 @@ def coverage(turn: int, dwell: int, tau: float, share: float, runs: int, seed: i
     names, truth = drift.terms(9), np.linspace(-1.0, 1.0, 9)
     hits, scatter, claimed = np.zeros(9), np.zeros(9), np.zeros(9)
     for e in samples(t0, t1, tau, share, runs, seed):
-        found = correlated.fit(X, X @ truth + e, names, t0, t1)
+        found = noise_mixture_fit.fit(X, X @ truth + e, names, t0, t1)
         hits += np.abs(found.beta - truth) <= found.half_width
         scatter += (found.beta - truth) ** 2
         claimed += found.u**2

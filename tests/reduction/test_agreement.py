@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gyrobench.reduction import combinations
-from gyrobench.reduction.agreement import Value, agree, holm, normalized_error, outlier
-from gyrobench.reduction.checks import ReductionError
 from gyrobench.reduction.result import Coefficient, Result
-from gyrobench.reduction.suite import Member, compare, together
+from gyrobench.reduction.suite import estimable_combinations
+from gyrobench.reduction.suite.consistency import Value, agree, holm, normalized_error, outlier
+from gyrobench.reduction.suite.method_comparison import Member, compare, together
+from gyrobench.reduction.window_checks import ReductionError
 
 NORMAL = 1.959963984540054
 
@@ -195,7 +195,7 @@ def test_what_the_rank_does_not_give_is_not_compared() -> None:
     a = result({"D_F + D_II": (1.0, 0.1)}, made_of={"D_F + D_II": {"D_F": 1.0, "D_II": 0.5}})
     b = result({"D_F": (1.0, 0.1)})
     assert [len(c.values) for c in compare({"a": a, "b": b}, ())] == [1, 1]
-    assert combinations.weights(compare({"b": b}, ())[0].quantity, a) is None
+    assert estimable_combinations.weights(compare({"b": b}, ())[0].quantity, a) is None
 
 
 # ------------------------------------------------------------------------------------------ suite

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from gyrobench.reduction import estimation
+from gyrobench.reduction.loops import estimator_metrics
 
 T = 1e-3
 
@@ -22,23 +22,23 @@ def markov(rng, n, a):
 def test_independent_squares_of_a_markov_series():
     # 1 + 2 sum a^(2k) = (1 + a^2)/(1 - a^2): 9.53 for a = 0.9
     rng, n, a = np.random.default_rng(1), 20000, 0.9
-    found = np.mean([estimation.independent_squares(markov(rng, n, a)) for _ in range(20)])
+    found = np.mean([estimator_metrics.independent_squares(markov(rng, n, a)) for _ in range(20)])
     assert found == pytest.approx(n * (1 - a * a) / (1 + a * a), rel=0.1)
-    white = np.mean([estimation.independent_squares(rng.normal(size=n)) for _ in range(20)])
+    white = np.mean([estimator_metrics.independent_squares(rng.normal(size=n)) for _ in range(20)])
     assert white == pytest.approx(n, rel=0.05)
 
 
 @pytest.mark.parametrize("a", [0.0, 0.95])
 def test_interval_of_an_rms_holds_the_truth(a):
     rng = np.random.default_rng(2)
-    found = [estimation.rms(2.0 * markov(rng, 4000, a)).interval for _ in range(400)]
+    found = [estimator_metrics.rms(2.0 * markov(rng, 4000, a)).interval for _ in range(400)]
     covered = np.mean([low <= 2.0 <= high for low, high in found])
     assert abs(covered - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / 400) + 0.01
 
 
 def test_decibels():
     x = np.random.default_rng(3).normal(size=5000)
-    found = estimation.decibels(estimation.rms(x / 10.0), estimation.rms(x))
+    found = estimator_metrics.decibels(estimator_metrics.rms(x / 10.0), estimator_metrics.rms(x))
     assert found.value == pytest.approx(-20.0, abs=1e-12)
     # each rms is known to 1/sqrt(2 n) = 1 %: 8.686 dB times sqrt(2) percent
     assert found.u == pytest.approx(8.686 * 0.01 * math.sqrt(2.0), rel=0.05)
@@ -50,13 +50,13 @@ def test_interval_of_an_rms_with_a_sine_holds_the_truth(amplitude):
     rng, t = np.random.default_rng(13), np.arange(6000) * T
     wave = amplitude * np.sin(2.0 * math.pi * 5.0 * t + 0.4)
     true = math.sqrt(1.0 + amplitude**2 / 2.0)
-    found = [estimation.rms_of_sine(t, wave + markov(rng, t.size, 0.8), 5.0) for _ in range(400)]
+    found = [estimator_metrics.rms_of_sine(t, wave + markov(rng, t.size, 0.8), 5.0) for _ in range(400)]
     covered = np.mean([v.interval[0] <= true <= v.interval[1] for v in found])
     assert abs(covered - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / 400) + 0.01
     scatter = np.std([v.value for v in found])
     assert np.mean([v.u for v in found]) == pytest.approx(scatter, rel=0.2)
     if amplitude == 3.0:  # taken as noise, the sine would be known to a few periods only
-        assert estimation.rms(wave + markov(rng, t.size, 0.8)).u > 3.0 * scatter
+        assert estimator_metrics.rms(wave + markov(rng, t.size, 0.8)).u > 3.0 * scatter
 
 
 @pytest.mark.parametrize("true", [0.0, 3.0, 7.5, 20.25])
@@ -65,8 +65,8 @@ def test_delay(true):
     rng = np.random.default_rng(4)
     t = np.arange(20000) * T
     truth = signal.lfilter(*signal.butter(2, 0.02), rng.normal(size=t.size))
-    estimate = estimation.late(t, truth, true * T) + 0.02 * truth.std() * rng.normal(size=t.size)
-    found = estimation.delay(t, estimate, truth, 40 * T)
+    estimate = estimator_metrics.late(t, truth, true * T) + 0.02 * truth.std() * rng.normal(size=t.size)
+    found = estimator_metrics.delay(t, estimate, truth, 40 * T)
     assert found.value == pytest.approx(true * T, abs=4.0 * found.u + 1e-5)
     assert found.u < 0.2 * T
 
@@ -74,7 +74,7 @@ def test_delay(true):
 def test_delay_wants_a_long_record():
     t = np.arange(1000) * T
     with pytest.raises(ValueError, match=r"too short for a delay of up to 0\.1 s: 2 s are needed"):
-        estimation.delay(t, t, t, 0.1)
+        estimator_metrics.delay(t, t, t, 0.1)
 
 
 @pytest.mark.parametrize(("gain", "phase"), [(0.389, 0.0), (1.27, -0.3), (1.0, -2.8), (0.95, 0.05)])
@@ -84,7 +84,7 @@ def test_response_to_a_sine(gain, phase):
     w = 2.0 * math.pi * 1.5
     truth = 0.01 * np.sin(w * t + 0.7) + 0.002
     noise = rng.normal(size=t.size) * 1e-3
-    found = estimation.response_to_sine(t, gain * 0.01 * np.sin(w * t + 0.7 + phase) + noise, truth, 1.5)
+    found = estimator_metrics.response_to_sine(t, gain * 0.01 * np.sin(w * t + 0.7 + phase) + noise, truth, 1.5)
     assert found.phase is not None
     assert found.gain.value == pytest.approx(gain, abs=4.5 * found.gain.u)
     assert found.phase.value == pytest.approx(phase, abs=4.5 * found.phase.u)
@@ -98,7 +98,7 @@ def test_response_to_a_sine(gain, phase):
 def test_response_wants_ten_periods():
     t = np.arange(9000) * T
     with pytest.raises(ValueError, match="9 periods of 1 Hz are recorded: 10 are needed"):
-        estimation.response_to_sine(t, t, t, 1.0)
+        estimator_metrics.response_to_sine(t, t, t, 1.0)
 
 
 def test_response_to_a_random_truth():
@@ -106,7 +106,7 @@ def test_response_to_a_random_truth():
     rng = np.random.default_rng(7)
     truth = markov(rng, 20000, 0.5)
     noise = rng.normal(size=truth.size)
-    found = estimation.response_to_truth(0.5 * truth + noise + 3.0, truth)
+    found = estimator_metrics.response_to_truth(0.5 * truth + noise + 3.0, truth)
     assert found.gain.value == pytest.approx(0.5, abs=4.0 * found.gain.u)
     assert found.gain.u == pytest.approx(1.0 / math.sqrt(truth.size), rel=0.6)
     assert np.std(found.rest) == pytest.approx(1.0, rel=0.03)
@@ -120,8 +120,8 @@ def test_nees_of_correlated_errors_is_rarely_refused(a):
     found, naive = [], []
     for _ in range(runs):
         e = math.sqrt(P) * markov(rng, n, a)
-        found.append(estimation.nees(e, np.full(n, P), 0.95).holds)
-        naive.append(estimation.nis(e * e / P, 0.95).holds)
+        found.append(estimator_metrics.nees(e, np.full(n, P), 0.95).holds)
+        naive.append(estimator_metrics.nis(e * e / P, 0.95).holds)
     assert abs(np.mean(found) - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / runs) + 0.015
     if a > 0.5:
         assert np.mean(naive) < 0.5
@@ -129,14 +129,14 @@ def test_nees_of_correlated_errors_is_rarely_refused(a):
 
 def test_nees_sees_an_overconfident_filter():
     e = markov(np.random.default_rng(9), 20000, 0.9)
-    found = estimation.nees(e, np.full(e.size, 0.7))
+    found = estimator_metrics.nees(e, np.full(e.size, 0.7))
     assert not found.holds and found.p < 1e-3 and found.mean == pytest.approx(1.0 / 0.7, rel=0.1)
-    assert estimation.nees(e, np.ones(e.size)).holds
+    assert estimator_metrics.nees(e, np.ones(e.size)).holds
 
 
 def test_nis_bounds_are_those_of_chi_square():
     values = np.random.default_rng(10).normal(size=500) ** 2
-    found = estimation.nis(values, 0.95)
+    found = estimator_metrics.nis(values, 0.95)
     assert (found.low, found.high) == pytest.approx(stats.chi2.ppf([0.025, 0.975], 500) / 500, rel=1e-9)
     assert found.p == pytest.approx(2 * min(stats.chi2.cdf(values.sum(), 500), stats.chi2.sf(values.sum(), 500)))
 
@@ -145,7 +145,7 @@ def test_whiteness_is_the_ljung_box_of_statsmodels():
     diagnostic = pytest.importorskip("statsmodels.stats.diagnostic")
     x = markov(np.random.default_rng(11), 3000, 0.05)
     x -= x.mean()  # ours is about zero, theirs about the mean
-    _, q, p = estimation.whiteness(x, 20)
+    _, q, p = estimator_metrics.whiteness(x, 20)
     theirs = diagnostic.acorr_ljungbox(x, lags=[20])
     assert q == pytest.approx(float(theirs["lb_stat"].iloc[0]), rel=1e-9)
     assert p == pytest.approx(float(theirs["lb_pvalue"].iloc[0]), rel=1e-6)
@@ -153,5 +153,5 @@ def test_whiteness_is_the_ljung_box_of_statsmodels():
 
 def test_variance_ratio():
     R = 2.0 + 0.1 * np.random.default_rng(12).normal(size=5000)
-    found = estimation.variance_ratio(R, 2.0)
+    found = estimator_metrics.variance_ratio(R, 2.0)
     assert found.value == pytest.approx(1.0, abs=4 * found.u) and found.u < 0.003

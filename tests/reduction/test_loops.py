@@ -8,8 +8,8 @@ import types
 import numpy as np
 import pytest
 
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.reduction.loops import cross_axis, drift, gates, phasor, response, scatter, step
+from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, scatter, step
+from gyrobench.reduction.window_checks import ReductionError
 
 DT = 1e-3
 

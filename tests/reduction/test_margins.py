@@ -8,8 +8,8 @@ import control
 import numpy as np
 import pytest
 
-from gyrobench.reduction.loops import Point
-from gyrobench.reduction.margins import (
+from gyrobench.reduction.loops.loop_measures import Point
+from gyrobench.reduction.loops.margins import (
     between,
     deviation,
     excited,

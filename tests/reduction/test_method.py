@@ -10,12 +10,21 @@ import pytest
 from numpy.typing import NDArray
 
 from gyrobench import units
-from gyrobench.reduction import harmonic, recorded
-from gyrobench.reduction.checks import ReductionError, window_problems
-from gyrobench.reduction.merge import merge
-from gyrobench.reduction.method import Effect, Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import harmonic
+from gyrobench.reduction.drift.turns import Turns
+from gyrobench.reduction.estimation.fit_result import (
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    fit,
+    linear_result,
+    plus_minus,
+)
+from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.result import Result
-from gyrobench.reduction.turns import Turns
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
@@ -205,19 +214,19 @@ def test_turns() -> None:
 def test_what_a_run_says() -> None:
     meta = {"options": {"latitude": 0.8, "k": 0.0, "u_axis": 1e-4}, "plan": [{"phase": 2, "face": "up"}],
             "parameters": {"gyro.k": 3.0, "gyro.D_F": 1e-6, "site.gravity": 9.81}}  # fmt: skip
-    site = recorded.Site.of(meta)
+    site = run_metadata.Site.of(meta)
     assert (site.latitude, site.gravity) == (0.8, 9.81) and site.shown()["gravity / (m/s²)"] == 9.81
-    assert recorded.Site.of({"options": {"latitude": 0.8}}).gravity == pytest.approx(9.8067, abs=1e-3)
-    assert recorded.number(meta, "k", "gyro.k") == 3.0
-    assert recorded.truth_of(meta, ("D_F", "D_I")) == {"D_F": 1e-6} and recorded.truth_of({}, ("D_F",)) is None
-    assert recorded.sizes(meta, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
-    assert recorded.phases(meta, ("up", "down")) == {2: {"phase": 2, "face": "up"}}
+    assert run_metadata.Site.of({"options": {"latitude": 0.8}}).gravity == pytest.approx(9.8067, abs=1e-3)
+    assert run_metadata.number(meta, "k", "gyro.k") == 3.0
+    assert run_metadata.truth_of(meta, ("D_F", "D_I")) == {"D_F": 1e-6} and run_metadata.truth_of({}, ("D_F",)) is None
+    assert run_metadata.sizes(meta, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
+    assert run_metadata.phases(meta, ("up", "down")) == {2: {"phase": 2, "face": "up"}}
     with pytest.raises(ReductionError, match="mount up unknown; there are down"):
-        recorded.phases(meta, ("down",))
+        run_metadata.phases(meta, ("down",))
     with pytest.raises(ReductionError, match="scale factor unknown: the gyro has no parameter K; give the option K"):
-        recorded.number(meta, "K", "gyro.K", "scale factor")
+        run_metadata.number(meta, "K", "gyro.K", "scale factor")
     with pytest.raises(ReductionError, match="latitude"):
-        recorded.Site.of({})
+        run_metadata.Site.of({})
 
 
 def test_windows_of_two_channels() -> None:

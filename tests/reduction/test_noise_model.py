@@ -14,8 +14,8 @@ import pytest
 from scipy import stats
 
 from gyrobench import drift
-from gyrobench.reduction import correlated, noise
-from gyrobench.reduction.regression import RegressionError, generalized, least_squares
+from gyrobench.reduction.estimation import noise, noise_mixture_fit
+from gyrobench.reduction.estimation.regression import RegressionError, generalized, least_squares
 
 _spec = importlib.util.spec_from_file_location("coverage_of_tumble", Path(__file__).with_name("coverage.py"))
 assert _spec is not None and _spec.loader is not None
@@ -108,7 +108,7 @@ def test_population_by_hand() -> None:
 def test_ideal_data_come_back_exactly() -> None:
     t0, t1, X = mc.plan(72, 10)
     truth = np.linspace(-1, 1, 9) + 0.05
-    e = correlated.fit(X, X @ truth, drift.terms(9), t0, t1)
+    e = noise_mixture_fit.fit(X, X @ truth, drift.terms(9), t0, t1)
     np.testing.assert_allclose(e.beta, truth, rtol=1e-12)
     assert np.max(e.u) < 1e-13 and e.warnings == () and e.white == 1.0
 
@@ -117,7 +117,7 @@ def test_gain_reproduces_the_design_and_fits_like_generalized_least_squares() ->
     t0, t1, X = mc.plan(36, 5)
     y = next(mc.samples(t0, t1, 5.0, 1.0, 1, 2))
     names = drift.terms(9)
-    e = correlated.fit(X, y, names, t0, t1)
+    e = noise_mixture_fit.fit(X, y, names, t0, t1)
     np.testing.assert_allclose(e.gain @ X, np.eye(9), atol=1e-10)
     tau, share = e.best
     window = float(np.median(t1 - t0))
@@ -129,7 +129,7 @@ def test_gain_reproduces_the_design_and_fits_like_generalized_least_squares() ->
 def test_white_noise_gives_nearly_the_ordinary_answer() -> None:
     t0, t1, X = mc.plan(72, 10)
     y = X @ np.ones(9) + next(mc.samples(t0, t1, 0.0, 0.0, 1, 4))
-    e, o = correlated.fit(X, y, drift.terms(9), t0, t1), least_squares(X, y, drift.terms(9))
+    e, o = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1), least_squares(X, y, drift.terms(9))
     assert e.white > 0.5  # a quarter beforehand
     np.testing.assert_allclose(e.beta, o.beta, atol=0.1 * o.u.max())
     assert np.all((e.u / o.u > 0.9) & (e.u / o.u < 1.5))
@@ -139,7 +139,7 @@ def test_white_noise_gives_nearly_the_ordinary_answer() -> None:
 def test_parameters_of_the_noise_are_found() -> None:
     """Mean over records of the likeliest values; correlation time and rms are biased low, as every short record's."""
     t0, t1, X = mc.plan(72, 10)
-    found = [correlated.fit(X, y, drift.terms(9), t0, t1) for y in mc.samples(t0, t1, 3.0, 1.0, 40, 8)]
+    found = [noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1) for y in mc.samples(t0, t1, 3.0, 1.0, 40, 8)]
     tau = np.median([e.tau[0] for e in found]) / mc.WINDOW
     sigma = np.median([e.sigma[0] for e in found])
     assert 2.0 < tau < 4.5
@@ -152,22 +152,22 @@ def test_parameters_of_the_noise_are_found() -> None:
 def test_unbounded_correlation_time_is_said() -> None:
     t0, t1, X = mc.plan(36, 5)
     y = next(mc.samples(t0, t1, 500.0, 1.0, 1, 3))
-    e = correlated.fit(X, y, drift.terms(9), t0, t1)
+    e = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1)
     assert len(e.warnings) == 1 and "not bounded by this record" in e.warnings[0]
 
 
 def test_scale_and_shift_of_data_do_not_matter() -> None:
     t0, t1, X = mc.plan(36, 5)
     y = next(mc.samples(t0, t1, 3.0, 0.6, 1, 6))
-    a = correlated.fit(X, y, drift.terms(9), t0, t1)
-    b = correlated.fit(X, 1e-6 * y + X @ np.arange(9.0), drift.terms(9), t0 + 1e5, t1 + 1e5)
+    a = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1)
+    b = noise_mixture_fit.fit(X, 1e-6 * y + X @ np.arange(9.0), drift.terms(9), t0 + 1e5, t1 + 1e5)
     np.testing.assert_allclose(b.u, 1e-6 * a.u, rtol=1e-5)
     np.testing.assert_allclose(b.half_width, 1e-6 * a.half_width, rtol=1e-5)
 
 
 def test_degrees_of_freedom_say_the_same_as_the_coverage_factor() -> None:
     t0, t1, X = mc.plan(36, 5)
-    e = correlated.fit(X, next(mc.samples(t0, t1, 3.0, 1.0, 1, 7)), drift.terms(9), t0, t1)
+    e = noise_mixture_fit.fit(X, next(mc.samples(t0, t1, 3.0, 1.0, 1, 7)), drift.terms(9), t0, t1)
     for k, dof in zip(e.half_width / e.u, e.dof, strict=True):
         assert k == pytest.approx(1.959964 if math.isinf(dof) else stats.t.ppf(0.975, dof), rel=2e-3)
     assert np.all((e.p >= 0) & (e.p <= 1))
@@ -177,11 +177,11 @@ def test_refusals() -> None:
     t0, t1, X = mc.plan(36, 5)
     y, names = np.zeros(t0.size), drift.terms(9)
     with pytest.raises(RegressionError, match="finite positive length"):
-        correlated.fit(X, y, names, t0, t0)
+        noise_mixture_fit.fit(X, y, names, t0, t0)
     with pytest.raises(RegressionError, match="overlap or are out of order"):
-        correlated.fit(X, y, names, t0[::-1], t1[::-1])
+        noise_mixture_fit.fit(X, y, names, t0[::-1], t1[::-1])
     with pytest.raises(RegressionError, match="non-finite"):
-        correlated.fit(X, y + math.nan, names, t0, t1)
+        noise_mixture_fit.fit(X, y + math.nan, names, t0, t1)
 
 
 # ------------------------------------------------------------------------------------------ coverage
@@ -221,7 +221,9 @@ def test_intervals_cover_the_population(design: str, readings: bool) -> None:
     ratio = []
     for _ in range(runs):
         V = reading_covariance(t0, t1, *noise.draw(rng, t0, t1, readings))
-        e = correlated.fit(X, np.linalg.cholesky(V) @ rng.standard_normal(t0.size), names, t0, t1, readings=readings)
+        e = noise_mixture_fit.fit(
+            X, np.linalg.cholesky(V) @ rng.standard_normal(t0.size), names, t0, t1, readings=readings
+        )
         ratio.append(e.beta / e.half_width)
     counting.check(np.array(ratio))
 
@@ -230,7 +232,7 @@ def test_combinations_are_of_the_mixture() -> None:
     """Two candidates by hand: t of 1e9 degrees, sd 1 and 2 about 0.5 and -0.5, weights alike; of the sum of the two
     coefficients, which are independent, the means are +-1 and the sd sqrt2 and 2 sqrt2: variance (2 + 8)/2 + 1.
     """
-    m = correlated.Mixture(
+    m = noise_mixture_fit.Mixture(
         np.array([0.5, 0.5]), np.array([[0.5, 0.5], [-0.5, -0.5]]), np.array([np.eye(2), 4.0 * np.eye(2)]), 10**9
     )
     sd, half = m.spread(np.array([[1.0, 1.0], [1.0, 0.0]]))
@@ -288,7 +290,7 @@ def test_readings_are_told_from_white_rate_noise():
     n, T, s = 300, 100.0, 0.1
     t0 = T * np.arange(n)
     y = 5.0 + np.diff(rng.normal(0.0, s, n + 1)) / T
-    found = correlated.fit(np.ones((n, 1)), y, ("mean",), t0, t0 + T, readings=True)
+    found = noise_mixture_fit.fit(np.ones((n, 1)), y, ("mean",), t0, t0 + T, readings=True)
     assert found.reading > 0.9 and found.sigma_reading[0] == pytest.approx(s, rel=0.1)
     naive = np.std(y) / np.sqrt(n)
     assert found.u[0] < 0.4 * naive

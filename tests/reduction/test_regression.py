@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gyrobench import drift
-from gyrobench.reduction import regression as R
+from gyrobench.reduction.estimation import regression as R
 
 rng = np.random.default_rng(11)
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
-from gyrobench.reduction import attitude, harmonic, series, uncertainty
-from gyrobench.reduction.checks import window_problems
-from gyrobench.reduction.regression import RegressionError
+from gyrobench.reduction.drift import harmonic, window_regressors
+from gyrobench.reduction.estimation import residual_series, uncertainty
+from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.window_checks import window_problems
 
 rng = np.random.default_rng(3)
 
@@ -66,15 +67,15 @@ def test_averages_of_the_regressors_are_exact() -> None:
     c = math.cos(lat)
     a0, a1 = 0.3, 0.3 + math.radians(40)
     face = frames.MOUNTS[1][None]
-    turning = attitude.Turning(np.array([a0]), np.array([a1]), np.zeros(1), np.array([100.0]), face)
+    turning = window_regressors.Turning(np.array([a0]), np.array([a1]), np.zeros(1), np.array([100.0]), face)
     base = frames.polar_base(lat)
-    X = attitude.regressors(turning, base, frames.G0, drift.NAMES)[0]
+    X = window_regressors.regressors(turning, base, frames.G0, drift.NAMES)[0]
     w = a1 - a0
     assert X[0] == pytest.approx(1.0, rel=1e-15)
     assert X[1] == pytest.approx(c * (math.cos(a0) - math.cos(a1)) / w, rel=1e-13)
     assert X[4] == pytest.approx(c * c * (0.5 - (math.sin(2 * a1) - math.sin(2 * a0)) / (4 * w)), rel=1e-13)
     assert X[9] == pytest.approx(-c * c * (math.sin(a1) ** 2 - math.sin(a0) ** 2) / (2 * w), rel=1e-13)
-    rates = [attitude.axis_rate(turning, base, lat, 7e-5, k)[0] for k in range(3)]
+    rates = [window_regressors.axis_rate(turning, base, lat, 7e-5, k)[0] for k in range(3)]
     assert rates == pytest.approx([0.0, 7e-5 + w / 100, 0.0], abs=1e-18)
 
 
@@ -82,13 +83,13 @@ def test_averages_of_the_regressors_are_exact() -> None:
 def test_stretches_split_at_gaps_and_lengths() -> None:
     t0 = np.array([0.0, 1, 2, 4, 5, 7])
     t1 = np.array([1.0, 2, 3, 5, 7, 9])
-    parts = series.stretches(t0, t1, np.arange(6.0))
+    parts = residual_series.stretches(t0, t1, np.arange(6.0))
     assert [(w, x.tolist()) for w, x in parts] == [(1.0, [0, 1, 2]), (1.0, [3]), (2.0, [4, 5])]
 
 
 def test_autocorrelation_by_hand() -> None:
     """1, 2 | 3, 1: power 15, one pair in each stretch: (2 + 3)/15 times 4 values over 2 pairs."""
-    found = series.autocorrelation([np.array([1.0, 2.0]), np.array([3.0, 1.0])], 2)
+    found = residual_series.autocorrelation([np.array([1.0, 2.0]), np.array([3.0, 1.0])], 2)
     assert found["rho"] == pytest.approx([1.0, 5 / 15 * 4 / 2, 0.0])
     assert found["bound"][1] == pytest.approx(1.96 / math.sqrt(2), rel=1e-4)
 
@@ -97,25 +98,29 @@ def test_ljung_box_agrees_with_statsmodels() -> None:
     sm = pytest.importorskip("statsmodels.stats.diagnostic")
     x = rng.normal(size=200)
     x -= x.mean()
-    acf = series.autocorrelation([x], 10)
-    q, p = series.ljung_box(acf, 200, 10)
+    acf = residual_series.autocorrelation([x], 10)
+    q, p = residual_series.ljung_box(acf, 200, 10)
     table = sm.acorr_ljungbox(x, lags=[10])
     assert (q, p) == pytest.approx((table["lb_stat"].iloc[0], table["lb_pvalue"].iloc[0]))
 
 
 def test_runs_by_hand() -> None:
     """+ + + - - - : 2 runs of 4 expected, variance 1.2."""
-    z, p = series.runs_test(np.array([3.0, 4, 5, -3, -4, -5]))
+    z, p = residual_series.runs_test(np.array([3.0, 4, 5, -3, -4, -5]))
     assert z == pytest.approx((2 - 4) / math.sqrt(1.2)) and p == pytest.approx(0.0679, abs=1e-4)
-    assert series.runs_test(np.zeros(5)) == (0.0, 1.0)
+    assert residual_series.runs_test(np.zeros(5)) == (0.0, 1.0)
 
 
 def test_test_sizes_on_white_noise() -> None:
     hits = np.zeros(3)
     for _ in range(400):
         x = rng.normal(size=150)
-        acf = series.autocorrelation([x[:70], x[70:]], 20)
-        hits += [series.ljung_box(acf, 150, 20)[1] < 0.05, series.runs_test(x)[1] < 0.05, series.normality(x)[1] < 0.05]
+        acf = residual_series.autocorrelation([x[:70], x[70:]], 20)
+        hits += [
+            residual_series.ljung_box(acf, 150, 20)[1] < 0.05,
+            residual_series.runs_test(x)[1] < 0.05,
+            residual_series.normality(x)[1] < 0.05,
+        ]
     assert np.all(hits / 400 < 0.05 + 3.3 * math.sqrt(0.05 * 0.95 / 400) + 0.02)
 
 
@@ -124,20 +129,20 @@ def test_allan_of_white_noise() -> None:
     pool.
     """
     x = 2.0 * rng.normal(size=4000)
-    found = series.allan([(10.0, x[:1500]), (10.0, x[1500:]), (33.0, np.ones(9))])
+    found = residual_series.allan([(10.0, x[:1500]), (10.0, x[1500:]), (33.0, np.ones(9))])
     for tau, dev, lo, hi in zip(*(found[k] for k in ("tau", "dev", "lo", "hi")), strict=True):
         assert lo < dev < hi
         if tau < 1000:
             assert 0.8 * lo < 2.0 / math.sqrt(tau / 10) < 1.2 * hi
     assert found["slopes"][0]["slope"] == pytest.approx(-0.5, abs=0.1)
-    assert series.allan([(10.0, x[:5])]) == {}
+    assert residual_series.allan([(10.0, x[:5])]) == {}
 
 
 def test_allan_agrees_with_allantools() -> None:
     import allantools
 
     x = rng.normal(size=500)
-    found = series.allan([(2.0, x)])
+    found = residual_series.allan([(2.0, x)])
     _, dev, _, _ = allantools.oadev(x, rate=0.5, data_type="freq", taus=[2.0, 16.0])
     assert [found["dev"][0], found["dev"][3]] == pytest.approx(dev.tolist())
 
@@ -145,10 +150,10 @@ def test_allan_agrees_with_allantools() -> None:
 def test_spectrum_of_white_noise() -> None:
     """One-sided density of white means s over windows T: 2 s^2 T."""
     x = 3.0 * rng.normal(size=(40, 256))
-    found = series.spectrum([(5.0, row) for row in x])
+    found = residual_series.spectrum([(5.0, row) for row in x])
     assert np.mean(found["S"][2:-2]) == pytest.approx(2 * 9.0 * 5.0, rel=0.06)
     assert found["f"][-1] == pytest.approx(0.1)
-    assert series.spectrum([(5.0, x[0][:9])]) == {}
+    assert residual_series.spectrum([(5.0, x[0][:9])]) == {}
 
 
 # ------------------------------------------------------------------------------------------ uncertainty

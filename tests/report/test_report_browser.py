@@ -11,7 +11,7 @@ import subprocess
 import pytest
 from reading import Written
 
-from gyrobench.report.content import read_content
+from gyrobench.report.assets import read_content
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages are not looked at")

@@ -36,7 +36,7 @@ def test_what_differs_comes_first_and_only_that(compared):
 
 
 def test_long_lists_show_only_the_entry_that_differs():
-    from gyrobench.report.comparison import comparison
+    from gyrobench.report.comparison_page import comparison
 
     a, b = tumble(windows=12), tumble(windows=12)
     b.provenance["parameters"]["sequencer.target"] = [0.0] * 41 + [0.5] + [0.0] * 57

@@ -16,8 +16,8 @@ from simulated import tumble
 
 from gyrobench import report
 from gyrobench.reduction import result as result_module
-from gyrobench.report.content import read_content
-from gyrobench.report.document import document
+from gyrobench.report.assets import read_content
+from gyrobench.report.result_json import document
 
 NASTY = "<script>alert('x')</script> & #let x = 1 $a_b$ *bold* _under_ [c] \\ @ref `raw` //no comment -- \"quoted\""
 
@@ -333,7 +333,7 @@ def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
 
 def test_wiring_drawing_stands_alone():
     """The wiring drawing also stands alone, from the description of a system."""
-    from gyrobench.report.drawing import system
+    from gyrobench.report.diagrams import system
 
     description = {
         "wires": [{"wire": "a.x[1] -> b.y[1]", "connected": True}, {"wire": "b.z -> a.w", "connected": True}]

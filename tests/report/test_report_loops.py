@@ -14,13 +14,13 @@ from reading import Written
 
 from gyrobench import report
 from gyrobench.reduction.result import Coefficient, Response, Result
-from gyrobench.report.comparison import comparison
-from gyrobench.report.content import read_content
-from gyrobench.report.document import document
+from gyrobench.report.assets import read_content
+from gyrobench.report.comparison_page import comparison
 from gyrobench.report.responses import draw
+from gyrobench.report.result_json import document
+from gyrobench.report.result_page import _shown
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
-from gyrobench.report.view import _shown
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 
 PLAN = LoopPlan(

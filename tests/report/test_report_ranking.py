@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from simulated import tumble
 
-from gyrobench.report.comparison import comparison
+from gyrobench.report.comparison_page import comparison
 
 
 def runs(*values, ranked_by="D_F", u=0.001):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from gyrobench import frames
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
 from gyrobench.system.system import load_system
 
 NAME = "servo_two_axis"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
-from gyrobench.reduction import harmonic
+from gyrobench.reduction.drift import harmonic
 
 sys.path.insert(0, str(Path(__file__).parent))
 import tumble_2dof as T

@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 from gyrobench import drift, frames
-from gyrobench.reduction import noise, repeats
+from gyrobench.reduction.estimation import noise, repeatability
 from gyrobench.system.system import load_system
 
 system = load_system("eight_position")
@@ -239,17 +239,17 @@ TABLE = {
 def test_table_3_1() -> None:
     """[T3-1-MEAN, T3-1-SIGMA] All means but u_zy; sigma with n - 1 about the rounded mean of all but u_y and u_zy."""
     for name, (values, mean, sigma) in TABLE.items():
-        assert (abs(repeats.statistics(values).mean - mean) < 0.5) == (name != "uzy"), name
-        found = repeats.statistics(values, about=mean).sigma
+        assert (abs(repeatability.statistics(values).mean - mean) < 0.5) == (name != "uzy"), name
+        found = repeatability.statistics(values, about=mean).sigma
         assert (abs(found - sigma) < 0.06) == (name not in ("uy", "uzy")), name
 
 
 def test_e19() -> None:
     """[T3-1-ERR] u_zy: 11006 contradicts the mean, 11066 restores it; sigma of u_y, u_zy is not 5.2, 19.1."""
     values = [11066 if v == 11006 else v for v in TABLE["uzy"][0]]
-    assert repeats.statistics(values).mean == pytest.approx(11075, abs=0.5)
-    assert repeats.statistics(values).sigma == pytest.approx(20.5, abs=0.06)
-    assert repeats.statistics(TABLE["uy"][0]).sigma == pytest.approx(5.6, abs=0.05)
+    assert repeatability.statistics(values).mean == pytest.approx(11075, abs=0.5)
+    assert repeatability.statistics(values).sigma == pytest.approx(20.5, abs=0.06)
+    assert repeatability.statistics(TABLE["uy"][0]).sigma == pytest.approx(5.6, abs=0.05)
 
 
 def test_days_together() -> None:
@@ -262,7 +262,7 @@ def test_days_together() -> None:
         for c in "xy":
             w[f"mean_{c}"] = w[f"mean_{c}"] + rng.normal(size=48) * 0.003 * DPH / p[f"k_{c}"]
         each[f"{day + 1}"] = R.reduce(w, setup(phi))
-    result = repeats.together(each)
+    result = repeatability.together(each)
     c = named(result)["R_x"]
     values = [named(r)["R_x"].estimate for r in each.values()]
     assert c.estimate == pytest.approx(np.mean(values))
@@ -276,7 +276,7 @@ def test_days_together() -> None:
     assert table["rows"][5][2] == pytest.approx(np.std(values, ddof=1))
     json.dumps(result.as_dict(), allow_nan=False)
     with pytest.raises(R.ReductionError, match="at least two"):
-        repeats.together({"1": each["1"]})
+        repeatability.together({"1": each["1"]})
 
 
 # ------------------------------------------------------------------------------------------ uncertainty

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gyrobench import frames
-from gyrobench.reduction import composite
-from gyrobench.reduction.checks import ReductionError
+from gyrobench.reduction.drift import composite
+from gyrobench.reduction.window_checks import ReductionError
 
 DPH = math.pi / 180.0 / 3600.0
 W = frames.EARTH_RATE

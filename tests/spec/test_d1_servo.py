@@ -14,8 +14,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gyrobench import drift, frames
-from gyrobench.reduction import harmonic, recorded, servo
-from gyrobench.system.servo import ATTITUDES, LEVEL, attitude
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import harmonic, servo_regression
+from gyrobench.system.families.servo_stand import ATTITUDES, LEVEL, attitude
 from gyrobench.system.system import System, load_system
 
 DPH = math.pi / 180.0 / 3600.0
@@ -126,7 +127,7 @@ def test_our_sign_and_the_books(seed: int) -> None:
     """CROSS-MAP: omega_d of gyrobench.drift is -omega_M, coefficient by coefficient; E36 printed fails."""
     rng = np.random.default_rng(seed)
     p, gamma = random_gyro(rng), rng.uniform(-1.0, 1.0, 3)
-    ours = {name: sign * p[symbol] for name, (symbol, sign) in servo.BOOK.items() if symbol in p}
+    ours = {name: sign * p[symbol] for name, (symbol, sign) in servo_regression.BOOK.items() if symbol in p}
     assert float(drift.drift(gamma, ours)) == pytest.approx(-omega_m(p, gamma), rel=1e-12)
     X, Y, Z = gamma
     printed = p["R"] + p["U_x"] * X - p["U_z"] * Z + p["ΔK"] * X * Z + p["K_zx"] * X * X - p["K_xz"] * X * X
@@ -143,7 +144,7 @@ def test_our_sign_and_the_books(seed: int) -> None:
         "K_xy": "D_OS",
     }
     for symbol, name in signs.items():
-        assert servo.BOOK[name] == (symbol, 1 if symbol in ("U_x", "K_xz", "K_xy") else -1)
+        assert servo_regression.BOOK[name] == (symbol, 1 if symbol in ("U_x", "K_xz", "K_xy") else -1)
 
 
 # ------------------------------------------------------------------------------------------ 5.1 - 5.3
@@ -245,7 +246,7 @@ def test_polar_geometry(seed: int) -> None:
         truth = rate(p, mount, th, phi, g)
         np.testing.assert_allclose(m * W - constant + wide, truth, rtol=1e-12)
         axes = np.repeat(attitude(f"polar {mount}", phi)[None], th.size, axis=0)
-        seen = servo.Held(th, th, th, th + 1.0, axes).seen(np.array([0.0, 0.0, -g]))[:, 0, :]
+        seen = servo_regression.Held(th, th, th, th + 1.0, axes).seen(np.array([0.0, 0.0, -g]))[:, 0, :]
         np.testing.assert_allclose(seen.T, polar_gamma(mount, th, phi, g), atol=1e-12)
         if mount == "S":  # E39: U_x for U_z, K_xz for K_zx in the constant, cos for cos2
             bad = R + Ux * g * s + Kxz * (g * s) ** 2 - 0.5 * Kxz * g * g * c
@@ -293,7 +294,7 @@ def test_polar_separation(seed: int) -> None:
 
 
 def test_cosine_and_sine_names() -> None:
-    """E52: here A are sines and B cosines, the other way round than in gyrobench.reduction.harmonic."""
+    """E52: here A are sines and B cosines, the other way round than in gyrobench.reduction.drift.harmonic."""
     theta = np.linspace(0.0, 2 * math.pi, 37)
     r = 1.0 + 0.5 * np.sin(theta) + 0.25 * np.cos(2 * theta)
     fine = np.linspace(0.0, 2 * math.pi, 36 * 200 + 1)
@@ -312,7 +313,7 @@ def test_condition_with_two_dwells(degrees: float, condition: float) -> None:
     """SERVO-C3-SING: rank 8, N = 36 a mount and the two dwells."""
     phi = math.radians(degrees)
     windows, _ = REFUSALS.held(phi, ("x east, y up", "x east, y down", "polar S", "polar N"))
-    X = servo.design(windows, recorded.Site(phi, frames.G0), drift.terms(8))
+    X = servo_regression.design(windows, run_metadata.Site(phi, frames.G0), drift.terms(8))
     assert np.linalg.matrix_rank(X) == 8
     assert float(np.linalg.cond(X)) == pytest.approx(condition, rel=0.006)
 
@@ -338,7 +339,7 @@ def test_uncertainties_per_unit_noise() -> None:
     """36 points a mount and two dwells at 45.75 degrees: the spec's eight numbers."""
     phi = math.radians(45.75)
     windows, _ = REFUSALS.held(phi, ("x east, y up", "x east, y down", "polar S", "polar N"))
-    X = servo.design(windows, recorded.Site(phi, frames.G0), drift.terms(8))
+    X = servo_regression.design(windows, run_metadata.Site(phi, frames.G0), drift.terms(8))
     u = dict(zip(drift.terms(8), np.sqrt(np.diag(np.linalg.inv(X.T @ X))).tolist(), strict=True))
     expected = {
         "D_F": 0.707,
@@ -396,9 +397,9 @@ def test_reducer_from_ideal_input(seed: int) -> None:
 
 def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
     """Two dwells at angle 0 and a turn of 144 windows in each mount."""
-    from gyrobench.system.record import Record
+    from gyrobench.record.record import Record
 
-    site = recorded.Site(phi, g * frames.G0)
+    site = run_metadata.Site(phi, g * frames.G0)
     rows: list[list[float]] = []
     plan = []
     t = 0.0
@@ -407,8 +408,8 @@ def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
         n = 144 if name.startswith("polar") else 3
         ends = np.linspace(0.0, (2 if name == "polar S" else -2) * math.pi, n + 1) if n == 144 else np.zeros(n + 1)
         axes = np.repeat(attitude(name, phi)[None], n, axis=0)
-        w = servo.Held(ends[:-1], ends[1:], np.zeros(n), np.ones(n), axes)
-        omega_d = servo.design(w, site, tuple(true)) @ np.array(list(true.values()))
+        w = servo_regression.Held(ends[:-1], ends[1:], np.zeros(n), np.ones(n), axes)
+        omega_d = servo_regression.design(w, site, tuple(true)) @ np.array(list(true.values()))
         r = omega_d - W * (axes[:, 0] @ frames.pole(phi))
         length = np.diff(ends) / r if n == 144 else np.full(n, 1e-3)
         for j in range(n):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.system.measured import DataError
+from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import load_system
 
 system = load_system("torquer_scale_factor")

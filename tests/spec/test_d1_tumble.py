@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
-from gyrobench.reduction import harmonic
+from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.result import Result
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -81,7 +81,7 @@ def test_uncertainties_follow_the_formulas_of_the_spec() -> None:
 
     With one dwell window the statics carry sigma_s; least squares does not do worse than the closed formulas.
     """
-    from gyrobench.reduction.regression import least_squares
+    from gyrobench.reduction.estimation.regression import least_squares
 
     s = T.setup(gravity=frames.G0)
     phi = s.latitude
@@ -429,7 +429,7 @@ def test_model_errors_are_found() -> None:
 
 
 def test_correlated_noise_is_seen_and_said() -> None:
-    from gyrobench.reduction import noise
+    from gyrobench.reduction.estimation import noise
 
     def markov(t0: np.ndarray, t1: np.ndarray) -> np.ndarray:
         root = np.linalg.cholesky(noise.process_covariance(t0, t1, 360.0))
@@ -450,7 +450,7 @@ def test_correlated_noise_is_seen_and_said() -> None:
 
 def test_from_a_run() -> None:
     """The setup comes from run.json: options, plan, gyro parameters; an unfinished run says so."""
-    from gyrobench.system.record import Record
+    from gyrobench.record.record import Record
 
     system = T.system.with_values({"dwell": 600.0, "windows": 36})
     plan = system.plan().rows()

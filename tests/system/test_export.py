@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.system.container import export_container
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session, run
-from gyrobench.system.series import record_from_series
-from gyrobench.system.ssp import ExportError, export_ssp
-from gyrobench.system.ssp_read import read_ssp
+from gyrobench.engine.session import Session, run
+from gyrobench.exchange.container import export_container
+from gyrobench.exchange.external_record import record_from_series
+from gyrobench.exchange.ssp_export import ExportError, export_ssp
+from gyrobench.exchange.ssp_import import read_ssp
+from gyrobench.record.record import Record
 from gyrobench.system.system import RefusedError, System
 
 Make = Callable[[str], Path]

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.system.container import export_container
-from gyrobench.system.run import run
-from gyrobench.system.series import record_from_series
-from gyrobench.system.ssp import export_ssp
+from gyrobench.engine.session import run
+from gyrobench.exchange.container import export_container
+from gyrobench.exchange.external_record import record_from_series
+from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.system.system import System, load_system
 
 VALUES = {

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gyrobench.system.order import AlgebraicLoopError
-from gyrobench.system.record import Record
-from gyrobench.system.run import RunError, run
+from gyrobench.engine.session import RunError, run
+from gyrobench.record.record import Record
+from gyrobench.system.execution_order import AlgebraicLoopError
 from gyrobench.system.system import System
 
 Make = Callable[[str], Path]

@@ -9,9 +9,9 @@ import control
 import numpy as np
 import pytest
 
-from gyrobench.reduction.margins import model_response
-from gyrobench.system.linear import NotLinear, loops, poles, unstable
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.linear.linear_model import NotLinear, loops, poles, unstable
+from gyrobench.reduction.loops.margins import model_response
 
 NAME = "stabilizer_power_2dof"
 STILL = {f"gyro.{n}_{c}": 0.0 for n in ("turn_on", "markov", "white", "pickoff") for c in "xy"} | {
@@ -108,8 +108,8 @@ def test_poles_of_a_model() -> None:
 
 
 def test_a_break_that_is_no_wired_input() -> None:
+    from gyrobench.linear.linear_model import Linear, operating_point
     from gyrobench.packaging import load_part
-    from gyrobench.system.linear import Linear, operating_point
     from gyrobench.system.parameters import resolve
 
     with Session(NAME) as s:

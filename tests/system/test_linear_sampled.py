@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
+from gyrobench.linear.sampled_model import sampled_step
 from gyrobench.packaging import load_part
-from gyrobench.system.linear_sampled import sampled_step
 
 H = 1e-3
 

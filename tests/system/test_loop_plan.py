@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.motion_profile import read_profile
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.measured import DataError
-from gyrobench.system.profile import read_profile
 
 
 def test_parameters_of_the_exciter() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gyrobench.system.measured import DataError, read_measured
+from gyrobench.record.csv_reader import DataError, read_measured
 
 GOOD = """# latitude = 45.75deg
 # a remark

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from gyrobench.system.order import AlgebraicLoopError, Link, execution_order
+from gyrobench.system.execution_order import AlgebraicLoopError, Link, execution_order
 
 
 def link(text: str) -> Link:

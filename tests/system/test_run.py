@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from gyrobench.system.describe import describe
+from gyrobench.engine.session import RunError, RunInterrupted, Session, run
+from gyrobench.record.record import Record
 from gyrobench.system.parameters import slot_seed
-from gyrobench.system.record import Record
-from gyrobench.system.run import RunError, RunInterrupted, Session, run
 from gyrobench.system.system import RefusedError, Slot, System
+from gyrobench.system.system_description import describe
 from gyrobench.system.values import ValueProblem
 from gyrobench.system.wiring import WiringError
 
@@ -128,7 +128,7 @@ def test_windows_times_and_meta(small: System, tmp_path: Path) -> None:
 
 def test_csv_fallback_reads_back_bit_for_bit(small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     record = run(small, values=QUICK, seed=2)
-    monkeypatch.setattr("gyrobench.system.record._have_parquet", lambda: False)
+    monkeypatch.setattr("gyrobench.record.record._have_parquet", lambda: False)
     record.save(tmp_path)
     assert (tmp_path / "record.csv").exists()
     assert Record.load(tmp_path).same_data(record)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 
 Make = Callable[[str], Path]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from tumbling import NAME
 
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 
 
 @pytest.fixture(scope="session")
@@ -44,7 +44,7 @@ def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     """Runs a gyrobench command: exit code, stdout, stderr.  Anything but a proper exit fails the test."""
 
     def run(*words: object) -> tuple[int, str, str]:
-        from gyrobench.cli import main
+        from gyrobench.commands.cli import main
 
         monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
         capsys.readouterr()

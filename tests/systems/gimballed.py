@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from gyrobench.engine.session import Session
 from gyrobench.reduction.result import Result
-from gyrobench.system.flight import Leg
-from gyrobench.system.run import Session
+from gyrobench.system.flight_plan import Leg
 from gyrobench.system.system import load_system
 
 DEG = math.pi / 180.0

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import recorded, servo
-from gyrobench.system.servo import NOISES, attitude
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.drift import servo_regression
+from gyrobench.system.families.servo_stand import NOISES, attitude
 
 Array = NDArray[np.float64]
 DPH = math.pi / 180.0 / 3600.0  # 1 deg/h in rad/s
@@ -40,13 +41,13 @@ def latitude(rng: np.random.Generator) -> float:
     return float(math.radians(rng.uniform(12.0, 78.0)) * rng.choice([-1.0, 1.0]))
 
 
-def held(record: Any) -> tuple[servo.Held, Array]:
+def held(record: Any) -> tuple[servo_regression.Held, Array]:
     """Windows of the held phases and which rows of the record they are."""
     labels = {r["phase"]: r["label"] for r in record.meta["plan"] if r["mode"] == "servo"}
     w = record.windows
     rows = np.isin(w["phase"], list(labels))
     axes = np.array([attitude(labels[p], record.meta["options"]["latitude"]) for p in w["phase"][rows].tolist()])
-    return servo.Held(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
+    return servo_regression.Held(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
 
 
 def expected_rate(record: Any) -> Array:
@@ -57,9 +58,9 @@ def expected_rate(record: Any) -> Array:
     The gyro turns in the base that turns with the Earth; what the Earth gives along its output axis changes with theta.
     """
     windows, _ = held(record)
-    site, parameters = recorded.Site.of(record.meta), record.meta["parameters"]
+    site, parameters = run_metadata.Site.of(record.meta), record.meta["parameters"]
     true = np.array([parameters[f"gyro.{n}"] for n in NAMES])
-    omega_d = servo.design(windows, site, NAMES) @ true
+    omega_d = servo_regression.design(windows, site, NAMES) @ true
     earth = windows.axes @ frames.earth_rate_local(site.latitude, site.earth_rate)
     middle = (windows.angle_start + windows.angle_end) / 2.0
     along = np.cos(middle) * earth[:, 2] - np.sin(middle) * earth[:, 1]

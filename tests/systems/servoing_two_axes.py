@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import recorded
+from gyrobench.reduction import run_metadata
 from gyrobench.system.system import load_system
 
 Array = NDArray[np.float64]
@@ -47,9 +47,9 @@ def gyro(rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-def held(record: Any) -> tuple[Any, recorded.Site, Array]:
+def held(record: Any) -> tuple[Any, run_metadata.Site, Array]:
     """Windows of the held phases as the reduction sees them, the site, and which rows of the record they are."""
-    site = recorded.Site.of(record.meta)
+    site = run_metadata.Site.of(record.meta)
     mounts = {r["phase"]: int(r["label"].split()[1]) for r in record.meta["plan"] if r["mode"] == "servo"}
     rows = np.isin(record.windows["phase"], list(mounts))
     phase = record.windows["phase"][rows].astype(int)

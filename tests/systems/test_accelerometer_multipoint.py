@@ -15,8 +15,8 @@ from multipoint import KS, NAME, estimates, load, polynomial, quiet, windows
 from scipy.spatial.transform import Rotation
 
 from gyrobench.bench import Bench
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
 UG, ARCSEC = 1e-6, math.pi / 648000.0

@@ -18,9 +18,9 @@ import counting
 import numpy as np
 import pytest
 
-from gyrobench.reduction import noise
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
+from gyrobench.reduction.estimation import noise
 from gyrobench.system.system import load_system
 
 _spec = importlib.util.spec_from_file_location(

@@ -15,8 +15,8 @@ import tumbling
 import two_channels
 from servoing import DAY50, DPH, W50
 
-from gyrobench.reduction.suite import Member, compare, together
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.reduction.suite.method_comparison import Member, compare, together
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import RefusedError, load_system
 from gyrobench.system.values import ValueProblem

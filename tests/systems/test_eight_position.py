@@ -17,11 +17,11 @@ from scipy import stats
 
 from gyrobench import drift, frames
 from gyrobench.bench import Bench
+from gyrobench.engine.session import Session
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.multi_day_record import combine
+from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system.days import combine
-from gyrobench.system.measured import DataError
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session
 from gyrobench.system.system import RefusedError, System, load_system
 from gyrobench.system.values import ValueProblem
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.report.comparison import comparison
-from gyrobench.system.run import PartRefusal, Session, run
+from gyrobench.engine.session import PartRefusal, Session, run
+from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.report.comparison_page import comparison
 from gyrobench.system.system import RefusedError, load_system
 from gyrobench.system.values import ValueProblem
 

@@ -14,7 +14,7 @@ import pytest
 from servoing import DAY50
 from servoing_two_axes import day
 
-from gyrobench.system.run import run
+from gyrobench.engine.session import run
 from gyrobench.system.system import load_system
 
 ERU = 7.2921159e-5

@@ -16,11 +16,11 @@ from scipy import stats
 
 from gyrobench import drift, frames
 from gyrobench.bench import Bench
-from gyrobench.reduction import noise
-from gyrobench.reduction.axes import parse
+from gyrobench.engine.session import Session
+from gyrobench.record.csv_reader import DataError
+from gyrobench.reduction.drift.attitude_parser import parse
+from gyrobench.reduction.estimation import noise
 from gyrobench.reduction.result import Result
-from gyrobench.system.measured import DataError
-from gyrobench.system.run import Session
 from gyrobench.system.system import RefusedError, System, load_system
 from gyrobench.system.values import ValueProblem
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures
 
-from gyrobench.system.run import RunError, Session
+from gyrobench.engine.session import RunError, Session
 
 Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]

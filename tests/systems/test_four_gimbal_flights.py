@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures, session, table
 
+from gyrobench.engine.session import RunError, Session
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase
-from gyrobench.system.run import RunError, Session
 from gyrobench.system.system import RefusedError, load_system
 
 NAME = "platform_four_gimbal"

@@ -15,9 +15,9 @@ import pytest
 
 from gyrobench import drift, frames
 from gyrobench.bench import Bench
+from gyrobench.engine.session import Session
+from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.result import Result
-from gyrobench.system.measured import DataError
-from gyrobench.system.run import Session
 from gyrobench.system.system import RefusedError, System, load_system
 
 NAME = "open_loop_drift"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gyrobench.system.run import Session, run
+from gyrobench.engine.session import Session, run
 from gyrobench.system.system import load_system
 
 NAME = "platform_single_axis"

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from gyrobench.reduction import margins as m
-from gyrobench.system.linear import unstable
-from gyrobench.system.measured import DataError
-from gyrobench.system.run import RunError, Session, run
+from gyrobench.engine.session import RunError, Session, run
+from gyrobench.linear.linear_model import unstable
+from gyrobench.record.csv_reader import DataError
+from gyrobench.reduction.loops import margins as m
 from gyrobench.system.system import load_system
 from gyrobench.system.wiring import WiringError
 

@@ -13,8 +13,8 @@ import pytest
 from servoing import DPH, NAMES, QUIET
 
 from gyrobench import frames
+from gyrobench.engine.session import Session
 from gyrobench.reduction.result import Result
-from gyrobench.system.run import Session
 from gyrobench.system.system import load_system
 
 NAME = "servo_vertical_level"

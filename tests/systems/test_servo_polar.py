@@ -13,8 +13,8 @@ import pytest
 from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rate, gyro, held, latitude
 
 from gyrobench import frames
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.system.run import RunError, Session, run
+from gyrobench.engine.session import RunError, Session, run
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.system.system import RefusedError, load_system
 from gyrobench.system.values import ValueProblem
 

@@ -13,7 +13,7 @@ import pytest
 from servoing import DAY50, DPH, QUIET, W50
 
 from gyrobench import frames
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 from gyrobench.system.sockets import Connector, Socket
 from gyrobench.system.system import Slot, System, load_system
 

@@ -30,8 +30,8 @@ from servoing_two_axes import (
 )  # fmt: skip
 
 from gyrobench import drift, frames
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.system.run import RunError, Session, run
+from gyrobench.engine.session import RunError, Session, run
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.system.system import RefusedError, load_system
 from gyrobench.system.values import ValueProblem
 

@@ -12,8 +12,8 @@ import pytest
 from servoing import DPH, QUIET, errors, expected_rate, gyro, held, latitude
 
 from gyrobench import frames
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.system.system import RefusedError, load_system
 
 NAME = "servo_vertical_level"

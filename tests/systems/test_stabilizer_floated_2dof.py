@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gyrobench.reduction import margins
+from gyrobench.engine.session import Session
+from gyrobench.reduction.loops import margins
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
-from gyrobench.system.run import Session
 from gyrobench.system.system import RefusedError, System, load_system
 
 NAME = "stabilizer_floated_2dof"

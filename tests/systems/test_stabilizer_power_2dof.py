@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.system.linear import poles, unstable
+from gyrobench.engine.session import PartRefusal, RunError, Session
+from gyrobench.linear.linear_model import poles, unstable
+from gyrobench.record.csv_reader import DataError
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
-from gyrobench.system.measured import DataError
-from gyrobench.system.run import PartRefusal, RunError, Session
 from gyrobench.system.system import System, load_system
 
 NAME = "stabilizer_power_2dof"

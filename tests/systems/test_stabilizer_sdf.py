@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 from gyrobench.system.system import RefusedError, load_system
 
 NAME = "stabilizer_sdf"

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures, session, table
 
-from gyrobench.system.flight import Leg
-from gyrobench.system.linear import unstable
+from gyrobench.engine.session import RunError, Session
+from gyrobench.linear.linear_model import unstable
+from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase
-from gyrobench.system.run import RunError, Session
 from gyrobench.system.system import RefusedError, load_system
 
 NAME = "platform_three_gimbal"
@@ -166,7 +166,7 @@ def test_without_the_resolver_up_to_the_phase_margin(integral: float) -> None:
 
 
 def phase_margin(model: dict[str, Any]) -> float:
-    from gyrobench.reduction.margins import grid, margins, model_response
+    from gyrobench.reduction.loops.margins import grid, margins, model_response
 
     f = grid(0.1, 100.0)
     found = margins(f, model_response(model, f)[:, 0, 0])

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from gyrobench.bench import Bench
-from gyrobench.reduction.checks import ReductionError
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]

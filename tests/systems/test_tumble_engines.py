@@ -12,9 +12,9 @@ import pytest
 from tumbling import DPH, NAME, SHORT, drift_in, gyro, load, quiet
 
 from gyrobench import frames
-from gyrobench.system.engine import initialize, start
+from gyrobench.engine.reference_engine import initialize, start
+from gyrobench.engine.session import Session, run
 from gyrobench.system.parameters import resolve
-from gyrobench.system.run import Session, run
 from gyrobench.system.wiring import parse_wires
 
 Command = Callable[..., tuple[int, str, str]]

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from tumbling import NAME, SHORT, load
 
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
 

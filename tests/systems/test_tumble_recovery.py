@@ -11,8 +11,8 @@ import pytest
 from tumbling import DPH, NAMES, RATE, SHORT, drift_in, errors, gyro, lag, latitude, load, quiet
 
 from gyrobench import frames
+from gyrobench.engine.session import Session
 from gyrobench.reduction.result import Result
-from gyrobench.system.run import Session
 
 LIMIT = 1e-6  # deg/h per g^n
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tumbling import DPH, NAME, NAMES, SHORT, gyro, lag, load, quiet
 
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]

@@ -9,7 +9,7 @@ import pytest
 from tumbling import DPH, NAMES, RATE, SHORT, load, quiet
 
 from gyrobench import frames
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 
 W = frames.EARTH_RATE / DPH  # 15.041 deg/h
 PHI = math.radians(45.75)

@@ -12,8 +12,8 @@ import pytest
 from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet
 
 from gyrobench import frames
+from gyrobench.engine.session import Session
 from gyrobench.reduction.result import Result
-from gyrobench.system.run import Session
 from gyrobench.system.sockets import Connector, Socket
 from gyrobench.system.system import Slot, System
 

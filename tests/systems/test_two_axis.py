@@ -14,8 +14,8 @@ import pytest
 
 from gyrobench import drift
 from gyrobench.bench import Bench
+from gyrobench.engine.session import Session, run
 from gyrobench.reduction.result import Result
-from gyrobench.system.run import Session, run
 from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]

@@ -13,8 +13,8 @@ import pytest
 from two_channels import NAME, SHORT, load
 
 from gyrobench.bench import Bench
-from gyrobench.system.record import Record
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from two_channels import DPH, LOOP, NAME, NAMES, RATE, SHORT, gyro, latitude, load, quasi_static, quiet
 
+from gyrobench.engine.session import Session, run
 from gyrobench.reduction.result import Result
-from gyrobench.system.run import Session, run
 
 LIMIT = 1e-6  # deg/h per g^n
 

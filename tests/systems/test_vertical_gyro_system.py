@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyrobench.system.run import PartRefusal, RunError, Session
+from gyrobench.engine.session import PartRefusal, RunError, Session
 from gyrobench.system.system import RefusedError, load_system
 
 NAME = "vertical_gyro"

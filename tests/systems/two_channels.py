@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.system.record import Record
+from gyrobench.record.record import Record
 from gyrobench.system.system import System, load_system
 
 NAME = "tumble_two_channel"

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.math import atan2, clip, cos, exp, fabs, index, sin, sqrt, tanh
+from gyrobench.component.math import atan2, clip, cos, exp, fabs, index, sin, sqrt, tanh
 
 GAIN = 2.5
 

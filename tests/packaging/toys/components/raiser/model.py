@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.math import index, log
+from gyrobench.component.math import index, log
 
 
 class Raiser(Component):

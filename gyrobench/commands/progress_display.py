@@ -1,0 +1,74 @@
+"""How far a run is: on a terminal one line that moves, elsewhere a line from time to time.  Always on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Any
+
+QUIET = 1.0  # s without a word, so that short runs stay silent
+PAUSE = 10.0  # s between two lines where there is no terminal
+
+
+def span(seconds: float) -> str:
+    """``75`` -> "1 min 15 s"."""
+    if not seconds < 1e6:
+        return "unknown"
+    whole = round(seconds)
+    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+
+
+def words(status: Any) -> str:
+    """Simulated time, rate and time left of a :class:`gyrobench.engine.run_driver.Status`."""
+    rate = status.steps / max(status.elapsed, 1e-9)
+    speed = f"{rate / 1e6:.2f} M steps/s" if rate >= 1e5 else f"{rate:,.0f} steps/s"
+    if status.time >= status.total:  # the ways between the phases of a plan are not known beforehand
+        return f"t = {status.time:,.0f} s, {speed}, soon done"
+    return f"t = {status.time:,.0f} of {status.total:,.0f} s, {speed}, {span(status.eta)} left"
+
+
+class Meter:
+    """The ``progress`` of a run; a context manager."""
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+        self.bar: Any = None
+        self.task: Any = None
+        self.last = time.monotonic()
+
+    def __enter__(self) -> Meter:
+        return self
+
+    def __call__(self, status: Any) -> None:
+        if sys.stderr.isatty():
+            if self.bar is None and status.elapsed >= QUIET:
+                self._open()
+            if self.bar is not None:
+                self.bar.update(self.task, completed=status.fraction, words=words(status))
+        elif time.monotonic() - self.last >= PAUSE:
+            self.last = time.monotonic()
+            print(f"{self.label}: {100.0 * status.fraction:.0f} %, {words(status)}", file=sys.stderr, flush=True)
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(24),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[words]}"),
+        )
+        self.bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self.task = self.bar.add_task(self.label, total=1.0, words="")
+        self.bar.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.bar is not None:
+            self.bar.stop()

@@ -1,0 +1,113 @@
+"""What exists already: a laboratory's records, and the records of runs, reduced (again)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.commands import console
+from gyrobench.commands.run_folders import claim
+from gyrobench.commands.run_system import (
+    Done,
+    WorkError,
+    limits_of,
+    load,
+    ours,
+    publish,
+    reduced,
+    show_paths,
+    specification,
+)
+from gyrobench.record.record import Record, RecordError
+from gyrobench.reduction.result import Result
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+
+
+def measuring(name: str) -> Any:
+    system = load(name)
+    if isinstance(system, Suite):
+        raise UsageError(f"{name} compares runs: reduce each record by its own test, then give it their folders")
+    if not hasattr(system, "measured"):
+        known = [other for other in Bench.find().systems() if hasattr(load(other), "measured")]
+        raise UsageError(f"{system.name} has no reduction of measured data; there is one for {', '.join(known)}")
+    return system
+
+
+def template(name: str) -> str:
+    """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
+    from gyrobench.system.lab_record import explained
+
+    return explained(str(measuring(name).template()))
+
+
+def reduce(
+    name: str,
+    data: Sequence[Path],
+    values: Mapping[str, str],
+    spec: str | None,
+    out: Path | None,
+    force: bool = False,
+    as_json: bool = False,
+) -> str:
+    """A laboratory's CSV to a report, or runs to that of a suite; returns the verdict."""
+    if isinstance(load(name), Suite):
+        from gyrobench.commands import run_suite
+
+        return run_suite.reduce(load(name, values), data, spec, out, force, as_json)
+    system = measuring(name)
+    if len(data) > 1:
+        raise UsageError(f"{name} reduces one record at a time; --data was given {len(data)} times")
+    file = specification(spec)
+    limits = limits_of(file)
+    one = data[0]
+    text = one.read_bytes()
+    record = system.measured(one, values)
+    record.meta["data"] = {"file": one.name, "sha256": hashlib.sha256(text).hexdigest()}
+    result: Result = system.reduce(record, limits)
+    result.provenance = dict(record.meta)
+    identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
+    folder = out or Bench.find().out / name / f"measured-{identity}"
+    claim(folder, {"system": name, "data": {"file": one.name}}, force)
+    record.save(folder)
+    show_paths(publish(result, folder, record, file), None if as_json else console.answer(result))
+    return result.verdict
+
+
+def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
+    """Reduces a saved record again and writes its report, or that of a suite; returns the verdict.
+
+    Raises RecordError when the folder is no run, and WorkError naming what an incomplete record lacks.
+    """
+    if not (folder / "run.json").is_file():
+        raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
+    system = load(str(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("system")))
+    if isinstance(system, Suite):
+        from gyrobench.commands import run_suite
+
+        return run_suite.report(folder, system, spec, as_json)
+    done = again(folder, system, specification(spec))
+    assert done.result is not None
+    show_paths(done.paths, None if as_json else console.answer(done.result))
+    return done.result.verdict
+
+
+def again(folder: Path, system: System, spec: Path | None) -> Done:
+    """Record in ``folder``, of a run of ``system``, reduced and reported again."""
+    record = Record.load(folder)
+    try:
+        result = reduced(system, record, limits_of(spec))
+    except Exception as error:
+        if not ours(error) or record.complete:
+            raise
+        raise WorkError(
+            f"{folder}: the record is not complete, so there is no report\n{console.lacking(record)}"
+        ) from None
+    old = folder / "result.json"
+    if old.exists():  # the step check is a run of its own and is kept
+        result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
+    return Done(folder, record, result, publish(result, folder, record, spec))

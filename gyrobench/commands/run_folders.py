@@ -1,0 +1,131 @@
+"""Folders of runs: named by what is run; nobody's run is overwritten by another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.engine import checkpoint
+from gyrobench.record.record import Record
+from gyrobench.system.system import System
+
+RECORD = ("run.json", "record.parquet", "record.csv", "channels.parquet", "channels.csv", checkpoint.FILE)
+REPORT = ("result.json", "report.html", "report.pdf")
+
+
+def run_folder(
+    session: Any,
+    system: System,
+    seed: int,
+    step: float,
+    maps: Mapping[str, Path],
+    out: Path | None,
+    force: bool,
+    resume: bool = False,
+) -> tuple[Path, checkpoint.Keeper]:
+    """Where the run is saved: --out, else a folder named by what is run; and the keeper of its checkpoint.
+
+    With ``resume`` the keeper goes on from the checkpoint in that folder or in the one :func:`beside` it; whether that
+    is one of this run the keeper checks.  Raises UsageError when there is none to resume, and when --out holds another
+    run, unless ``force``, or files that are none of a run.
+    """
+    from gyrobench.system.parameters import resolve
+
+    _, parameters, _ = resolve(session.assembly, system, seed, session.base)
+    identity = {
+        "system": system.name,
+        "parts": {slot: {"sha256": digest} for slot, digest in sorted(session.hashes.items())},
+        "parameters": parameters,
+        "options": dict(system.values),
+        "seed": seed,
+        "step": step,
+    }
+    identity = json.loads(json.dumps(identity))
+    texts = {slot: file.read_text(encoding="utf-8") for slot, file in maps.items()}
+    text = json.dumps([identity, texts, session.engine], sort_keys=True)
+    folder = out or Bench.find().out / system.name / hashlib.sha256(text.encode()).hexdigest()[:8]
+    kept = [f for f in (folder, beside(folder)) if (f / checkpoint.FILE).is_file()]
+    if not resume:
+        claim(folder, identity, force)
+    elif not kept:
+        state = "the run is complete" if whole_record(folder) else "no checkpoint of a run with these parts and values"
+        raise UsageError(
+            "--resume: " + (checkpoint.obstacle(session.slaves) or f"nothing to continue in {folder}: {state}")
+        )
+    elif folder not in kept:
+        claim(folder, identity, force)
+    return folder, checkpoint.Keeper(unfinished(folder), resume, kept[0] if kept else None)
+
+
+def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
+    """Makes a folder for a run; one that holds the same run may be written again.  Raises UsageError."""
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"--out {folder}: is a file; name a folder")
+    old = None
+    if (folder / "run.json").is_file():
+        try:
+            old = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        except ValueError:
+            old = {}
+    elif (folder / checkpoint.FILE).is_file():  # of a process that was killed
+        try:
+            old = checkpoint.about(folder)
+        except checkpoint.ResumeError:
+            old = {}
+    elif folder.is_dir() and any(not p.name.startswith(checkpoint.FILE) for p in folder.iterdir()):
+        raise UsageError(f"--out {folder}: holds other files; name a new folder, for example {folder / 'run1'}")
+    if old is not None:
+        changed = [k for k, v in identity.items() if not _covers(old.get(k), v)]
+        if changed and not force:
+            raise UsageError(
+                f"--out {folder}: holds another run (its {', '.join(changed)} differ); name another folder, "
+                "or --force to replace it"
+            )
+        for name in (*RECORD, *REPORT) if changed else ():
+            (folder / name).unlink(missing_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _covers(old: Any, new: Any) -> bool:
+    """Whether all that ``new`` says stands in ``old`` too."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        return all(_covers(old.get(k), v) for k, v in new.items())
+    return bool(old == new)
+
+
+def keep(record: Record, folder: Path) -> Path:
+    """Saves what a run left when it stopped, beside a whole record of the same run rather than over it."""
+    return record.save(unfinished(folder))
+
+
+def whole_record(folder: Path) -> bool:
+    """Whether a complete record is there."""
+    try:
+        return bool(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("complete", True))
+    except (OSError, ValueError):
+        return False
+
+
+def beside(folder: Path) -> Path:
+    """Where a run that stopped is kept when the folder holds a whole record."""
+    return folder.with_name(folder.name + "-incomplete")
+
+
+def unfinished(folder: Path) -> Path:
+    """Where a run that has not ended is kept: its folder, unless that holds a whole record."""
+    return beside(folder) if whole_record(folder) else folder
+
+
+def labels(runs: Iterable[Path]) -> list[str]:
+    """Short names of folders, all different.  Raises UsageError for a folder given twice."""
+    folders = [f.resolve() for f in runs]
+    for f in folders:
+        if folders.count(f) > 1:
+            raise UsageError(f"{f}: given twice")
+    names = [f.name for f in folders]
+    return [f.name if names.count(f.name) == 1 else str(Path(f.parent.name, f.name)) for f in folders]

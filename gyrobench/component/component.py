@@ -1,0 +1,396 @@
+"""What a component (a part of the bench) is.
+
+A part is one class of declarations and equations.  The class is the single source of the plain Python
+part, the Python FMU, the native FMU (its equations translated to C), the model description and the
+linearization.  This module with ``declare``, ``numerics`` and ``math`` is all that a part needs to run: a
+Python FMU carries copies of these four files and nothing else of gyrobench.
+
+Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut into
+``n = ceil(H / step)`` equal internal steps ``h = H / n`` with the inputs held.  In each one
+
+1.  the noise of this internal step is drawn (counter-based: it depends on ``seed``, the port and the
+    count of internal steps, on nothing else);
+2.  the states advance, by the exponential Euler step ``x+ = x + h phi1(h A) f(x)`` with
+    ``A = df/dx`` (exact when f is linear in x) or by RK4 with declared substeps;
+3.  the ``@sampled`` methods whose turn it is run, with ``self.t`` at the end of the internal step.
+
+After the last one ``outputs`` is evaluated and all is checked to be finite but large discrete arrays (memories).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+from gyrobench.component.declarations import (
+    Declaration,
+    Discrete,
+    Input,
+    Noise,
+    Output,
+    Parameter,
+    Scalar,
+    State,
+    floats,
+    full,
+    make_layout,
+    shape_of,
+)
+from gyrobench.component.math import Dual, lift
+from gyrobench.component.numerics import normal, phi1
+
+__all__ = [
+    "Component",
+    "Declaration",
+    "Discrete",
+    "Input",
+    "Noise",
+    "Output",
+    "Parameter",
+    "PartError",
+    "Scalar",
+    "State",
+    "sampled",
+]
+
+
+class PartError(Exception):
+    """A part refuses its parameters, its inputs, or what became of its states."""
+
+
+def sampled(every: int = 1) -> Callable[[Callable[[Any], None]], Callable[[Any], None]]:
+    """Marks a method that runs after each ``every``-th internal step."""
+
+    def mark(method: Callable[[Any], None]) -> Callable[[Any], None]:
+        method._every = every  # type: ignore[attr-defined]
+        return method
+
+    return mark
+
+
+class Component:
+    """Base of every part: collects the declarations and steps the equations (see the module's text)."""
+
+    version: ClassVar[str] = "1.0.0"
+    integrator: ClassVar[str] = "exponential"  # or "rk4"
+    rk4_substeps: ClassVar[int] = 20  # of one internal step
+    nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
+    declarations: ClassVar[dict[str, Declaration]] = {}
+    layout: ClassVar[list[Scalar]] = []
+    states: ClassVar[list[Scalar]] = []
+    noises: ClassVar[list[Noise]] = []
+    ticks: ClassVar[list[tuple[str, int]]] = []
+
+    t = 0.0
+    h = 0.0
+
+    def __init_subclass__(cls) -> None:
+        found = {n: d for n, d in vars(cls).items() if isinstance(d, Declaration)}
+        if any(isinstance(d, Noise) for d in found.values()):
+            found["seed"] = Parameter(1, int, "seed of the noise of this instance", min=0)
+        methods = {n: m for n, m in vars(cls).items() if hasattr(m, "_every")}
+        if "step" not in found and (methods or any(isinstance(d, State) for d in found.values())):
+            found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
+        for n, d in found.items():
+            if hasattr(Component, n) or n in ("der", "noise", "instance"):
+                raise PartError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
+            d.name = n
+        cls.declarations = found
+        cls.layout = make_layout(found)
+        cls.states = [s for s in cls.layout if s.section == "state"]
+        cls.noises = [d for d in found.values() if isinstance(d, Noise)]
+        cls.ticks = [(n, m._every) for n, m in methods.items()]
+        cls._by_name = {s.name: s for s in cls.layout}
+        cls._watched = [s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory]
+
+    _by_name: ClassVar[dict[str, Scalar]] = {}
+    _watched: ClassVar[list[Scalar]] = []  # must be finite after each step
+
+    def __init__(self, name: str = "", **parameters: Any) -> None:
+        self.instance = name or type(self).__name__
+        self.reset()
+        for key, x in parameters.items():
+            if not isinstance(self.declarations.get(key), Parameter):
+                known = ", ".join(n for n, d in self.declarations.items() if isinstance(d, Parameter))
+                raise PartError(f"{self.instance}: no parameter {key!r}; it has {known}")
+            if shape_of(x) != self.declarations[key].shape:
+                raise PartError(f"{self.instance}: {key} has shape {self.declarations[key].shape}")
+            setattr(self, key, floats(x))
+
+    # ------------------------------------------------------------------ equations of a part
+    def start(self) -> None:
+        """Once, when initialization ends: derived values, and refusals."""
+
+    def flow(self) -> None:
+        """``self.der.<state>`` from states, discretes, parameters, inputs, noise."""
+
+    def outputs(self) -> None:
+        """Outputs, at the present instant."""
+
+    def refuse(self, condition: Any, message: str) -> None:
+        """Ends the run with ``message`` if the condition holds; ``{H}`` in it prints self.H with %g."""
+        if condition:
+            values = {s.name: f"{self._at(s):g}" for s in self.layout if len(s.path) == 1}
+            raise PartError(f"{self.instance}: {message.format(**values)} (t = {self.t:.9g} s)")
+
+    # ------------------------------------------------------------------ values
+    def _at(self, s: Scalar) -> float:
+        x: Any = self
+        for key in s.path:
+            x = getattr(x, key) if isinstance(key, str) else x[key]
+        return float(x)
+
+    def _put(self, s: Scalar, x: float) -> None:
+        box: Any = self
+        for key in s.path[:-1]:
+            box = getattr(box, key) if isinstance(key, str) else box[key]
+        last = s.path[-1]
+        if isinstance(last, str):
+            setattr(box, last, float(x))
+        else:
+            box[last] = float(x)
+        self._dirty = True
+
+    def set(self, name: str, x: float) -> None:
+        """Sets a scalar by its FMI name, SI."""
+        self._put(self._find(name), x)
+
+    def get(self, name: str) -> float:
+        """A scalar by its FMI name; outputs follow the present inputs."""
+        s = self._find(name)
+        if s.section == "output":
+            self._refresh()
+        return self._at(s)
+
+    def read(self, references: Iterable[int]) -> list[float]:
+        """Values by value reference, as an FMU's get calls want them."""
+        found = [self._referenced(r) for r in references]
+        if any(s.section == "output" for s in found):
+            self._refresh()
+        return [self._at(s) for s in found]
+
+    def write(self, references: Iterable[int], values: Iterable[float]) -> None:
+        """Sets values by value reference.  A parameter is fixed once initialization has ended."""
+        for r, x in zip(references, values, strict=True):
+            s = self._referenced(r)
+            if self._running and s.section == "parameter":
+                raise PartError(
+                    f"{self.instance}: parameter {s.name} is fixed once initialization has ended: reset first"
+                )
+            self._put(s, x)
+
+    def _referenced(self, reference: int) -> Scalar:
+        if not 0 <= reference < len(self.layout):
+            raise PartError(f"{self.instance}: no variable has the value reference {reference}")
+        return self.layout[reference]
+
+    def _find(self, name: str) -> Scalar:
+        s = self._by_name.get(name)
+        if s is None:
+            raise PartError(f"{self.instance}: no variable {name!r}; it has {', '.join(self._by_name)}")
+        return s
+
+    def reset(self) -> None:
+        """Back to before initialization, every value at its start."""
+        self.der = SimpleNamespace()
+        self.noise = SimpleNamespace(**{n.name: 0.0 for n in self.noises})
+        for d in self.declarations.values():
+            setattr(self, d.name, floats(d.start))
+            if isinstance(d, State):
+                setattr(self.der, d.name, floats(full(0.0, d.shape)))
+        self.t = self.h = 0.0
+        self._tick = 0
+        self._running = False
+        self._dirty = True
+        self._phi: list[list[float]] = []
+        self._phi_h = 0.0
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that decides the future, as plain numbers (exact through JSON)."""
+        return {
+            "part": f"{type(self).__name__} {self.version}",
+            "v": [self._at(s) for s in self.layout],
+            "noise": [getattr(self.noise, n.name) for n in self.noises],
+            "t": self.t,
+            "h": self.h,
+            "tick": self._tick,
+            "running": self._running,
+            "dirty": self._dirty,
+            "phi": [list(r) for r in self._phi],
+            "phi_h": self._phi_h,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        if state["part"] != f"{type(self).__name__} {self.version}":
+            raise PartError(f"{self.instance}: a state of {state['part']} is not one of this part")
+        for s, x in zip(self.layout, state["v"], strict=True):
+            self._put(s, x)
+        for n, x in zip(self.noises, state["noise"], strict=True):
+            setattr(self.noise, n.name, x)
+        self.t, self.h, self._tick = state["t"], state["h"], state["tick"]
+        self._running, self._dirty = state["running"], state["dirty"]
+        self._phi, self._phi_h = [list(r) for r in state["phi"]], state["phi_h"]
+
+    # ------------------------------------------------------------------ running
+    def initialize(self, t0: float = 0.0) -> None:
+        """Checks parameters and inputs, runs ``start`` and ``outputs``.  Raises PartError."""
+        self.t = t0
+        for s in self.layout:
+            if s.section in ("parameter", "input", "state"):
+                x = self._at(s)
+                wrong = s.decl.bound_broken(x)
+                if wrong:
+                    raise PartError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
+        self._evaluate_start()
+        self._finite()
+        self._running = True
+
+    def _evaluate_start(self) -> None:
+        self._tick = 0
+        self._draw("start")
+        self._draw("step")
+        self._guard(self.start)
+        self._guard(self.outputs)
+        self._dirty = False
+
+    def _refresh(self) -> None:
+        if self._dirty:
+            if self._running:
+                self._guard(self.outputs)
+                self._dirty = False
+            else:
+                self._evaluate_start()
+
+    def do_step(self, t: float, step: float) -> None:
+        """Advances from t to t + step with the inputs held.  Raises PartError."""
+        if not self._running:
+            raise PartError(f"{self.instance}: a step before initialization has succeeded")
+        if not (math.isfinite(t) and math.isfinite(step) and step > 0.0):
+            raise PartError(f"{self.instance}: a step must be positive and finite, not {step:g} s")
+        for s in self.layout:
+            if s.section == "input":
+                x = self._at(s)
+                if not math.isfinite(x):
+                    raise PartError(f"{self.instance}: input {s.name} is {x:g} at t = {t:.9g} s")
+        largest = getattr(self, "step", step)
+        n = max(1, math.ceil(step / largest - 1e-9))
+        h = step / n
+        self.h = h
+        for k in range(n):
+            self.t = t + k * h
+            self._tick += 1
+            self._draw("step")
+            self._draw("second")
+            if self.states:
+                self._advance(h)
+            self.t = t + (k + 1) * h
+            for name, every in self.ticks:
+                if self._tick % every == 0:
+                    self._guard(getattr(self, name))
+        self._guard(self.outputs)
+        self._dirty = False
+        self._finite()
+
+    def _guard(self, method: Callable[[], None]) -> None:
+        try:
+            method()
+        except (ArithmeticError, IndexError, ValueError) as e:
+            where = f"{method.__name__} at t = {self.t:.9g} s"
+            raise PartError(f"{self.instance}: {e} in {where}") from e
+
+    def _finite(self) -> None:
+        for s in self._watched:
+            x = self._at(s)
+            if not math.isfinite(x):
+                raise PartError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
+
+    # ------------------------------------------------------------------ noise
+    def _draw(self, per: str) -> None:
+        for port, n in enumerate(self.noises):
+            if n.per != per:
+                continue
+            size = getattr(self, n.name)
+            x = 0.0
+            if size != 0.0:
+                x = size * normal(int(self.seed), port, self._tick)  # type: ignore[attr-defined]
+                if per == "second":
+                    x = x / math.sqrt(self.h)
+            setattr(self.noise, n.name, x)
+
+    # ------------------------------------------------------------------ integration
+    def _flow(self) -> list[float]:
+        self._guard(self.flow)
+        d = self.der
+        return [float(_dig(getattr(d, s.path[0]), s.path[1:])) for s in self.states]
+
+    def jacobian(self) -> list[list[float]]:
+        """df/dx at the present point, by forward-mode differentiation of ``flow``."""
+        return [list(r) for r in zip(*(self.tangent({s.name: 1.0})[0] for s in self.states), strict=True)]
+
+    def tangent(self, seeds: dict[str, float]) -> tuple[list[float], list[float]]:
+        """Derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
+        twin = object.__new__(type(self))
+        twin.__dict__.update(self.__dict__)
+        twin.der = SimpleNamespace()
+        for name, d in self.declarations.items():
+            setattr(twin, name, _dual(getattr(self, name)))
+            if isinstance(d, State):
+                setattr(twin.der, name, _dual(getattr(self.der, name)))
+        twin.noise = SimpleNamespace(**{k: Dual(v) for k, v in vars(self.noise).items()})
+        for name, weight in seeds.items():
+            s = self._find(name)
+            _dig(getattr(twin, s.path[0]), s.path[1:]).d = weight
+        twin._guard(twin.flow)
+        twin._guard(twin.outputs)
+        der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
+        out = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in self.layout if s.section == "output"]
+        return der, [lift(y).d for y in out]
+
+    def _advance(self, h: float) -> None:
+        if self.integrator == "rk4":
+            self._advance_rk4(h)
+            return
+        anew = getattr(self, self.nonlinear) != 0.0 if isinstance(self.nonlinear, str) else self.nonlinear
+        if anew or h != self._phi_h:
+            self._phi = phi1([[a * h for a in row] for row in self.jacobian()])
+            self._phi_h = h
+        f = self._flow()
+        for s, row in zip(self.states, self._phi, strict=True):
+            dx = 0.0
+            for p, fj in zip(row, f, strict=True):
+                dx = dx + p * fj
+            self._put(s, self._at(s) + h * dx)
+
+    def _advance_rk4(self, h: float) -> None:
+        t, dt = self.t, h / self.rk4_substeps
+        for k in range(self.rk4_substeps):
+            x = [self._at(s) for s in self.states]
+
+            def move(f: list[float], by: float, x: list[float] = x) -> None:
+                for s, xi, fi in zip(self.states, x, f, strict=True):
+                    self._put(s, xi + by * fi)
+
+            self.t = t + k * dt
+            k1 = self._flow()
+            self.t = t + (k + 0.5) * dt
+            move(k1, 0.5 * dt)
+            k2 = self._flow()
+            move(k2, 0.5 * dt)
+            k3 = self._flow()
+            self.t = t + (k + 1) * dt
+            move(k3, dt)
+            k4 = self._flow()
+            sums = [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+            move(sums, dt / 6.0)
+
+
+def _dig(x: Any, path: tuple[Any, ...]) -> Any:
+    for i in path:
+        x = x[i]
+    return x
+
+
+def _dual(x: Any) -> Any:
+    return [_dual(e) for e in x] if isinstance(x, list) else Dual(float(x))

@@ -1,0 +1,304 @@
+"""Checkpoints: a run that was stopped goes on where it was, and its record is bit-equal with that of a whole run.
+
+``checkpoint.npz`` in the folder of the run holds the serialized state of every FMU, the buffer ``out`` of the engine,
+the last watched value, the number of steps and the rows recorded so far: one file, written under a temporary name and
+renamed, so that it is whole or not there.  It is written when the user stops the run and about once a minute of wall
+time, for a process that is killed; it is removed when the run is complete.  A checkpoint belongs to one job: parts,
+parameters, options, seed, step, order and wiring; any other job is refused.  Both engines write and read the same file.
+
+Not covered: FMUs that cannot serialize their state, and FMUs in a process of their own (``isolate``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gyrobench.engine.fmu_instance import LocalSlave, PartFailure, Slave
+from gyrobench.engine.program import Program
+from gyrobench.engine.reference_engine import Array, Progress, take
+from gyrobench.record.record import _replace
+
+FILE = "checkpoint.npz"
+FORMAT = 1
+PERIOD = 60.0  # s of wall time between two checkpoints
+SHARE = 50.0  # and this many times what the last one took
+SHOWN = 5  # differences named in a refusal
+NAMES = {
+    "step": "step (s)",
+    "stop": "end of the simulated time (s)",
+    "every": "steps between two rows of the channels",
+    "order": "order of execution",
+    "wiring": "wires, mapping or recorded channels",
+}
+
+
+class ResumeError(Exception):
+    """A run that cannot be continued; the text says why."""
+
+    exit_code = 2
+
+
+def wiring(program: Program) -> str:
+    """A digest of what goes where between the parts and into the record, unit factors included."""
+    calls = [(*p.sets, *p.gets, *p.channel_gets, *p.window_gets) for p in program.parts]
+    parts = [[[g.kind, list(g.references), g.at, g.source, g.scaled] for g in groups] for groups in calls]
+    rows = [[r.names, r.source, r.gain] for r in (program.channel, program.window)]
+    text = json.dumps([parts, rows, program.watch, program.done])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def obstacle(slaves: Mapping[str, Slave]) -> str:
+    """Why a run with these FMUs cannot be resumed; empty when it can."""
+    apart = [slot for slot, s in slaves.items() if not isinstance(s, LocalSlave)]
+    if apart:
+        return f"{', '.join(apart)}: an FMU in a process of its own (--isolate) does not give out its state"
+    mute = [
+        slot
+        for slot, s in slaves.items()
+        if isinstance(s, LocalSlave)
+        and not (s.description.coSimulation.canGetAndSetFMUstate and s.description.coSimulation.canSerializeFMUstate)
+    ]
+    if mute:
+        return f"{', '.join(mute)}: the FMU cannot save its state (canSerializeFMUstate is not true in its description)"
+    return ""
+
+
+def save_state(slave: LocalSlave) -> bytes:
+    """The serialized state of an FMU.  Raises PartFailure."""
+    try:
+        state = slave.fmu.getFMUstate()
+        try:
+            return bytes(slave.fmu.serializeFMUstate(state))
+        finally:
+            slave.fmu.freeFMUstate(state)
+    except Exception as error:
+        raise slave.fail("serializeFMUstate", error) from None
+
+
+def load_state(slave: LocalSlave, data: bytes) -> None:
+    """Puts an initialized FMU into a serialized state.  Raises PartFailure."""
+    try:
+        state = slave.fmu.deSerializeFMUstate(data)
+        try:
+            slave.fmu.setFMUstate(state)
+        finally:
+            slave.fmu.freeFMUstate(state)
+    except Exception as error:
+        raise slave.fail("deSerializeFMUstate", error) from None
+
+
+def about(folder: Path) -> dict[str, Any] | None:
+    """The job of the checkpoint in a folder; None when there is none.  Raises ResumeError for a damaged file."""
+    return dict(_read(folder / FILE)[0]["job"]) if (folder / FILE).is_file() else None
+
+
+def _read(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        head = json.loads(arrays.pop("head").tobytes().decode("utf-8"))
+        if head["format"] != FORMAT:
+            raise ValueError(f"format {head['format']}, this version reads {FORMAT}")
+        return head, arrays
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise ResumeError(f"{file}: not a checkpoint that can be read: {error}") from None
+
+
+def _whole(rows: list[Array], width: int) -> Array:
+    """All rows as one array; the list then holds that one."""
+    if not rows:
+        return np.empty((0, width))
+    if len(rows) > 1 or rows[0].ndim == 1:
+        rows[:] = [np.concatenate([r if r.ndim == 2 else r[None, :] for r in rows])]
+    return rows[0]
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """What is not the same in two jobs, in words."""
+    found = []
+    for key, now in new.items():
+        was = old.get(key)
+        if json.dumps(was, sort_keys=True) == json.dumps(now, sort_keys=True):
+            continue
+        if key == "parts":
+            was = was or {}
+            found += [f"the part in slot {s} (its FMU)" for s in sorted({*was, *now}) if was.get(s) != now.get(s)]
+        elif isinstance(now, dict) and isinstance(was, dict):
+            names = [n for n in {**was, **now} if was.get(n) != now.get(n)]
+            if "seed" in new and old.get("seed") != new["seed"]:  # said already; the slots' seeds come from it
+                names = [n for n in names if not n.endswith(".seed")]
+            found += [f"{n}: {_shown(was.get(n))} there, {_shown(now.get(n))} here" for n in names]
+        elif key == "wiring":
+            found.append(NAMES[key])
+        else:
+            found.append(f"{NAMES.get(key, key)}: {_shown(was)} there, {_shown(now)} here")
+    return found
+
+
+def _shown(value: Any) -> str:
+    text = ", ".join(map(str, value)) if isinstance(value, list) else "none" if value is None else str(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+class Keeper:
+    """Keeps the checkpoint of one run.
+
+    folder: of the checkpoint.  resume: continue from the one in ``source`` (default: the folder).  stop_at: s of
+    simulated time at which the run is interrupted as if by the user.  period: s of wall time between checkpoints.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        resume: bool = False,
+        source: Path | None = None,
+        stop_at: float | None = None,
+        period: float | None = None,
+    ) -> None:
+        self.folder = Path(folder)
+        self.resume = resume
+        self.source = Path(source or folder)
+        self.stop_at = stop_at
+        self.period = PERIOD if period is None else period
+        self.says = ""  # whether and how an interrupted run goes on
+        self.resumed_at: list[float] = []  # s
+        self.job: dict[str, Any] = {}
+        self.head: dict[str, Any] = {}
+        self.arrays: dict[str, Array] = {}
+        self.due = self.began = time.monotonic()
+
+    def check(self, job: Mapping[str, Any], program: Program, slaves: Mapping[str, Slave]) -> None:
+        """Before anything runs: reads the checkpoint when resuming.  Raises ResumeError when it is not of this job."""
+        self.program, self.slaves = program, slaves
+        job = {**job, "order": program.order, "wiring": wiring(program)}
+        self.job = json.loads(json.dumps(job))
+        self.why = obstacle(slaves)
+        if not self.resume:
+            return
+        if self.why:
+            raise ResumeError(f"--resume: {self.why}; run it again without --resume")
+        file = self.source / FILE
+        if not file.is_file():
+            raise ResumeError(f"--resume: no interrupted run to continue in {self.source} (there is no {FILE})")
+        self.head, self.arrays = _read(file)
+        found = differences(self.head["job"], self.job)
+        if found:
+            more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
+            lines = "".join(f"\n  - {line}" for line in [*found[:SHOWN], *more])
+            raise ResumeError(f"--resume: the interrupted run in {self.source} is another one; what differs:{lines}")
+
+    def notes(self) -> list[str]:
+        """What to say before a run that starts anew although it could be continued."""
+        if self.resume or not (self.source / FILE).is_file():
+            return []
+        return [f"this run starts anew; the interrupted one in {self.source} could be continued with --resume"]
+
+    def restore(self, state: Progress) -> Progress:
+        """The run as it was saved, after initialization; ``state`` itself when not resuming.
+
+        Raises PartFailure, and ResumeError for an FMU that does not show its outputs again.
+        """
+        self.due = time.monotonic() + self.period
+        if not self.resume:
+            return state
+        out = self.program.out
+        try:
+            states = {slot: self.arrays[f"state.{slot}"].tobytes() for slot in self.program.order}
+            saved = self.arrays["out"]
+            found = Progress(
+                k=int(self.head["k"]),
+                last=float(self.arrays["last"][0]),
+                finished=bool(self.head["finished"]),
+                channel_rows=[self.arrays["channel"]],
+                window_rows=[self.arrays["window"]],
+                timed=int(self.head["timed"]),
+                timed_seconds=dict(self.head["timed_seconds"]),
+            )
+            self.resumed_at = [*self.head["resumed_at"], found.k * float(self.job["step"])]
+        except KeyError as error:
+            raise ResumeError(f"{self.source / FILE}: not a checkpoint that can be read: {error} is missing") from None
+        for p in self.program.parts:
+            slave = self.slaves[p.slot]
+            assert isinstance(slave, LocalSlave)
+            load_state(slave, states[p.slot])
+            take(slave, p.gets, out)
+            if any(out[g.at : g.at + g.n].tobytes() != saved[g.at : g.at + g.n].tobytes() for g in p.gets):
+                raise ResumeError(
+                    f"--resume: {p.slot}: the outputs of the FMU are not those it had when its state was saved; "
+                    "it does not save all of its state, so the run cannot be continued"
+                )
+        out[:] = saved
+        return found
+
+    def last_step(self, h: float) -> int | None:
+        """The step after which the run stops as asked for."""
+        return None if self.stop_at is None else max(0, round(self.stop_at / h))
+
+    def look(self, state: Progress) -> None:
+        """Between two chunks: writes a checkpoint when one is due."""
+        if time.monotonic() >= self.due and not self.why:
+            began = time.monotonic()
+            self.write(state)
+            now = time.monotonic()
+            self.due = now + max(self.period, SHARE * (now - began))
+
+    def stopped(self, state: Progress) -> None:
+        """The user has stopped the run: writes the checkpoint, or says why there is none."""
+        problem = self.why or self.write(state)
+        self.says = f"it cannot be resumed: {problem}" if problem else "the same command with --resume continues it"
+
+    def write(self, state: Progress) -> str:
+        """Writes the checkpoint.  What hinders it is returned, not raised: the run itself is sound."""
+        program = self.program
+        head = {
+            "format": FORMAT,
+            "job": self.job,
+            "k": state.k,
+            "finished": state.finished,
+            "timed": state.timed,
+            "timed_seconds": state.timed_seconds,
+            "resumed_at": self.resumed_at,
+        }
+        arrays: dict[str, Any] = {
+            "head": np.frombuffer(json.dumps(head).encode("utf-8"), np.uint8),
+            "out": program.out,
+            "last": np.array([state.last]),
+            "channel": _whole(state.channel_rows, 1 + len(program.channel.names)),
+            "window": _whole(state.window_rows, 1 + len(program.window.names)),
+        }
+
+        def save(path: Path) -> None:
+            with path.open("wb") as f:
+                np.savez(f, **arrays)
+                f.flush()
+                os.fsync(f.fileno())
+
+        try:
+            for slot, slave in self.slaves.items():
+                assert isinstance(slave, LocalSlave)
+                arrays[f"state.{slot}"] = np.frombuffer(save_state(slave), np.uint8)
+            self.folder.mkdir(parents=True, exist_ok=True)
+            _replace(self.folder / FILE, save)
+        except (PartFailure, OSError) as error:
+            return str(error)
+        return ""
+
+    def done(self) -> None:
+        """The record is complete and saved: removes the checkpoint, and what a killed process left of one."""
+        remove((self.folder, self.source))
+
+
+def remove(folders: Iterable[Path]) -> None:
+    """Removes the checkpoints in folders."""
+    for folder in folders:
+        for file in folder.glob(f"{FILE}*"):
+            file.unlink(missing_ok=True)

@@ -1,0 +1,172 @@
+"""The native engine: the loop of :mod:`gyrobench.engine.reference_engine` in C (engine.c), on FMPy's instances.
+
+The structures below mirror engine.c field by field.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from ctypes import POINTER, c_double, c_int32, c_int64, c_void_p
+from typing import Any
+
+import numpy as np
+
+from gyrobench.engine.engine_library import engine_library
+from gyrobench.engine.fmu_instance import STATUS, LocalSlave, PartFailure
+from gyrobench.engine.program import KINDS, Group, Program, Row
+from gyrobench.engine.reference_engine import Progress
+
+BLOCK = 16384  # rows
+MORE, DONE, FULL, FAILED = range(4)
+
+
+class _Group(ctypes.Structure):
+    _fields_ = (
+        ("kind", c_int64),
+        ("n", c_int64),
+        ("call", c_void_p),
+        ("references", c_void_p),
+        ("values", c_void_p),
+        ("out", c_void_p),
+        ("source", c_void_p),
+        ("n_scaled", c_int64),
+        ("scaled", c_void_p),
+        ("factor", c_void_p),
+    )
+
+
+class _Part(ctypes.Structure):
+    _fields_ = (
+        ("component", c_void_p),
+        ("step", c_void_p),
+        *((f"n_{g}", c_int64) for g in ("sets", "gets", "channel_gets", "window_gets")),
+        *((g, POINTER(_Group)) for g in ("sets", "gets", "channel_gets", "window_gets")),
+    )
+
+
+class _Table(ctypes.Structure):
+    _fields_ = (
+        ("n", c_int64),
+        ("rows", c_int64),
+        ("capacity", c_int64),
+        ("source", c_void_p),
+        ("gain", c_void_p),
+        ("block", c_void_p),
+    )
+
+
+class _Run(ctypes.Structure):
+    _fields_ = (
+        ("parts", POINTER(_Part)),
+        ("n_parts", c_int64),
+        ("out", c_void_p),
+        ("t0", c_double),
+        ("h", c_double),
+        *((n, c_int64) for n in ("k", "every", "watch", "done")),
+        ("last", c_double),
+        ("channel", _Table),
+        ("window", _Table),
+        ("timed_seconds", c_void_p),
+        *((n, c_int64) for n in ("timed", "failed_part", "failed_call", "failed_kind", "failed_status")),
+    )
+
+
+class NativeEngine:
+    """The loop in C.  Every slave must be a LocalSlave.  Raises CompilerError where C cannot be compiled."""
+
+    name = "native"
+
+    def __init__(self, program: Program, slaves: Mapping[str, LocalSlave]) -> None:
+        self.library = engine_library()
+        self.program = program
+        self.slaves = [slaves[p.slot] for p in program.parts]
+        self.keep: list[Any] = []
+        self.run = _Run()
+        parts = (_Part * len(program.parts))()
+        for part, p, slave in zip(parts, program.parts, self.slaves, strict=True):
+            functions = slave.pointers()
+            part.component = slave.component
+            part.step = functions["DoStep"]
+            for name in ("sets", "gets", "channel_gets", "window_gets"):
+                groups: list[Group] = getattr(p, name)
+                call = "Set" if name == "sets" else "Get"
+                packed = (_Group * max(len(groups), 1))(*(self.group(g, functions[call + g.kind]) for g in groups))
+                setattr(part, f"n_{name}", len(groups))
+                setattr(part, name, ctypes.cast(packed, POINTER(_Group)))
+                self.keep.append(packed)
+        self.keep.append(parts)
+        r = self.run
+        r.parts, r.n_parts = ctypes.cast(parts, POINTER(_Part)), len(program.parts)
+        r.out = program.out.ctypes.data
+        r.watch, r.done = program.watch, program.done
+        self.seconds = np.zeros(len(program.parts))
+        r.timed_seconds = self.seconds.ctypes.data
+        self.blocks = {
+            "channel": self.table(r.channel, program.channel),
+            "window": self.table(r.window, program.window),
+        }
+
+    def pointer(self, values: Any, kind: Any) -> int:
+        array = (kind * max(len(values), 1))(*values)
+        self.keep.append(array)
+        return ctypes.addressof(array)
+
+    def group(self, g: Group, call: int) -> _Group:
+        self.keep.append(g)
+        return _Group(
+            KINDS.index(g.kind),
+            g.n,
+            call,
+            ctypes.addressof(g.references),
+            ctypes.addressof(g.values),
+            self.program.out.ctypes.data + 8 * g.at,
+            self.pointer(g.source, c_int32),
+            len(g.scaled),
+            self.pointer([j for j, _ in g.scaled], c_int32),
+            self.pointer([f for _, f in g.scaled], c_double),
+        )
+
+    def table(self, table: _Table, row: Row) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Gives a table of rows its block."""
+        block = np.empty((BLOCK, 1 + len(row.source)))
+        table.n, table.rows, table.capacity = len(row.source), 0, BLOCK
+        table.source = self.pointer(row.source, c_int32)
+        table.gain = self.pointer(row.gain, c_double)
+        table.block = block.ctypes.data
+        return block
+
+    def empty(self, progress: Progress) -> None:
+        """Moves the recorded rows into the progress."""
+        for name, rows in (("channel", progress.channel_rows), ("window", progress.window_rows)):
+            table: _Table = getattr(self.run, name)
+            if table.rows:
+                rows.append(self.blocks[name][: table.rows].copy())
+                table.rows = 0
+
+    def advance(self, progress: Progress, k_end: int, t0: float, h: float, every: int) -> None:
+        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises PartFailure."""
+        r = self.run
+        r.t0, r.h, r.k, r.every, r.last = t0, h, progress.k, every, progress.last
+        r.timed = progress.timed
+        self.seconds[:] = [progress.timed_seconds[p.slot] for p in self.program.parts]
+        while True:
+            code = self.library.gyrobench_run(ctypes.byref(r), c_int64(k_end))
+            self.empty(progress)
+            if code != FULL:
+                break
+        progress.k, progress.last, progress.timed = int(r.k), float(r.last), int(r.timed)
+        for p, s in zip(self.program.parts, self.seconds, strict=True):
+            progress.timed_seconds[p.slot] = float(s)
+        if code == DONE:
+            progress.finished = True
+        if code == FAILED:
+            slave = self.slaves[r.failed_part]
+            kind = KINDS[r.failed_kind]
+            call = (f"set{kind}", "doStep", f"get{kind}")[r.failed_call]
+            status = f"status {r.failed_status} ({STATUS[r.failed_status] if r.failed_status < 6 else 'unknown'})"
+            raise PartFailure(slave.slot, call, status, t0 + progress.k * h, slave.messages())
+
+    def close(self) -> None:
+        """Drops the arrays; the slaves are freed by their owner."""
+        self.keep.clear()

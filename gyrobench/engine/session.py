@@ -1,0 +1,346 @@
+"""Runs a system: builds or takes the FMUs, binds, checks, orders, runs, and returns the record.
+
+    record = run(load_system("tumble_single_axis"), values={"latitude": "45.75deg"}, seed=3, out=Path("reports/out/x"))
+
+A :class:`Session` prepares once (unzip, load, bind, order) and runs many times with other values and seeds.
+"""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from gyrobench.engine.checkpoint import Keeper
+from gyrobench.engine.fmu_instance import LocalSlave, PartFailure, Slave
+from gyrobench.engine.program import build_program
+from gyrobench.engine.reference_engine import ReferenceEngine, initialize, start
+from gyrobench.engine.run_driver import Interrupt, Status, drive
+from gyrobench.record.record import Record, rows_to_columns
+from gyrobench.system.parameters import defaults, resolve
+from gyrobench.system.part_files import resolve_parts, sha256
+from gyrobench.system.system import RefusedError, System, load_system
+from gyrobench.system.values import ValueProblem
+from gyrobench.system.wiring import Assembly, assemble
+
+
+class RunError(Exception):
+    """A run that did not end as it should; ``record`` holds what there was until then (or None)."""
+
+    exit_code = 3
+
+    def __init__(self, message: str, record: Record | None = None) -> None:
+        self.record = record
+        kept = "" if record is None or record.folder is None else f"\nthe record until then is kept in {record.folder}"
+        super().__init__(message + kept)
+
+
+class RunInterrupted(RunError):
+    """The user stopped the run."""
+
+
+class PartRefusal(RunError):
+    """A part refuses its parameters, before the first step."""
+
+    exit_code = 2
+
+
+class Session:
+    """A system with its FMUs unzipped and loaded, for one run or a thousand.
+
+    parts: slot -> path of an FMU or name of a part (default: the slot's).  maps: slot -> mapping file.
+    engine: "native", "reference" or None (native where it can).  isolate: slots whose FMU runs in a child process.
+    target: of the parts that are built, "native" or "python".  timeout: s for one call of an isolated FMU.
+    Use as a context manager, or call :meth:`close`.
+    Raises BenchError, BuildError, MisfitError, WiringError, AlgebraicLoopError before anything is loaded.
+    """
+
+    def __init__(
+        self,
+        system: System | str,
+        parts: Mapping[str, Path | str] | None = None,
+        maps: Mapping[str, Path] | None = None,
+        *,
+        engine: str | None = None,
+        isolate: Iterable[str] = (),
+        target: str = "native",
+        bench: Path | None = None,
+        timeout: float = 10.0,
+    ) -> None:
+        if engine not in (None, "native", "reference"):
+            raise ValueProblem(f"engine '{engine}': one of native, reference")
+        self.system = load_system(system, bench) if isinstance(system, str) else system
+        self.isolate = tuple(isolate)
+        for slot in self.isolate:
+            if slot not in self.system.slots:
+                raise ValueProblem(f"isolate: no slot '{slot}'; slots: {', '.join(self.system.slots)}")
+        self.notes: list[str] = []
+        paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
+        self.swapped = sorted(parts or {})
+        self.bench = bench
+        self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
+        self.assembly: Assembly = assemble(self.system, paths, maps)
+        self.notes += self.assembly.notes
+        self.program = build_program(self.assembly)
+        self.base = defaults(self.assembly)
+        self.hashes = {slot: sha256(p) for slot, p in paths.items()}
+        self.engine = self._choose(engine)
+        self.folder = Path(tempfile.mkdtemp(prefix="gyrobench-"))
+        self.slaves: dict[str, Slave] = {}
+        try:
+            for slot, path in paths.items():
+                self.slaves[slot] = self._slave(slot, path, timeout)
+        except BaseException as error:
+            self.close()
+            if isinstance(error, PartFailure):
+                raise RunError(str(error)) from None
+            raise
+
+    def _choose(self, engine: str | None) -> str:
+        if self.isolate:
+            if engine == "native":
+                self.notes.append("isolated FMUs run in the reference engine")
+            return "reference"
+        if engine == "reference":
+            return engine
+        from gyrobench.engine.engine_library import engine_library
+        from gyrobench.packaging import CompilerError
+
+        try:
+            engine_library()
+        except CompilerError as error:
+            self.notes.append(f"reference engine (about a hundred times slower than native): {error}")
+            return "reference"
+        return "native"
+
+    def _slave(self, slot: str, path: Path, timeout: float) -> Slave:
+        from fmpy import extract
+
+        folder = self.folder / slot
+        extract(str(path), str(folder))
+        if slot in self.isolate:
+            from gyrobench.engine.isolated_instance import RemoteSlave
+
+            return RemoteSlave(slot, folder, timeout)
+        return LocalSlave(slot, self.assembly.descriptions[slot], folder)
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees all FMUs and removes the unzipped files."""
+        for slave in self.slaves.values():
+            slave.close()
+        self.slaves = {}
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def run(
+        self,
+        values: Mapping[str, Any] | None = None,
+        seed: int = 1,
+        step: float | None = None,
+        out: Path | None = None,
+        progress: Callable[[Status], None] | None = None,
+        keeper: Keeper | None = None,
+    ) -> Record:
+        """One run from t = 0, or from where ``keeper`` resumes it, to its end.  See :func:`run`."""
+        system = self.system.with_values(values or {})
+        if step is not None:
+            system.step = float(step)
+        if not 0.0 < system.step < float("inf"):
+            raise ValueProblem(f"step = {system.step} s: must be > 0")
+        system.refuse()
+        starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
+        if problems := system.check_parameters(parameters):
+            raise RefusedError(system.name, problems)
+        linear = self._linear(system, parameters, notes) if system.loops else {}
+        meta = {**self._meta(system, seed, parameters, notes), **linear}
+        every = max(1, round(system.channel_period / system.step))
+        if keeper is not None:
+            job = {k: meta[k] for k in ("system", "seed", "step", "options", "parameters")}
+            parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
+            keeper.check({**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.slaves)
+        self.program.out[:] = 0.0
+        state = None
+        engine: Any = None
+        problem: Exception | None = None
+        try:
+            for slot in self.program.order:
+                self.slaves[slot].instantiate()
+                self.slaves[slot].set_start(starts[slot])
+            initialize(self.program, self.slaves, 0.0)
+            state = start(self.program, self.slaves, 0.0)
+            if keeper is not None:
+                state = keeper.restore(state)
+            if self.engine == "native":
+                from gyrobench.engine.native_engine import NativeEngine
+
+                engine = NativeEngine(self.program, self.slaves)  # type: ignore[arg-type]
+            else:
+                engine = ReferenceEngine(self.program, self.slaves)
+            drive(engine, state, system, every, progress, keeper)
+        except (PartFailure, Interrupt) as error:
+            problem = error
+            if keeper is not None and state is not None and isinstance(error, Interrupt) and error.by_user:
+                keeper.stopped(state)
+        finally:
+            if engine is not None:
+                engine.close()
+            for slave in self.slaves.values():
+                slave.free()
+        if state is None:
+            said = isinstance(problem, PartFailure) and problem.messages and "(Error)" in problem.status
+            raise (PartRefusal if said else RunError)(str(problem))
+        return self._finish(state, system, meta, out, problem, keeper)
+
+    def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+        """The linear model for run.json; what it warns about goes to the log at once, and into the notes."""
+        import logging
+
+        from gyrobench.linear.linear_model import NotLinear, loops
+        from gyrobench.packaging import load_part
+
+        def part_of(slot: str) -> Any:
+            if slot not in self.names:
+                raise NotLinear(f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known")
+            return load_part(self.names[slot], self.bench)
+
+        found, said = loops(self.assembly, parameters, part_of, system.step)
+        for text in said:
+            logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
+        notes += said
+        return {"linear": found}
+
+    def _finish(
+        self,
+        state: Any,
+        system: System,
+        meta: dict[str, Any],
+        out: Path | None,
+        problem: Exception | None,
+        keeper: Keeper | None,
+    ) -> Record:
+        windows = system.windows
+        names = list(windows.columns) if windows else []
+        scale = state.k / state.timed if state.timed else 0.0
+        meta["timing"] = {slot: s * scale for slot, s in state.timed_seconds.items()}
+        meta["complete"] = problem is None
+        meta["steps"] = state.k
+        meta["stopped_at"] = state.k * system.step
+        if keeper is not None and keeper.resumed_at:
+            meta["resumed_at"] = keeper.resumed_at
+        if problem is not None:
+            meta["problem"] = str(problem)
+        record = Record(
+            rows_to_columns(state.window_rows, names, time=False),
+            rows_to_columns(state.channel_rows, self.program.channel.names, time=True),
+            meta,
+        )
+        if out is not None:
+            record.save(out)
+        if isinstance(problem, Interrupt) and problem.by_user:
+            raise RunInterrupted(f"{problem}; {keeper.says}" if keeper is not None else str(problem), record)
+        if problem is not None:
+            raise RunError(str(problem), record)
+        if keeper is not None and out is not None:
+            keeper.done()
+        return record
+
+    def _units(self) -> dict[str, str]:
+        """SI units of the recorded channels, as far as their sockets or their FMUs name them."""
+        found = {}
+        for name in self.program.channel.names:
+            slot, bound = self.assembly.output(name)
+            connector = self.assembly.bindings[slot].socket.connector(bound.element.split("[")[0])
+            found[name] = connector.unit if connector is not None and connector.unit else bound.unit
+        return found
+
+    def _meta(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+        parts = {}
+        for slot, d in self.assembly.descriptions.items():
+            parts[slot] = {
+                "name": d.modelName,
+                "version": d.version or "",
+                "target": self.built.get(slot, "foreign"),
+                "fmi": d.fmiVersion,
+                "sha256": self.hashes[slot],
+            }
+        item = next((s for s in ("gyro", "accelerometer") if s in parts), None)  # what the test is about
+        return {
+            "system": system.name,
+            "title": system.title,
+            "instrument": f"{parts[item]['name']} {parts[item]['version']}, simulated" if item else "",
+            "spec": list(system.spec),
+            "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            "seed": seed,
+            "step": system.step,
+            "engine": self.engine,
+            "isolated": list(self.isolate),
+            **self.assembly.order.as_dict(system.step),
+            "parts": parts,
+            "parameters": parameters,
+            "changed": [*(f"{s}: part" for s in self.swapped), *system.given],
+            "options": dict(system.values),
+            "units": self._units(),
+            "plan": system.plan().rows(),
+            "versions": dict(_versions()),
+            "notes": [*self.notes, *notes, *system.warnings()],
+        }
+
+
+def run(
+    system: System | str,
+    parts: Mapping[str, Path | str] | None = None,
+    maps: Mapping[str, Path] | None = None,
+    values: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    engine: str | None = None,
+    out: Path | None = None,
+    step: float | None = None,
+    isolate: Iterable[str] = (),
+    progress: Callable[[Status], None] | None = None,
+    target: str = "native",
+    bench: Path | None = None,
+    timeout: float = 10.0,
+    resume: bool = False,
+    stop_at: float | None = None,
+) -> Record:
+    """One run; saved in ``out`` (a folder) when given.
+
+    values: options and "slot.parameter", numbers in SI or texts with units.  step: s, instead of the system's.
+    seed: of all noise; each slot gets a seed of its own from it unless "slot.seed" is set.
+    progress: called about five times a second with a :class:`Status`.
+    resume: go on with the interrupted run in ``out``, see :mod:`gyrobench.engine.checkpoint`.
+    stop_at: s of simulated time at which the run is interrupted as if by the user.
+    Raises the errors of :class:`Session`, RefusedError, ResumeError and ValueProblem before anything runs, and RunError
+    (with what was recorded, saved too) when an FMU fails, the plan does not end, or the user interrupts
+    (RunInterrupted).
+    """
+    if out is None and (resume or stop_at is not None):
+        raise ValueProblem("resume and stop_at: name the folder of the run in out")
+    keeper = Keeper(out, resume, stop_at=stop_at) if out is not None else None
+    with Session(
+        system, parts, maps, engine=engine, isolate=isolate, target=target, bench=bench, timeout=timeout
+    ) as session:
+        return session.run(values, seed, step, out, progress, keeper)
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {"python": platform.python_version()}
+    for name in ("gyrobench", "fmpy", "numpy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

@@ -1,0 +1,1 @@
+"""Files of other tools: SSP archives, container FMUs, result files."""

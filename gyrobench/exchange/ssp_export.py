@@ -1,0 +1,214 @@
+"""A system as SSP 1.0 archive: structure (SSD), parameter values (SSV) and the FMUs, without vendor annotations.
+
+``SystemStructure.ssd``       components in execution order, connectors with units, connections
+``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
+``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
+``resources/<slot>.fmu``      one FMU for each slot
+
+What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
+
+- libcosim applies the SSV bound to a component (it does not look at bindings of the system), takes the step size from
+  its caller, and couples all parts in parallel (Jacobi): every connection carries the value of the last step, ours
+  only the cut ones.
+- FMPy's ``simulate_ssp`` couples in parallel too, starts from zero inputs, and applies parameter values only when they
+  are handed over: ``simulate_ssp(f, parameter_set=read_ssv(f, "resources/parameters.ssv"), step_size=..., ...)``.
+  It ignores linear transformations.
+- A factor of a connection (a unit or sign of a mapping file) is a LinearTransformation; the connection then
+  suppresses the conversion by units, so that it is not done twice.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from gyrobench import units
+from gyrobench.system.binding import Bound
+from gyrobench.system.parameters import Starts, defaults, resolve
+from gyrobench.system.part_files import resolve_parts
+from gyrobench.system.system import System
+from gyrobench.system.wiring import Assembly, assemble
+
+SSP = "http://ssp-standard.org/SSP1/"
+SSD, SSC, SSV = (f"{SSP}SystemStructure{n}" for n in ("Description", "Common", "ParameterValues"))
+PARAMETERS = "resources/parameters.ssv"
+STAMP = (1980, 1, 1, 0, 0, 0)
+
+
+class ExportError(Exception):
+    """A system that cannot be written in the form that is asked for; the text says why."""
+
+
+def prepare(
+    system: System,
+    parts: Mapping[str, Path | str] | None,
+    maps: Mapping[str, Path] | None,
+    values: Mapping[str, Any] | None,
+    seed: int,
+    bench: Path | None,
+) -> tuple[Assembly, Starts, list[str]]:
+    """The assembly, the start values by slot, and notes.  Raises what a run would raise before it runs."""
+    chosen = system.with_values(values or {})
+    chosen.refuse()
+    notes: list[str] = []
+    paths, _ = resolve_parts(chosen, parts or {}, "native", bench, notes)
+    assembly = assemble(chosen, paths, maps)
+    starts, _, more = resolve(assembly, chosen, seed, defaults(assembly))
+    return assembly, starts, [*notes, *assembly.notes, *more]
+
+
+def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
+    """Outputs that a record needs: windows, done and channels, as "slot.output" -> (slot, variable)."""
+    system = assembly.system
+    names = [*(system.windows.columns.values() if system.windows else ()), *system.channels]
+    names += [system.windows.watch] if system.windows else []
+    names += [system.done] if system.done else []
+    absent = {f"{s}.{n}" for s, b in assembly.bindings.items() for n in b.absent if n not in b.outputs}
+    return {n: assembly.output(n) for n in dict.fromkeys(names) if n.partition("[")[0] not in absent}
+
+
+def stop_time(system: System) -> float:
+    """A time by which the plan has certainly ended: its duration, 5 % and a minute for each phase more."""
+    plan = system.plan()
+    return system.stop if system.stop is not None else 1.05 * plan.duration() + 60.0 * len(plan.phases)
+
+
+def export_ssp(
+    system: System,
+    path: Path,
+    parts: Mapping[str, Path | str] | None = None,
+    maps: Mapping[str, Path] | None = None,
+    values: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    bench: Path | None = None,
+) -> list[str]:
+    """Writes the archive and returns notes for the user.
+
+    Raises what a run would raise before it runs (misfit, wires, algebraic loop, values).
+    """
+    assembly, starts, notes = prepare(system, parts, maps, values, seed, bench)
+    scaled = sorted({c.wire for c in assembly.connections if c.gain != 1.0})
+    if scaled:
+        notes.append(
+            f"factors are LinearTransformations, which FMPy's simulate_ssp ignores (results are wrong there): "
+            f"{', '.join(scaled)}"
+        )
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(path.suffix + ".part")
+    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in (
+            ("SystemStructure.ssd", _xml(_structure(assembly, starts))),
+            (PARAMETERS, _xml(_values(system.name, starts, prefix=True))),
+            *((f"resources/{slot}.ssv", _xml(_values(slot, {slot: v}))) for slot, v in starts.items() if v),
+            *((f"resources/{slot}.fmu", p.read_bytes()) for slot, p in assembly.paths.items()),
+        ):
+            archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
+    temporary.replace(path)
+    return notes
+
+
+def _xml(root: ET.Element) -> bytes:
+    ET.indent(root)
+    data: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return data
+
+
+def _type(parent: ET.Element, bound: Bound, namespace: str = SSC, **attributes: str) -> None:
+    if bound.unit and bound.kind == "Real":
+        attributes["unit"] = bound.unit
+    ET.SubElement(parent, f"{{{namespace}}}{bound.kind}", attributes)
+
+
+def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
+    for prefix, uri in (("ssd", SSD), ("ssc", SSC)):
+        ET.register_namespace(prefix, uri)
+    system = assembly.system
+    root = ET.Element(f"{{{SSD}}}SystemStructureDescription", version="1.0", name=system.name)
+    if system.title:
+        root.set("description", f"{system.title}; communication step {system.step:g} s")
+    top = ET.SubElement(root, f"{{{SSD}}}System", name=system.name)
+    elements = ET.SubElement(top, f"{{{SSD}}}Elements")
+    used: set[str] = set()
+    for slot in assembly.order.order:
+        component = ET.SubElement(
+            elements,
+            f"{{{SSD}}}Component",
+            name=slot,
+            type="application/x-fmu-sharedlibrary",
+            source=f"resources/{slot}.fmu",
+        )
+        ports = ET.SubElement(component, f"{{{SSD}}}Connectors")
+        for kind, bound in _ports(assembly, slot):
+            connector = ET.SubElement(ports, f"{{{SSD}}}Connector", name=bound.variable, kind=kind)
+            _type(connector, bound)
+            used.add(bound.unit)
+        if starts[slot]:
+            bindings = ET.SubElement(component, f"{{{SSD}}}ParameterBindings")
+            kind = "application/x-ssp-parameter-set"
+            ET.SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=kind, source=f"resources/{slot}.ssv")
+    connections = ET.SubElement(top, f"{{{SSD}}}Connections")
+    for c in assembly.connections:
+        element = ET.SubElement(
+            connections,
+            f"{{{SSD}}}Connection",
+            startElement=c.source,
+            startConnector=c.output.variable,
+            endElement=c.target,
+            endConnector=c.input.variable,
+        )
+        if c.gain != 1.0:
+            element.set("suppressUnitConversion", "true")
+            ET.SubElement(element, f"{{{SSC}}}LinearTransformation", factor=repr(c.gain))
+    _units(root, assembly, used)
+    ET.SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0", stopTime=repr(stop_time(system)))
+    return root
+
+
+def _ports(assembly: Assembly, slot: str) -> Iterable[tuple[str, Bound]]:
+    """Connected inputs, connected and recorded outputs; an input that is not connected keeps its start value."""
+    inputs = {c.input.variable: c.input for c in assembly.connections if c.target == slot}
+    outputs = {c.output.variable: c.output for c in assembly.connections if c.source == slot}
+    outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == slot}
+    return [*(("input", b) for b in inputs.values()), *(("output", b) for b in outputs.values())]
+
+
+def _units(root: ET.Element, assembly: Assembly, used: set[str]) -> None:
+    declared = {u.name: u.baseUnit for d in assembly.descriptions.values() for u in d.unitDefinitions if u.baseUnit}
+    element = ET.SubElement(root, f"{{{SSD}}}Units")
+    for name in sorted(used - {""}):
+        base = declared.get(name)
+        if base is not None:
+            exponents = {s: int(getattr(base, s) or 0) for s in units.BASE}
+            factor = float(base.factor)
+        else:
+            try:
+                found = units.base_unit(name)
+            except units.UnitError:
+                found = None
+            exponents, factor = found if found is not None else ({}, 1.0)
+        attributes = {s: str(e) for s, e in exponents.items() if e}
+        if factor != 1.0:
+            attributes["factor"] = repr(factor)
+        ET.SubElement(ET.SubElement(element, f"{{{SSC}}}Unit", name=name), f"{{{SSC}}}BaseUnit", attributes)
+    if not len(element):
+        root.remove(element)
+
+
+def _values(name: str, starts: Starts, prefix: bool = False) -> ET.Element:
+    ET.register_namespace("ssv", SSV)
+    root = ET.Element(f"{{{SSV}}}ParameterSet", version="1.0", name=name)
+    parameters = ET.SubElement(root, f"{{{SSV}}}Parameters")
+    for slot, values in starts.items():
+        for bound, value in values:
+            text = (
+                str(value).lower() if isinstance(value, bool) else str(value) if bound.kind != "Real" else repr(value)
+            )
+            parameter = ET.SubElement(
+                parameters, f"{{{SSV}}}Parameter", name=(f"{slot}." if prefix else "") + bound.variable
+            )
+            ET.SubElement(parameter, f"{{{SSV}}}{bound.kind}", value=text)
+    return root

@@ -1,0 +1,296 @@
+"""The linear model of a system with loops: its parts' own Jacobians, put together along its wires.
+
+A system names its loops by the input where each is opened, ``loops = {"pitch": "stabilizer.u"}``.  Every part but the
+exciter is linearized at the operating point, which is the start of the run with the outputs propagated along the
+wires; excitations come in from outside.  Two models are made:
+
+``continuous``  the wires carry every value at once: what a textbook analyses.
+``discrete``    the co-simulation itself: one macro step runs the parts in their order, each exactly discretized with
+                its inputs held; a cut wire carries the value of the step before.  The communication step and every
+                inserted delay are in it, to rounding for parts that are integrated exactly.
+
+Opened at an input, the loop is L = -(what comes back there) / (what is put in there), other loops closed.
+
+A sampled method that passes an input on has no continuous model; the discrete one takes the part's own step, where one
+step is like the next (gyrobench.linear.sampled_model).
+
+Not modelled: limits; sampled methods whose steps differ (a moving average) and foreign FMUs leave the system without a
+linear model, which is said.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.component import Component
+from gyrobench.linear.part_linearization import jacobians
+from gyrobench.linear.sampled_model import Step, sampled_step
+from gyrobench.system.sockets import socket
+from gyrobench.system.values import flatten
+from gyrobench.system.wiring import Assembly, Connection
+
+Array = NDArray[np.float64]
+SLOW = 1e-2  # rad/s: a pole nearer to the origin is an integrator of the model (an attitude, a time)
+PASSES = 3  # along the wires, to find the operating point
+
+
+class NotLinear(Exception):
+    """The system has no linear model; the text says why."""
+
+
+@dataclass
+class Block:
+    """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable"."""
+
+    slot: str
+    inputs: list[str]
+    outputs: list[str]
+    states: list[str]
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+
+    def held(self, step: float) -> tuple[Array, Array]:
+        """exp(A h) and the integral of it times B: the exact step with the inputs held."""
+        from scipy.linalg import expm
+
+        n, m = self.b.shape
+        both = np.zeros((n + m, n + m))
+        both[:n, :n], both[:n, n:] = self.a, self.b
+        full = expm(both * step)
+        return full[:n, :n], full[:n, n:]
+
+
+def operating_point(
+    assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]]
+) -> dict[str, Component]:
+    """The parts as plain classes with these parameters ("slot.name", SI, arrays nested), started and propagated.
+
+    part_of: slot -> class; raises NotLinear for a slot that has none of ours.  Raises PartError when a part refuses.
+    """
+    parts = {}
+    for slot in assembly.order.order:
+        part = part_of(slot)(slot)
+        known = {s.name for s in part.layout if s.section == "parameter"}
+        for name, value in parameters.items():
+            of, _, parameter = name.partition(".")
+            for element, x in flatten(parameter, value).items() if of == slot else ():
+                if element in known:
+                    part.set(element, float(x))
+        parts[slot] = part
+
+    def feed(slot: str) -> None:
+        for c in assembly.connections:
+            if c.target == slot:
+                parts[slot].set(c.input.variable, c.gain * parts[c.source].get(c.output.variable))
+
+    for slot in assembly.order.order:
+        feed(slot)
+        parts[slot].initialize()
+    for _ in range(PASSES):
+        for slot in assembly.order.order:
+            feed(slot)
+    return parts
+
+
+class Linear:
+    """The linear system; see the module."""
+
+    def __init__(self, assembly: Assembly, parts: Mapping[str, Component], step: float) -> None:
+        self.step = step
+        system = assembly.system
+        sources = [s for s, d in system.slots.items() if socket(d.socket).name == "Excitation"]
+        self.connections = [c for c in assembly.connections if c.target not in sources]
+        self.outside = list(
+            dict.fromkeys(f"{c.source}.{c.output.variable}" for c in self.connections if c.source in sources)
+        )
+        channels = [n for n in system.channels if n.partition(".")[0] not in sources]
+        self.shown = [n for n in channels if self._has(parts, n)]
+        self.order = [s for s in assembly.order.order if s not in sources]
+        for part in parts.values():  # outputs may look ahead within the internal step
+            part.h = step / max(1, math.ceil(step / getattr(part, "step", step) - 1e-9))
+        self.blocks = {s: self._block(s, parts[s]) for s in self.order}
+        self.sampled: dict[str, Step] = {}
+        for s in self.order:
+            try:
+                found = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+            except ValueError as error:
+                raise NotLinear(f"{s} works in samples, and {error}") from error
+            if found is not None:
+                self.sampled[s] = found
+        self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
+        self.outputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].outputs]
+        self.states = [f"{s}.{v}" for s in self.order for v in self.blocks[s].states]
+        self.k = np.zeros((len(self.inputs), len(self.outputs)))
+        self.w = np.zeros((len(self.inputs), len(self.outside)))
+        for c in self.connections:
+            row, source = self.inputs.index(f"{c.target}.{c.input.variable}"), f"{c.source}.{c.output.variable}"
+            if source in self.outside:
+                self.w[row, self.outside.index(source)] = c.gain
+            else:
+                self.k[row, self.outputs.index(source)] = c.gain
+        self.cut = [n for n in self.outputs if any(self._late(c, n) for c in self.connections)]
+
+    @staticmethod
+    def _has(parts: Mapping[str, Component], name: str) -> bool:
+        slot, _, variable = name.partition(".")
+        return any(s.name == variable and s.section == "output" for s in parts[slot].layout)
+
+    def _block(self, slot: str, part: Component) -> Block:
+        incoming = list(dict.fromkeys(c.input.variable for c in self.connections if c.target == slot))
+        wired = [c.output.variable for c in self.connections if c.source == slot]
+        outgoing = list(dict.fromkeys([*wired, *(n.partition(".")[2] for n in self.shown if n.startswith(slot + "."))]))
+        return Block(slot, incoming, outgoing, [s.name for s in part.states], *jacobians(part, incoming, outgoing))
+
+    def _late(self, c: Connection, name: str) -> bool:
+        """True when this connection takes the output ``name`` from the step before."""
+        if f"{c.source}.{c.output.variable}" != name:
+            return False
+        return self.order.index(c.source) >= self.order.index(c.target)
+
+    def _row(self, break_at: str) -> int:
+        if break_at not in self.inputs:
+            raise NotLinear(f"the loop is opened at {break_at}, which is no wired input; {', '.join(self.inputs)}")
+        return self.inputs.index(break_at)
+
+    # ------------------------------------------------------------------ models
+    def continuous(self, break_at: str | None = None) -> dict[str, Any]:
+        """A, B, C, D: from the excitations to the channels, or of the loop L opened at an input ("slot.variable")."""
+        from scipy.linalg import block_diag
+
+        blocks = [self.blocks[s] for s in self.order]
+        a, b, c, d = (block_diag(*(getattr(p, m) for p in blocks)) for m in "abcd")
+        k, w = self.k.copy(), self.w
+        back = np.zeros((0, len(self.outputs)))
+        if break_at is not None:
+            row = self._row(break_at)
+            back = k[row : row + 1].copy()
+            k[row] = 0.0
+            w = np.zeros((len(self.inputs), 1))
+            w[row] = 1.0
+        solve = np.linalg.inv(np.eye(len(self.inputs)) - k @ d)  # no algebraic loop: this is a finite sum
+        uk, uw = solve @ k @ c, solve @ w
+        cy, dy = c + d @ uk, d @ uw
+        if break_at is not None:
+            return _model(a + b @ uk, b @ uw, -back @ cy, -back @ dy, [break_at], ["L"], self.states, 0.0)
+        rows = [self.outputs.index(n) for n in self.shown]
+        return _model(a + b @ uk, b @ uw, cy[rows], dy[rows], self.outside, self.shown, self.states, 0.0)
+
+    def discrete(self, break_at: str | None = None) -> dict[str, Any]:
+        """The same for the macro step of the co-simulation; states: those of the parts and the values over cuts."""
+        names_of = {s: self.sampled[s].names if s in self.sampled else self.blocks[s].states for s in self.order}
+        all_states = [f"{s}.{v}" for s in self.order for v in names_of[s]]
+        nx, nc = len(all_states), len(self.cut)
+        n_in = 1 if break_at is not None else len(self.outside)
+        width = nx + nc + n_in
+        x = np.eye(nx, width)
+        y = np.zeros((len(self.outputs), width))
+        for j, name in enumerate(self.cut):
+            y[self.outputs.index(name), nx + j] = 1.0
+        put = np.zeros((n_in, width))
+        put[:, nx + nc :] = np.eye(n_in)
+        came = np.zeros((1, width))
+        broken = -1 if break_at is None else self._row(break_at)
+        first_x = first_u = first_y = 0
+        for slot in self.order:
+            p = self.blocks[slot]
+            u_at = slice(first_u, first_u + len(p.inputs))
+            x_at = slice(first_x, first_x + len(names_of[slot]))
+            y_at = slice(first_y, first_y + len(p.outputs))
+            u = self.k[u_at] @ y + (self.w[u_at] @ put if break_at is None else 0.0)
+            if u_at.start <= broken < u_at.stop:
+                came = u[broken - u_at.start : broken - u_at.start + 1].copy()
+                u[broken - u_at.start] = put[0]
+            own = self.sampled.get(slot)
+            ad, bd = (own.a, own.b) if own else p.held(self.step)
+            c, d = (own.c, own.d) if own else (p.c, p.d)
+            x[x_at] = ad @ x[x_at] + bd @ u
+            y[y_at] = c @ x[x_at] + d @ u
+            first_u, first_x, first_y = u_at.stop, x_at.stop, y_at.stop
+        after = np.vstack([x, y[[self.outputs.index(n) for n in self.cut]]])
+        shown = -came if break_at is not None else y[[self.outputs.index(n) for n in self.shown]]
+        n = nx + nc
+        names = ([break_at], ["L"]) if break_at is not None else (self.outside, self.shown)
+        states = [*all_states, *(f"{c} (step before)" for c in self.cut)]
+        return _model(after[:, :n], after[:, n:], shown[:, :n], shown[:, n:], *names, states, self.step)
+
+
+def _model(
+    a: Array, b: Array, c: Array, d: Array, inputs: list[str], outputs: list[str], states: list[str], step: float
+) -> dict[str, Any]:
+    """JSON-able; step: s, 0 for a continuous model."""
+    matrices = {"A": a.tolist(), "B": b.tolist(), "C": c.tolist(), "D": d.tolist()}
+    return {**matrices, "inputs": list(inputs), "outputs": list(outputs), "states": list(states), "step": step}
+
+
+def poles(model: Mapping[str, Any]) -> list[complex]:
+    """Poles in the s plane, rad/s; of a discrete model ln(z) / step, without those at z = 0 (pure delays)."""
+    found = np.linalg.eigvals(np.asarray(model["A"], float)) if model["A"] else np.zeros(0)
+    if not model["step"]:
+        return [complex(p) for p in found]
+    return [cmath.log(complex(z)) / model["step"] for z in found if abs(z) > 1e-12]
+
+
+def unstable(model: Mapping[str, Any]) -> list[complex]:
+    """Poles in the right half plane, the fastest growing first; those nearer to 0 than 0.01 rad/s do not count.
+
+    Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
+    at z = 1, by the third root of 1e-16.
+    """
+    slow = max(SLOW, 1e-5 / model["step"]) if model["step"] else SLOW
+    right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > slow and p.real > 1e-6 * abs(p)]
+    return sorted(right, key=lambda p: -p.real)
+
+
+def loops(
+    assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float
+) -> tuple[dict[str, Any], list[str]]:
+    """What run.json keeps of the linear system, and what the user should be told before the run.
+
+        {"closed": {"continuous": model, "discrete": model},
+         "loops": {name: {"break": "slot.input", "continuous": model, "discrete": model}}}
+
+    or {"missing": why} where there is none; a model is A, B, C, D with names and step.
+    """
+    from gyrobench.component import PartError
+
+    try:
+        parts = operating_point(assembly, parameters, part_of)
+        linear = Linear(assembly, parts, step)
+        kinds: list[tuple[str, Callable[..., dict[str, Any]]]] = [("discrete", linear.discrete)]
+        if not linear.sampled:
+            kinds.insert(0, ("continuous", linear.continuous))
+        found: dict[str, Any] = {
+            "closed": {kind: model() for kind, model in kinds},
+            "loops": {
+                name: {"break": at, **{kind: model(at) for kind, model in kinds}}
+                for name, at in assembly.system.loops.items()
+            },
+        }
+    except PartError as error:  # the run will say it too
+        return {"missing": str(error)}, []
+    except NotLinear as error:
+        return {"missing": str(error)}, [f"no margins from linearized parts: {error}"]
+    said = []
+    for kind, text in (("continuous", "the linear loop"), ("discrete", f"the loop with its step of {step:g} s")):
+        bad = unstable(found["closed"][kind]) if kind in found["closed"] else []
+        if bad:
+            others = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+            said.append(f"{text} is unstable: pole {_written(bad[0])}{others}; the run will show it growing")
+            break
+    return found, said
+
+
+def _written(p: complex) -> str:
+    """A pole for people: -9.1 1/s, or 2.3 ± 89j rad/s with its frequency."""
+    if abs(p.imag) < 1e-9 * abs(p):
+        return f"{p.real:+.4g} 1/s"
+    return f"{p.real:+.4g} ± {p.imag:.4g}j rad/s ({p.imag / (2.0 * np.pi):.4g} Hz)"

@@ -1,0 +1,1 @@
+"""Records: of runs, of laboratories, of recorded motions."""

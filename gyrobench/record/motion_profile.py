@@ -1,0 +1,59 @@
+"""A recorded motion of a base, from a CSV file to the parameters of the part base_motion.
+
+# instrument = vertical gyro of the ship
+time [s],pitch [deg],roll [deg],heading [deg]
+0,0.10,-1.20,45.0
+0.5,0.12,-1.35,45.1
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gyrobench.record.csv_reader import Column, DataError, read_measured
+
+POINTS = 400  # of the part base_motion
+GAP = 3.0  # intervals longer than this many median intervals are gaps
+RECORDED = 9  # its preset
+_COLUMNS = (
+    Column("time", "s", "time of the reading, rising"),
+    Column("pitch", "rad", "pitch, about x (right)", required=False),
+    Column("roll", "rad", "roll, about y (forward)", required=False),
+    Column("heading", "rad", "heading, about z (up), counter-clockwise from above", required=False),
+)
+
+
+def read_profile(file: Path, slot: str = "motion") -> dict[str, Any]:
+    """The parameters of the base_motion in ``slot`` that play the recording, its time beginning with 0.
+
+    An angle whose column is missing stays 0.  Raises DataError for unsorted times, gaps (an interval of more than 3
+    median intervals: an interpolation over it would be invented), fewer than 3 and more than 400 points, no angle at
+    all, and all that :func:`gyrobench.record.csv_reader.read_measured` refuses; OSError for a file that is not there.
+    """
+    columns, _ = read_measured(file, _COLUMNS, "time")
+    t = columns["time"]
+    angles = [columns.get(name) for name in ("pitch", "roll", "heading")]
+    problems = []
+    if all(a is None for a in angles):
+        problems.append("none of the columns pitch, roll, heading: at least one is needed")
+    if not 3 <= t.size <= POINTS:
+        advice = f"thin it to every {-(-t.size // POINTS)}th row" if t.size > POINTS else "a recording is wanted"
+        problems.append(f"{t.size} points: 3 to {POINTS} are possible; {advice}")
+    intervals = np.diff(t)
+    for k in np.flatnonzero(intervals > GAP * np.median(intervals))[:8] if t.size >= 3 else ():
+        problems.append(
+            f"a gap of {intervals[k]:.6g} s after time = {t[k]:.6g} s, where the median interval is "
+            f"{np.median(intervals):.6g} s: cut the recording there, or fill it"
+        )
+    if problems:
+        raise DataError(file, problems)
+    table = np.column_stack([np.zeros(t.size) if a is None else a for a in angles])
+    return {
+        f"{slot}.preset": RECORDED,
+        f"{slot}.points": int(t.size),
+        f"{slot}.profile_t": (t - t[0]).tolist(),
+        f"{slot}.profile": table.tolist(),
+    }

@@ -1,0 +1,96 @@
+"""Several runs of one system as one record, a day each: repeats whose turn-on constants were drawn anew.
+
+A CSV file with the one column ``run`` names their folders (from where the file is, or from the working folder):
+
+    run
+    reports/out/eight_position/1a2b3c4d
+    reports/out/eight_position/5e6f7a8b
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gyrobench.record.csv_reader import DataError, read_lines
+from gyrobench.record.record import Record, RecordError
+
+DAY = 86400.0  # s
+FREE = ("seed", "date", "operator", "note")  # may differ from day to day
+
+
+def combine(records: Sequence[Record], names: Sequence[str], source: Path | str = "runs") -> Record:
+    """One record; its plan rows carry ``day``, its phases count on, its days start a whole day apart or more.
+
+    Raises DataError for records of different systems, options or true parameters, or incomplete ones.
+    """
+    first = records[0]
+    problems, plan, blocks = [], [], []
+    phase, start = 0, 0.0
+    for record, name in zip(records, names, strict=True):
+        problems += [f"{name}: {text}" for text in _differences(first, record)]
+        w = record.windows
+        if "t_end" not in w or not len(w["t_end"]):
+            problems.append(f"{name}: holds no windows")
+            continue
+        rows = [{**r, "phase": int(r["phase"]) + phase, "day": str(r.get("day") or name)} for r in record.meta["plan"]]
+        moved = {n: np.asarray(v) + start if n in ("t_start", "t_end") else np.asarray(v) for n, v in w.items()}
+        blocks.append({**moved, "phase": np.asarray(w["phase"]) + phase})
+        plan += rows
+        phase = max(r["phase"] for r in rows)
+        start = DAY * np.ceil((float(np.max(moved["t_end"])) + 1.0) / DAY)
+    if problems:
+        raise DataError(source, problems)
+    common = [n for n in blocks[0] if all(n in b for b in blocks)]
+    windows = {n: np.concatenate([b[n] for b in blocks]) for n in common}
+    runs = [{k: r.meta[k] for k in FREE if k in r.meta} | {"run": n} for r, n in zip(records, names, strict=True)]
+    return Record(windows, {}, {**first.meta, "plan": plan, "days": runs})
+
+
+def _differences(first: Record, other: Record) -> list[str]:
+    a, b = first.meta, other.meta
+    if a.get("system") != b.get("system"):
+        return [f"is a run of {b.get('system')}, the first is one of {a.get('system')}"]
+    found = [] if other.complete else ["the run is not complete"]
+    for kind in ("options", "parameters"):
+        x, y = _flat(a.get(kind)), _flat(b.get(kind))
+        names = [n for n in sorted(x.keys() | y.keys()) if x.get(n) != y.get(n) and not n.endswith(".seed")]
+        if names:
+            shown = ", ".join(f"{n} = {y.get(n)} (first: {x.get(n)})" for n in names[:4])
+            found.append(f"other {kind}: {shown}" + (f" and {len(names) - 4} more" if len(names) > 4 else ""))
+    return found
+
+
+def _flat(values: Any) -> dict[str, Any]:
+    return dict(values) if isinstance(values, dict) else {}
+
+
+def read_runs(file: Path, system: str) -> Record | None:
+    """The runs that ``file`` lists as one record; None when it is no list of runs.
+
+    Raises DataError for folders that are no runs of ``system``, a run named twice, or fewer than two.
+    """
+    lines = [t.strip() for t in read_lines(file)]
+    lines = [t for t in lines if t and not t.startswith("#")]
+    if not lines or lines[0].strip('"') != "run":
+        return None
+    names = [t.strip('"') for t in lines[1:]]
+    problems = [f"{n}: named twice" for n in sorted({n for n in names if names.count(n) > 1})]
+    if len(names) < 2:
+        problems.append(f"{len(names)} run: at least two are needed, a day each")
+    records = []
+    for n in names:
+        folder = Path(file).parent / n
+        try:
+            records.append(Record.load(folder if folder.exists() else Path(n)))
+        except RecordError as error:
+            problems.append(str(error))
+            continue
+        if records[-1].meta.get("system") != system:
+            problems.append(f"{n}: is a run of {records[-1].meta.get('system')}, not of {system}")
+    if problems:
+        raise DataError(file, problems)
+    return combine(records, [Path(n).name for n in names], file)

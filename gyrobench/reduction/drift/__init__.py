@@ -1,0 +1,1 @@
+"""Reductions of drift tests: regressors, harmonics, composite drift."""

@@ -1,0 +1,108 @@
+"""Composite drift of a record in one attitude: systematic and random part, correlation.  [TEST-COMPOSITE]
+
+    mean = sum d_i / n     sigma = sqrt( sum_{i=1..n} (d_i - mean)^2 / (n - 1) )            (E45: sum to n)
+    C(q) = 1/(n - q) sum_{i=1..n-q} (d_i - mean)(d_{i+q} - mean),   correlation C(q)/C(0)   (E46: less the mean)
+
+d_i are drift rates over windows of the same length dT, Earth rate removed; what repeats with the table angle must be
+removed by the caller.  sigma depends on dT.  Lags to n/4.  [000_791234d3afc34a0c.txt eq. 3-91..3-93]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+LEAST = 10  # windows
+
+
+@dataclass(frozen=True)
+class Composite:
+    """SI.  correlation[q] at the lag q dT, q = 0..n/4; time: first lag with a correlation below 1/e, None where there
+    is none up to n/4.
+    """
+
+    n: int
+    dT: float
+    mean: float
+    sigma: float
+    correlation: Array
+    time: float | None
+
+
+def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list[str]:
+    """Why there are no composite statistics, as sentences.  earth: Earth rate along the input axis, rad/s."""
+    found = []
+    if d.size < LEAST:
+        found.append(f"{d.size} windows: at least {LEAST} are needed")
+        return found
+    if not np.all(np.isfinite(d)):
+        return ["a drift rate is no finite number"]
+    length = t_end - t_start
+    if np.ptp(length) > 0.01 * np.median(length) or np.any(np.abs(t_start[1:] - t_end[:-1]) > 0.01 * length[1:]):
+        found.append("windows of different length or with gaps: σ and correlation need one ΔT")
+    if np.ptp(d) <= 1e-12 * float(np.max(np.abs(d))):
+        found.append("a constant series has no correlation: the data are not measured, or the quantum hides the drift")
+    if abs(earth) > 1e-7 and abs(float(np.mean(d)) + earth) < 0.2 * abs(earth):
+        found.append(
+            f"the mean {np.degrees(float(np.mean(d))) * 3600.0:.4g} °/h is the table's own turn against the Earth: add "
+            f"the Earth rate along the input axis, {np.degrees(earth) * 3600.0:.4g} °/h"
+        )
+    return found
+
+
+def composite(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> Composite:
+    """Statistics of the drift rates ``d`` (n,), rad/s.  Raises ReductionError with :func:`problems`."""
+    if wrong := problems(d, t_start, t_end, earth):
+        raise ReductionError(wrong)
+    n, dT = d.size, round(float(np.median(t_end - t_start)), 9)
+    mean = float(np.mean(d))
+    rest = d - mean
+    c = np.array([float(rest[: n - q] @ rest[q:]) / (n - q) for q in range(n // 4 + 1)])
+    rho = c / c[0]
+    below = np.flatnonzero(rho < math.exp(-1.0))
+    sigma = math.sqrt(float(rest @ rest) / (n - 1))
+    return Composite(n, dT, mean, sigma, rho, float(below[0]) * dT if below.size else None)
+
+
+def tables(found: Mapping[str, Composite | str], scale: float, unit: str) -> list[dict[str, Any]]:
+    """What was found in each series (a sentence where there is nothing), and the correlations, for Result.tables."""
+    rows: list[list[Any]] = []
+    for label, c in found.items():
+        if isinstance(c, str):
+            rows.append([label, "", "", "", "", c])
+        else:
+            time = c.time if c.time is not None else f"> {(c.correlation.size - 1) * c.dT:g}"
+            rows.append([label, c.n, c.dT, c.mean / scale, c.sigma / scale, time])
+    dTs = sorted({c.dT for c in found.values() if not isinstance(c, str)})
+    caption = "Mean: can be compensated; σ: the random drift, of windows of " + (
+        ", ".join(f"{t:g} s" for t in dTs) or "no length"
+    )
+    head = ["series", "windows", "ΔT / s", f"mean / ({unit})", f"σ / ({unit})", "correlation below 1/e after / s"]
+    out = [{"title": "Composite drift", "caption": caption, "columns": head, "rows": rows}]
+    whole = {n: c for n, c in found.items() if not isinstance(c, str)}
+    if whole:
+        lags = _shown(max(c.correlation.size for c in whole.values()))
+        body = [[q, *(float(c.correlation[q]) if q < c.correlation.size else "" for c in whole.values())] for q in lags]
+        head = ["lag / ΔT", *whole]
+        if len(whole) > 4:  # a page holds few columns: the series go down, the first lags across
+            across = lags[:8]
+            body = [
+                [n, *(float(c.correlation[q]) if q < c.correlation.size else "" for q in across)]
+                for n, c in whole.items()
+            ]
+            head = ["series, at lag / ΔT =", *(str(q) for q in across)]
+        caption = "Autocovariance over that at lag 0, to a quarter of the windows"
+        out.append({"title": "Correlation of the random part", "caption": caption, "columns": head, "rows": body})
+    return out
+
+
+def _shown(n: int, most: int = 25) -> Sequence[int]:
+    return sorted({*range(min(n, 11)), *np.unique(np.linspace(0, n - 1, most).round().astype(int)).tolist()})

@@ -1,0 +1,217 @@
+"""Tests in which the gyro holds the table, torquer idle: the table rate tells the drift.  [spec d1, 5.0; eq. 3-59]
+
+    theta' + omega_E,x = omega_d = -omega_M         theta right-handed about the input axis x, which is the table axis
+
+omega_d is the drift of gyrobench.drift in precession sign, omega_M the book's in torque sign (BOOK maps one to the
+other, CROSS-MAP).  A window says what the table turned from its first to its last reading, so the data are exact means,
+and neighbours share a reading.  Regressors are averaged over the window as the data are.
+
+Not modelled: change of the rate inside a window beyond an even turn, and J/H times the angular acceleration of the case
+about the output axis, which the gyro cannot tell from a rate: (J/H) theta' (c omega_E,z - s omega_E,y), with the Earth
+rate along y and z at angle 0; 5e-7 deg/h at most, nothing with the table axis along the pole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames
+from gyrobench.reduction import window_checks
+from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.estimation.fit_result import Effect, Findings
+from gyrobench.reduction.run_metadata import Site
+
+Array = NDArray[np.float64]
+REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
+SMALL = 1e-5  # rad, step of the geometric perturbations
+TRACKING = 2.0 / 3600.0 * np.pi / 180.0  # rad, the book's limit of the table against the gyro
+
+#: our name -> the book's, and the sign of the book's against ours  [CROSS-MAP]; D_O is empirical, after eq. 2-40
+BOOK: dict[str, tuple[str, int]] = {
+    "D_F": ("R", -1), "D_I": ("U_z", -1), "D_O": ("U_y", -1), "D_S": ("U_x", 1), "D_II": ("K_zx", -1),
+    "D_SS": ("K_xz", 1), "D_IO": ("K_zy", -1), "D_OS": ("K_xy", 1), "D_IS": ("ΔK", -1),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Held:
+    """Windows of a held table: angles (n,) rad, times (n,) s, and the gyro axes x, y, z (rows, in ENU) at angle 0 of
+    each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.
+    """
+
+    angle_start: Array
+    angle_end: Array
+    t_start: Array
+    t_end: Array
+    axes: Array
+    body: Array | None = None
+
+    @property
+    def rate(self) -> Array:
+        """Mean table rate of each window (n,), rad/s."""
+        out: Array = (self.angle_end - self.angle_start) / (self.t_end - self.t_start)
+        return out
+
+    def seen(self, local: Array) -> Array:
+        """A vector in ENU in gyro axes at the 12 nodes of each window: (n, 12, 3)."""
+        v = self.axes @ local
+        a = window_regressors.Turning(self.angle_start, self.angle_end, self.t_start, self.t_end, self.axes).nodes()
+        c, s = np.cos(a), np.sin(a)
+        x, y, z = (v[:, k, None] for k in range(3))
+        out: Array = np.stack([np.broadcast_to(x, a.shape), c * y + s * z, c * z - s * y], axis=-1)
+        return out if self.body is None else np.asarray(out @ self.body.T)
+
+
+def drift_rate(held: Held, site: Site) -> Array:
+    """The data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
+    earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
+    along = 1.0 if held.body is None else held.body[0, 0]
+    out: Array = earth + along * held.rate
+    return out
+
+
+def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
+    """Window means (n, p) of the drift regressors ``names``."""
+    return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
+
+
+def window_problems(
+    windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
+) -> list[str]:
+    """What is wrong with the rows of the held phases, as sentences."""
+    for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
+        windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
+    found = window_checks.window_problems(windows, required)
+    if found:
+        return found
+    there = set(np.asarray(windows["phase"]).astype(int).tolist())
+    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in there]
+    return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
+
+
+def tracking_problems(
+    windows: Mapping[str, Array], rows: NDArray[np.bool_], parameters: Mapping[str, Any], limit: float
+) -> list[str]:
+    """Where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and std) and
+    the gain of the gyro, as far as both are known.
+    """
+    gain = parameters.get("gyro.K_sg", 0.0) * parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or 1.0)
+    if not gain or "mean" not in windows or not limit > 0.0:
+        return []
+    size = (np.abs(windows["mean"]) + np.nan_to_num(windows["std"])) / gain
+    bad = np.flatnonzero(rows & (size > limit))
+    if not bad.size:
+        return []
+    arcsec = np.degrees(float(np.max(size[bad]))) * 3600.0
+    return [
+        f"the table is up to {arcsec:.3g} arcsec away from the gyro in {bad.size} windows (first: row {bad[0] + 1}); "
+        f"{np.degrees(limit) * 3600.0:.3g} arcsec are allowed: friction or torque ripple too large for the loop"
+    ]
+
+
+def effects(
+    held: Held, site: Site, found: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
+    sizes: Mapping[str, float],
+) -> list[Effect]:  # fmt: skip
+    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+
+    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
+    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
+    columns: what is fitted.
+    """
+    y, X = drift_rate(held, site), columns(held)
+
+    def moved(other: Held, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        dy, dX = np.zeros_like(y), np.zeros_like(X)
+        dy[rows] = (drift_rate(other, site) - y)[rows]
+        dX[rows] = (columns(other) - X)[rows]
+        return found.change(dy, dX) / SMALL
+
+    def axis(k: int) -> Array:
+        tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
+        return np.array([moved(tilted, phase == p) for p in np.unique(phase)])
+
+    def wobble() -> Array:  # q about y, z is (cos, sin) of 2 theta + phase, as of the part axis_wobble
+        middle = held.angle_start + held.angle_end
+        cases = []
+        for a in (middle, middle + np.pi / 2.0):
+            q = np.column_stack([np.zeros_like(a), np.cos(a), np.sin(a)])
+            # the reduction takes the axis as still: against the axis as it is, it is turned by -q
+            turned = held.axes + SMALL * np.cross(q[:, None, :], np.swapaxes(held.axes, 1, 2)).swapaxes(1, 2)
+            cases.append(moved(replace(held, axes=turned)))
+        return np.array(cases)
+
+    def order(n: int) -> Array:
+        length = held.t_end - held.t_start
+        ends = n * held.angle_start, n * held.angle_end
+        return np.array([found.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
+
+    def unbalance() -> Array:
+        down = held.axes @ np.array([0.0, 0.0, -site.g])
+        ends = []
+        for a in (held.angle_start, held.angle_end):
+            c, s = np.cos(a), np.sin(a)
+            ends.append((c * down[:, 1] + s * down[:, 2], c * down[:, 2] - s * down[:, 1]))
+        length = held.t_end - held.t_start
+        return np.array([found.change((late - early) / length) for early, late in zip(*ends, strict=True)])
+
+    def mount(k: int) -> Array:
+        return moved(replace(held, body=frames.rotation(np.eye(3)[k], SMALL)))
+
+    return [
+        Effect("table axis about y", sizes["u_axis"], "rad", axis(1), "each phase set up by itself"),
+        Effect("table axis about z", sizes["u_axis"], "rad", axis(2), "each phase set up by itself"),
+        Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), "each phase set up by itself"),
+        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble()),
+        Effect("input axis towards output axis", sizes["u_mount"], "rad", mount(2)),
+        Effect("input axis towards spin axis", sizes["u_mount"], "rad", mount(1)),
+        Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder"),
+        Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder"),
+        Effect("unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis"),
+        Effect("time base", sizes["u_time"], "1", found.change(-held.rate), "relative"),
+    ]
+
+
+def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The estimates in the book's names and torque sign.  combined: our name -> the book's words for a combination."""
+    rows: list[list[Any]] = []
+    for q, value, u in zip(found.quantities, found.value.tolist(), found.u.tolist(), strict=True):
+        if q.name in BOOK:
+            symbol, sign = BOOK[q.name]
+            words = (combined or {}).get(q.name, symbol)
+            rows.append([words, sign * value / q.scale, u / q.scale, q.unit, q.title, "+" if sign > 0 else "−"])
+    return {
+        "title": "In the book's names",
+        "caption": "Torque sign, ω_M = −ω_d; last column: sign of the book's against ours",
+        "columns": ["book", "estimate", "u of type A", "unit", "ours", "sign"],
+        "rows": rows,
+    }
+
+
+CONVENTIONS = (
+    "Drift ω_d in precession sign: table rate plus Earth rate along the input axis; the book's ω_M = −ω_d.",
+    "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
+    "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+    "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
+    "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
+)
+
+
+def equation(names: Sequence[str]) -> str:
+    """Typst math of the measurement equation with the terms ``names``."""
+    axis = {"I": "X", "O": "Y", "S": "Z"}
+    parts = []
+    for n in names:
+        index = n[2:]
+        if n == "D_F":
+            parts.append("D_F")
+        elif len(index) == 2 and index[0] == index[1]:
+            parts.append(f'D_"{index}" {axis[index[0]]}^2')
+        else:
+            parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(axis[a] for a in index))
+    return 'dot(theta) + omega_"E,x" = omega_d, quad omega_d = ' + " + ".join(parts)

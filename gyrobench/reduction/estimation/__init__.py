@@ -1,0 +1,1 @@
+"""Estimation: regression, noise models, uncertainties, intervals."""

@@ -1,0 +1,185 @@
+"""From a linear fit to a result: what every test method needs beside its design matrix, its formulas and its tables.
+
+    found = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
+    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.change(-k * current))]
+    result = linear_result(found, system="...", title="...", ..., effects=effects, specification=limits)
+
+Two channels measured at once: one result each, then gyrobench.reduction.merge_channels.  Everything inside is SI;
+what a
+Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.estimation import regression, uncertainty
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.result import BudgetLine, Coefficient, Result
+from gyrobench.reduction.window_checks import ReductionError
+
+__all__ = ["Effect", "Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+CONDITION = 100.0  # above this a warning names the weakest direction
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One source of type B: its standard uncertainty and the change (q,) of each estimate (SI) for one unit of it,
+    as :meth:`Findings.change` gives it; (m, q) for m errors of this size that have nothing to do with one another.
+    """
+
+    source: str
+    size: float
+    unit: str
+    change: Array
+    note: str = ""
+
+    @property
+    def sensitivity(self) -> Array:
+        """(q,) SI per unit of the source, without sign; independent errors add as squares."""
+        out: Array = np.sqrt(np.sum(np.square(np.atleast_2d(self.change)), axis=0))
+        return out
+
+
+def linear_result(
+    found: Findings, *, system: str, title: str, method: str, sources: Sequence[str], equation: str,
+    conventions: Sequence[str], effects: Sequence[Effect] = (), specification: Limits | None = None,
+    site: Mapping[str, Any] | None = None, instrument: str = "", simulated: bool | None = None,
+    no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
+    harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
+    warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
+) -> Result:  # fmt: skip
+    """The result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
+
+    equation: Typst math.  conventions, warnings, summary: sentences.  specification: name -> limits in the printed
+    unit.  no_closed: why there are no values of the book's formulas, if there should be.  tables: the method's own,
+    {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
+    simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
+    """
+    coefficients = [_coefficient(found, j, effects, specification or {}) for j in range(len(found.quantities))]
+    design = found.est.design
+    said = [*found.est.warnings, *found.warnings()]
+    if no_closed:
+        said.append(f"No closed formulas: {no_closed}.")
+    if design.condition > CONDITION:
+        said.append(f"Condition {design.condition:.3g}: hardly seen is {design.weakest}.")
+    return Result(
+        system=system,
+        title=title,
+        method=method,
+        sources=list(sources),
+        equation=equation,
+        conventions=list(conventions),
+        coefficients=coefficients,
+        series=found.series(),
+        correlation=regression.correlation(found.reported.covariance).tolist(),
+        condition=design.condition,
+        rank=design.rank,
+        dof=float(found.y.size - found.X.shape[1]),
+        noise=found.noise(),
+        tests=list(found.tests),
+        residual_std=found.residual_std,
+        residual_unit=found.y_unit,
+        acf=found.acf(),
+        allan=found.allan(),
+        psd=found.psd(),
+        harmonics=list(harmonics),
+        budget=_budget(found, effects, random),
+        type_b=_type_b(found, effects),
+        repeatability=dict(repeatability or {}),
+        tables=[*_closed_table(found, closed_caption), *tables],
+        warnings=[*said, *warnings],
+        summary=list(summary),
+        decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        site=dict(site or {}),
+        instrument=instrument,
+        simulated=any(q.truth is not None for q in found.quantities) if simulated is None else simulated,
+    )
+
+
+def plus_minus(c: Coefficient) -> str:
+    """ "−0.3001 ± 0.0023 °/h (95 %)": expanded uncertainty with two digits."""
+    U = c.k * c.u
+    if not U > 0.0 or not math.isfinite(U):
+        return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
+    digits = max(0, 1 - math.floor(math.log10(U)))
+    return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
+
+
+def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Limits) -> Coefficient:
+    q, r = found.quantities[j], found.reported
+    contributions = [float(e.sensitivity[j]) * e.size for e in effects]
+    u, U = uncertainty.combine(float(r.u[j]), float(r.half_width[j]), contributions)
+    limit = limits.get(q.title, limits.get(q.name))
+    estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
+    truth = None if q.truth is None else q.truth / q.scale
+    u_a, dof = float(r.u[j]) / q.scale, float(r.dof[j])
+    c = Coefficient(
+        name=q.title,
+        meaning=q.meaning,
+        unit=q.unit,
+        estimate=estimate,
+        u=u_s,
+        k=U / u if u > 0.0 else uncertainty.NORMAL,
+        interval=(estimate - U_s, estimate + U_s),
+        t=estimate / u_a if u_a > 0.0 else None,
+        p=float(r.p[j]) if u_a > 0.0 else None,
+        u_a=u_a,
+        dof=dof if math.isfinite(dof) else None,
+        closed=None if q.closed is None else q.closed / q.scale,
+        truth=truth,
+        z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
+        limit=limit,
+        verdict=uncertainty.verdict(estimate, U_s, limit),
+        combination=dict(q.combination or {q.name: 1.0}),
+    )
+    return replace(c, z=None) if found.ideal else c  # u is rounding: nothing to compare with
+
+
+def _budget(found: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
+    lines = []
+    note = "type A, from the residuals" + ("" if found.white else " under the estimated noise")
+    for j, q in enumerate(found.quantities):
+        u_a = float(found.u[j]) / q.scale
+        lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
+        for e in effects:
+            change = float(e.sensitivity[j]) / q.scale
+            if e.size > 0.0 and change * e.size > 1e-9 * u_a:
+                per = q.unit if e.unit == "1" else f"{q.unit}/{e.unit}"
+                lines.append(
+                    BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, q.unit, q.title, e.note)
+                )
+    return lines
+
+
+def _type_b(found: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+    """The standard uncertainties of the sources with their signs, which the budget does not show: what one source does
+    to two estimates belongs together.
+    """
+    scale = np.array([q.scale for q in found.quantities])
+    return [
+        {"source": e.source, "changes": (np.atleast_2d(e.change) * e.size / scale).tolist()}
+        for e in effects
+        if e.size > 0.0
+    ]
+
+
+def _closed_table(found: Findings, caption: str) -> list[dict[str, Any]]:
+    rows: list[list[Any]] = []
+    for j, q in enumerate(found.quantities):
+        if q.closed is not None:
+            a, b = float(found.value[j]) / q.scale, q.closed / q.scale
+            rows.append([q.name, a, b, a - b, float(found.u[j]) / q.scale, q.unit])
+    head = ["coefficient", "least squares", "closed formula", "difference", "u", "unit"]
+    title = "Least squares and closed formulas"
+    return [{"title": title, "caption": caption, "columns": head, "rows": rows}] if rows else []

@@ -1,0 +1,344 @@
+"""A linear fit of averaged data with everything a report shows beside its coefficients.
+
+    found = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
+    found.f_test("harmonics 3 and higher", columns, ...)
+    found.gain, found.value, found.u ...                    all in SI, in the order of ``found.quantities``
+
+Groups are the phases of a plan: rows of the data that are drawn together, against an angle, a time or a number.
+Where what is wanted is a function of what the data are linear in (R = (R/k)/(1/k)), :meth:`Findings.derive` turns
+the one into the other with uncertainties to first order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from gyrobench import drift, units
+from gyrobench.reduction.estimation import noise as noise_model
+from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation import residual_series as series
+from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.result import Series, Test
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+RAW = "Ljung-Box, residuals"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity that is estimated: its name, what it means, its printed unit and that unit's size in SI.
+
+    truth and closed (the book's formula on the same data): SI, None where there is none.  shown: the printed name
+    where it differs, as for the combination that a coefficient stands for; limits are looked up under both.
+    combination: coefficient of the drift model -> its factor in it (per g0^n); empty: it is the one of its name.  Where
+    |f| is the same in all attitudes D_OO (Dx_yy, Dy_xx) is folded into the others and left out.
+    """
+
+    name: str
+    meaning: str
+    unit: str  # "°/h/g"
+    scale: float
+    truth: float | None = None
+    closed: float | None = None
+    shown: str = ""
+    combination: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, name: str, meaning: str, unit: str, truth: float | None = None, closed: float | None = None
+    ) -> Quantity:
+        """With the printed form and the size of a unit that gyrobench.units knows: "deg/h", "mA", "arcsec"."""
+        return cls(name, meaning, units.display(unit), units.factor(unit), truth, closed)
+
+    @classmethod
+    def drift(cls, name: str, truth: float | None = None, closed: float | None = None, meaning: str = "") -> Quantity:
+        """A drift coefficient in rad/s per g0^n: D_F, D_IS ..., or Dx_0, Dy_yz ... of a channel."""
+        unit = units.display(drift.surface_unit(name))
+        return cls(name, meaning or drift.meaning(name), unit, units.factor("deg/h"), truth, closed)
+
+    @property
+    def title(self) -> str:
+        return self.shown or self.name
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows of the data that belong together, with what they are drawn against (in the printed unit)."""
+
+    label: str  # "mount 1, against the Earth"
+    rows: ArrayLike  # indices of the rows, or a mask
+    x: ArrayLike  # one for each row
+    x_name: str  # "table angle"
+    x_unit: str  # "°"
+    dense: tuple[ArrayLike, ArrayLike] | None = None  # x and rows of X of the plotted curve
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What is reported, in SI, in the order of the quantities; see correlated.Estimate."""
+
+    value: Array
+    covariance: Array
+    u: Array
+    half_width: Array
+    p: Array
+    dof: Array
+    gain: Array  # (q, n): value = gain y, of changes if the values are derived
+
+
+def fit(
+    quantities: Sequence[Quantity | str], X: Array, y: Array, t_start: Array | None, t_end: Array | None,
+    groups: Sequence[Group], y_name: str, y_unit: str, y_scale: float, *, noise: str = "estimated",
+    weights: Array | None = None, limit: float = 1e3,
+) -> Findings:  # fmt: skip
+    """Least squares of ``y = X a + noise``: X (n, p), y (n,) in SI, means over windows [t_start, t_end] (s).
+
+    quantities: one for each column; a name alone for an unknown that is only a step to a derived quantity.
+    noise: "estimated" (white, Gauss-Markov or both, from the data; wants some tens of windows) or "white" (assumed;
+    few readings; then ``weights`` (n,) may be given, and times may be None); "readings": estimated, of data that are
+    differences of readings at t_start and t_end (angles over time).  limit: largest condition number.
+    Raises ReductionError for data that cannot carry the model.
+    """
+    n = len(y)
+    if t_start is None or t_end is None:
+        t_start, t_end = np.arange(n, dtype=float), np.arange(n, dtype=float) + 1.0
+    known = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in quantities)
+    names = [q.name for q in known]
+    try:
+        if noise == "white":
+            est = noise_mixture_fit.ordinary(X, y, names, t_start, t_end, weights, limit)
+        elif noise in ("estimated", "readings") and weights is None:
+            est = noise_mixture_fit.fit(X, y, names, t_start, t_end, limit, noise == "readings")
+        else:
+            raise ValueError(f"noise '{noise}': 'estimated', 'readings', or 'white' with or without weights")
+    except RegressionError as error:
+        raise ReductionError(str(error)) from None
+    reported = Estimates(est.beta, est.covariance, est.u, est.half_width, est.p, est.dof, est.gain)
+    return Findings(
+        known, X, y, t_start, t_end, est, reported, list(groups), y_name, y_unit, y_scale, noise == "white", weights
+    )
+
+
+@dataclass
+class Findings:
+    """A fit and what its residuals say; made by :func:`fit`.  Data in SI, what is shown in the unit of the data."""
+
+    quantities: tuple[Quantity, ...]
+    X: Array
+    y: Array
+    t_start: Array
+    t_end: Array
+    est: noise_mixture_fit.Estimate  # of the linear unknowns
+    reported: Estimates
+    groups: list[Group]
+    y_name: str
+    y_unit: str
+    y_scale: float
+    white: bool  # assumed, not estimated
+    weights: Array | None = None
+    tests: list[Test] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        dof = self.y.size - self.X.shape[1]
+        residual = self.est.residual / self.y_scale
+        self.residual_std = math.sqrt(float(np.sum(self.est.residual**2)) / dof) / self.y_scale
+        self.stretches = series.stretches(self.t_start, self.t_end, residual)
+        self.ideal = self.residual_std * self.y_scale <= 1e-12 * float(np.max(np.abs(self.y)))
+        if not self.tests:
+            self.tests = self._residual_tests()
+
+    @property
+    def value(self) -> Array:
+        return self.reported.value
+
+    @property
+    def u(self) -> Array:
+        return self.reported.u
+
+    @property
+    def gain(self) -> Array:
+        """(q, n): how the reported values change with the data."""
+        return self.reported.gain
+
+    def change(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
+        """Change (q,) of the reported values, to first order, when the data and the design were wrong by dy, dX."""
+        wrong = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
+        out: Array = self.gain @ (wrong if dX is None else wrong - dX @ self.est.beta)
+        return out
+
+    def derive(self, quantities: Sequence[Quantity], function: Callable[[Array], ArrayLike]) -> Findings:
+        """The same fit reported as ``function`` (of the linear unknowns, SI) with uncertainties to first order."""
+        r, beta = self.est, self.est.beta
+        size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
+        value = np.atleast_1d(np.asarray(function(beta), dtype=float))
+        if value.size != len(quantities):
+            raise ValueError(f"{len(quantities)} quantities for {value.size} values")
+        J = np.empty((value.size, beta.size))
+        for j in range(beta.size):
+            step = np.zeros_like(beta)
+            step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
+            high, low = np.asarray(function(beta + step)), np.asarray(function(beta - step))
+            J[:, j] = (high - low) / (2.0 * step[j])
+        sd, half = r.mixture.spread(J)
+        u = np.minimum(sd, half / noise_mixture_fit.NORMAL)
+        size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
+        covariance = (J @ r.covariance @ J.T) * np.outer(size, size)
+        dof = noise_mixture_fit.dof_of(half / np.maximum(u, 1e-300))
+        p = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
+        reported = Estimates(value, covariance, u, half, p, dof, J @ r.gain)
+        return replace(self, quantities=tuple(quantities), reported=reported, tests=list(self.tests))
+
+    # ------------------------------------------------------------------------------------------ plots
+    def series(self) -> list[Series]:
+        """Data against what each group is drawn against, with fit, residual and the dense curve."""
+        out = []
+        fitted, middle = self.y - self.est.residual, (self.t_start + self.t_end) / 2.0
+        for g in self.groups:
+            rows = np.asarray(g.rows)
+            rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+            x = np.asarray(g.x, dtype=float)
+            turn = np.argsort(x, kind="stable")
+            x, rows = x[turn], rows[turn]
+            s = Series(
+                label=g.label, x=x.tolist(), x_name=g.x_name, x_unit=g.x_unit, y=(self.y[rows] / self.y_scale).tolist(),
+                fit=(fitted[rows] / self.y_scale).tolist(), residual=(self.est.residual[rows] / self.y_scale).tolist(),
+                y_name=self.y_name, y_unit=self.y_unit, t=middle[rows].tolist(),
+            )  # fmt: skip
+            if g.dense is not None:
+                s.shown_fit_x = np.asarray(g.dense[0], dtype=float).tolist()
+                s.shown_fit_y = (np.asarray(g.dense[1], dtype=float) @ self.est.beta / self.y_scale).tolist()
+            out.append(s)
+        return out
+
+    def _parts(self, values: Array) -> list[Array]:
+        """Stretches of neighbouring windows; readings that all stand alone count as one, in the order taken."""
+        parts = [v for _, v in series.stretches(self.t_start, self.t_end, values)]
+        return [values] if self.white or max(p.size for p in parts) < 3 else parts
+
+    def acf(self) -> dict[str, list[float]]:
+        parts = self._parts(self.est.residual / self.y_scale)
+        return series.autocorrelation(parts, min(40, max(max(p.size for p in parts) // 2, 1)))
+
+    def allan(self) -> dict[str, Any]:
+        found = {} if self.ideal else series.allan(self.stretches)
+        return {**found, "unit": self.y_unit} if found else {}
+
+    def psd(self) -> dict[str, Any]:
+        found = {} if self.ideal else series.spectrum(self.stretches)
+        return {**found, "unit": f"({self.y_unit})²/Hz"} if found else {}
+
+    # ------------------------------------------------------------------------------------------ noise
+    def noise(self) -> dict[str, Any]:
+        """The noise model of the estimation; units in the keys."""
+        e, unit, scale = self.est, self.y_unit, self.y_scale
+        if self.white:
+            found: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
+            return {**found, f"standard deviation / ({unit})": self.residual_std}
+        share = e.best[1]
+        model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
+        model += " with reading errors" if e.reading > 0.0 else ""
+        found = {
+            "model": "none (ideal data)" if self.ideal else model,
+            "weight of white noise alone": e.white,
+            f"white density / ({unit}/√Hz)": e.density[0] / scale,
+            f"white density, 90 % range / ({unit}/√Hz)": [v / scale for v in e.density[1:]],
+            f"Gauss-Markov rms / ({unit})": e.sigma[0] / scale,
+            f"Gauss-Markov rms, 90 % range / ({unit})": [v / scale for v in e.sigma[1:]],
+        }
+        if e.sigma_reading[2] > 0.0:
+            found[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
+            found[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
+        if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
+            found["correlation time / s"] = e.tau[0]
+            found["correlation time, 90 % range / s"] = list(e.tau[1:])
+        return found
+
+    def noise_sentence(self, what: str = "windows") -> str:
+        """The scatter in words, for the summary."""
+        text = f"Residual scatter of the {what} {self.residual_std:.3g} {self.y_unit}"
+        if self.ideal:
+            return text + ", rounding only."
+        if self.white:
+            return text + ", taken as white noise."
+        if self.est.best[1] == 0.0:
+            more = " and errors of the readings" if self.est.reading > 0.0 else ""
+            return text + f", compatible with white noise{more}."
+        return text + f", correlated over about {self.est.tau[0]:.3g} s; the intervals allow for it."
+
+    # ------------------------------------------------------------------------------------------ tests
+    def _residual_tests(self) -> list[Test]:
+        if self.ideal:
+            return []
+        n, e = self.y.size, self.est
+        lags = min(20, max(n // 5, 3))
+        q, p = series.ljung_box(series.autocorrelation(self._parts(e.residual / self.y_scale), lags), n, lags)
+        text = (
+            "no correlation seen"
+            if p >= 0.05
+            else "the noise is correlated, the intervals for white noise are too narrow"
+            if self.white
+            else "the noise is correlated; ordinary least squares would be too sure of itself"
+        )
+        found = [Test(RAW, q, p, f"correlation up to lag {lags}", text)]
+        whitened = ", residuals" if self.white else ", whitened residuals"
+        if not self.white:
+            acf = series.autocorrelation(self._parts(e.whitened), lags)
+            q, p = series.ljung_box(acf, n, lags, 2 if e.best[1] > 0.0 else 0)
+            text = "the noise model leaves some correlation" if p < 0.05 else "the noise model explains the correlation"
+            found.append(Test("Ljung-Box" + whitened, q, p, "correlation the noise model does not hold", text))
+        z, p = series.runs_test(e.whitened)
+        text = "signs of the residuals do not change at random" if p < 0.05 else "signs change at random"
+        found.append(Test("runs" + whitened, z, p, "slow trends and jumps", text))
+        w, p = series.normality(e.whitened)
+        text = "not normal; look for outliers" if p < 0.05 else "compatible with a normal distribution"
+        found.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
+        return found
+
+    def warnings(self) -> list[str]:
+        """What the tests say loudly; correlation that the noise model allows for is none."""
+        loud = [t for t in self.tests if t.p is not None and t.p < 0.001 and (self.white or t.name != RAW)]
+        return [f"{t.name}: p = {t.p:.2g}, {t.finding}." for t in loud]
+
+    def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
+        """Coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""
+        columns = np.column_stack([self.X, extra, self.y])
+        if self.white:
+            Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
+        else:
+            tau, share = self.est.best
+            model = np.array([tau]), np.array([share]), np.array([self.est.reading])
+            Z = noise_model.whiten(self.t_start, self.t_end, columns, *model)[0][:, 0, :]
+        z, A, p = Z[:, -1], Z[:, :-1], self.X.shape[1]
+        plain = np.linalg.lstsq(A[:, :p], z, rcond=None)[0]
+        q, r = np.linalg.qr(A)
+        full = np.linalg.solve(r, q.T @ z)
+        rss0, rss1 = float(np.sum((z - A[:, :p] @ plain) ** 2)), float(np.sum((z - A @ full) ** 2))
+        dof = z.size - A.shape[1]
+        inverse = np.linalg.inv(r)
+        covariance = inverse @ inverse.T * (rss1 / dof)
+        return full[p:], covariance[p:, p:], rss0, rss1, dof
+
+    def f_test(
+        self, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
+    ) -> tuple[Array, Array] | None:
+        """Adds an F test of ``extra`` columns (n, k): do they explain more than noise?  ``bad`` is said when they do.
+
+        Returns their amplitudes and standard uncertainties (SI); None, without a test, for ideal data, no columns or
+        fewer than ``minimum`` degrees of freedom.  Raises numpy.linalg.LinAlgError for columns the fit holds already.
+        """
+        k = extra.shape[1]
+        if self.ideal or not k or self.y.size - self.X.shape[1] - k < minimum:
+            return None
+        values, covariance, rss0, rss1, dof = self.whitened_fit(extra)
+        f = ((rss0 - rss1) / k) / (rss1 / dof)
+        p = float(special.fdtrc(k, dof, f))
+        self.tests.append(Test(name, f, p, what, bad if p < 0.05 else good))
+        return values, np.sqrt(np.diag(covariance))

@@ -1,0 +1,180 @@
+"""The same test repeated - on several days, after several turn-ons: mean, scatter, and what the scatter means.
+
+    mean x = sum x_i / n        sigma = sqrt(sum (x_i - x)^2 / (n - 1))        u(x) = sigma / sqrt(n), t of n - 1
+
+sigma is the random drift from day to day (the book's measure of long-term performance), u that of the mean.  Whether
+it is more than each day's own uncertainty explains is a chi-squared test, sum ((x_i - x)/u_i)^2 with n - 1 degrees of
+freedom for equal u_i.  [TEST-8POS, T3-1-MEAN, T3-1-SIGMA; 000_791234d3afc34a0c.txt ch. 3 par. 2.3, Table 3-1]
+
+Not modelled: trend over the days (a table in the order of time shows it), days of different weight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+Limits = Mapping[str, tuple[float | None, float | None]]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """n values: mean, standard deviation with n - 1 (nan for one), standard uncertainty of the mean."""
+
+    n: int
+    mean: float
+    sigma: float
+    u: float
+
+
+def statistics(values: Sequence[float], about: float | None = None) -> Statistics:
+    """``about``: the value that deviations are taken from in place of the mean (the book rounds its means).
+
+    Raises ReductionError for no values or one that is no finite number.
+    """
+    x = np.asarray(values, dtype=float)
+    if x.size == 0 or not np.all(np.isfinite(x)):
+        raise ReductionError(f"{x.size} values: at least one is needed, all of them finite")
+    mean = float(np.mean(x))
+    if x.size == 1:
+        return Statistics(1, mean, math.nan, math.nan)
+    sigma = math.sqrt(float(np.sum((x - (mean if about is None else about)) ** 2)) / (x.size - 1))
+    return Statistics(int(x.size), mean, sigma, sigma / math.sqrt(x.size))
+
+
+def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float]:
+    """Chi-squared and its probability that values of uncertainties ``u`` are those of one quantity."""
+    x, w = np.asarray(values, dtype=float), 1.0 / np.asarray(u, dtype=float) ** 2
+    q = float(np.sum(w * (x - np.sum(w * x) / np.sum(w)) ** 2))
+    return q, float(special.chdtrc(x.size - 1, q))
+
+
+def together(results: Mapping[str, Result], what: str = "day", specification: Limits | None = None) -> Result:
+    """One result of repeats (name of the day -> its result) with the same coefficients.
+
+    Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common
+    to all days.  Series: each coefficient against the number of the day.  Raises ReductionError for fewer than two
+    days or coefficients that are not the same.
+    """
+    days, parts = list(results), list(results.values())
+    if len(parts) < 2:
+        raise ReductionError(f"{len(parts)} {what}: at least two are needed for a scatter from {what} to {what}")
+    names = [c.name for c in parts[0].coefficients]
+    for day, r in results.items():
+        if [c.name for c in r.coefficients] != names:
+            raise ReductionError(f"{what} {day}: coefficients differ from those of {what} {days[0]}; reduce them alike")
+    n = len(parts)
+    table = np.array([[c.estimate for c in r.coefficients] for r in parts])
+    coefficients, series, tests, budget = [], [], [], []
+    for j, name in enumerate(names):
+        each = [r.coefficients[j] for r in parts]
+        coefficients.append(_mean(each, (specification or {}).get(name, each[0].limit)))
+        found = statistics(table[:, j].tolist())
+        own = [c.u_a or 0.0 for c in each]
+        if min(own) > 0.0 and found.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
+            q, p = agreement(table[:, j].tolist(), own)
+            text = f"varies from {what} to {what} by more than its noise" if p < 0.05 else "constant within its noise"
+            tests.append(Test(f"{what} to {what}, {name}", q, p, f"change between the {what}s", text))
+        x = [float(k + 1) for k in range(n)]
+        y = table[:, j].tolist()
+        series.append(
+            Series(
+                label=name, x=x, x_name=what, x_unit="", y=y, fit=[found.mean] * n,
+                residual=(table[:, j] - found.mean).tolist(), y_name=name, y_unit=each[0].unit, t=x,
+            )
+        )  # fmt: skip
+        c = coefficients[-1]
+        note = f"type A, standard deviation over {n} {what}s divided by √{n}"
+        budget.append(
+            BudgetLine(f"scatter from {what} to {what}", found.u, c.unit, 1.0, "1", found.u, c.unit, name, note)
+        )
+        budget += [b for b in parts[0].budget if b.coefficient == name and not b.note.startswith("type A")]
+    varying = [t.name.split(", ", 1)[1] for t in tests if t.p is not None and t.p < 0.05]
+    said = f"{', '.join(varying)} vary" if varying else "nothing varies"
+    first = parts[0]
+    return replace(
+        first,
+        coefficients=coefficients,
+        series=series,
+        correlation=_correlation(table) if n > 2 else first.correlation,
+        dof=float(n - 1),
+        noise={"model": f"scatter of {n} {what}s, taken as independent"},
+        tests=tests,
+        residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
+        acf={}, allan={}, psd={}, harmonics=[],
+        budget=budget,
+        repeatability={f"σ of {c.name} / ({c.unit})": statistics(table[:, j].tolist()).sigma
+                       for j, c in enumerate(first.coefficients)},
+        tables=[_table(days, parts, table, what), *({**t, "title": f"{t['title']}, {what} {days[0]}"}
+                                                    for t in first.tables)],
+        warnings=list(dict.fromkeys(w for r in parts for w in r.warnings)),
+        summary=[f"{n} {what}s; {said} from {what} to {what} by more than noise.", *_few(coefficients, table, what)],
+        verdict=uncertainty.overall(c.verdict for c in coefficients),
+    )  # fmt: skip
+
+
+def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:
+    sigma = [statistics(column).sigma for column in table.T.tolist()]
+    both = list(zip(coefficients, sigma, strict=True))[:2]
+    return [f"{c.name} = {c.estimate:.6g} {c.unit}, σ over the {what}s {s:.2g} {c.unit}." for c, s in both]
+
+
+def _mean(each: list[Coefficient], limit: tuple[float | None, float | None] | None) -> Coefficient:
+    found = statistics([c.estimate for c in each])
+    half = float(special.stdtrit(found.n - 1, 0.975)) * found.u
+    common = math.sqrt(float(np.mean([max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0) for c in each])))
+    u, U = uncertainty.combine(found.u, half, [common])
+    first = each[0]
+    closed = [c.closed for c in each if c.closed is not None]
+    truth = [c.truth for c in each if c.truth is not None]
+    true = float(np.mean(truth)) if len(truth) == len(each) else None
+    t = found.mean / found.u if found.u > 0.0 else None
+    return replace(
+        first,
+        estimate=found.mean,
+        u=u,
+        k=U / u if u > 0.0 else uncertainty.NORMAL,
+        interval=(found.mean - U, found.mean + U),
+        t=t,
+        p=None if t is None else float(2.0 * special.stdtr(found.n - 1, -abs(t))),
+        u_a=found.u,
+        dof=float(found.n - 1),
+        closed=float(np.mean(closed)) if len(closed) == len(each) else None,
+        truth=true,
+        z=(found.mean - true) / u if true is not None and u > 0.0 else None,
+        limit=limit,
+        verdict=uncertainty.verdict(found.mean, U, limit),
+    )
+
+
+def _correlation(table: Array) -> list[list[float]]:
+    off = table - table.mean(axis=0)
+    size = np.sqrt(np.sum(off * off, axis=0))
+    safe = np.where(size > 0.0, size, 1.0)
+    out = np.clip(off.T @ off / np.outer(safe, safe), -1.0, 1.0)
+    np.fill_diagonal(out, 1.0)
+    found: list[list[float]] = out.tolist()
+    return found
+
+
+def _table(days: list[str], parts: list[Result], table: Array, what: str) -> dict[str, Any]:
+    """Like Table 3-1: a row for each day, then mean and standard deviation; under it the days' own u of type A."""
+    each = [statistics(column) for column in table.T.tolist()]
+    own = [float(np.sqrt(np.mean([(r.coefficients[j].u_a or 0.0) ** 2 for r in parts]))) for j in range(len(each))]
+    rows: list[list[Any]] = [[day, *row] for day, row in zip(days, table.tolist(), strict=True)]
+    rows += [["mean", *(s.mean for s in each)], ["σ (n − 1)", *(s.sigma for s in each)], [f"u within a {what}", *own]]
+    head = [f"{c.name} / ({c.unit})" for c in parts[0].coefficients]
+    title = f"{what.capitalize()} by {what}"
+    return {"title": title, "caption": f"Estimates of each {what}, their mean and standard deviation",
+            "columns": [what, *head], "rows": rows}  # fmt: skip

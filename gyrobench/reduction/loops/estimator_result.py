@@ -1,0 +1,191 @@
+"""The measures of one estimator over one record, as coefficients, tests and tables of a result.
+
+    s = Signals(time, z, estimate, truth, latency, variance, innovation, nis, R_hat)
+    m = measure(s, frequency=1.0, R=2.7e-6)      # frequency: of the sine in the truth; None: a random truth
+    result.coefficients, result.tests ... = m.coefficients, m.tests ...
+
+What stands there, and why: the error against the truth of the same instant ranks estimators (:data:`RANKED`), for that
+is what a loop feels; noise reduction never stands without gain and phase; consistency tells whether a filter that
+states a variance may be believed.  [EST-KF-AR: mandatory pair; EST-WAVELET-ONLINE: both error columns]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench.reduction.loops import estimator_metrics
+from gyrobench.reduction.loops.estimator_metrics import Array, Consistency, Value
+from gyrobench.reduction.result import Coefficient, Test
+from gyrobench.reduction.window_checks import ReductionError
+
+RANKED = "error"  # the coefficient that ranks estimators, smallest first
+LOOP = 5.0  # degrees of phase that an estimator may cost in a loop
+CROSSOVER = 10.0  # Hz
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Evenly sampled series (n,) in one unit, at ``time`` s; transients are left out before.
+
+    latency: as the estimator states it, s.  variance, innovation, nis, R_hat: None where it has none.
+    """
+
+    time: Array
+    z: Array
+    estimate: Array
+    truth: Array
+    latency: float
+    variance: Array | None = None
+    innovation: Array | None = None
+    nis: Array | None = None
+    R_hat: Array | None = None
+
+    def problems(self) -> list[str]:
+        """What makes these series unfit, as sentences."""
+        found = []
+        given = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        for name, x in given.items():
+            if x.shape != self.time.shape:
+                found.append(f"{name} has {x.size} samples, time has {self.time.size}")
+            elif not np.all(np.isfinite(x)):
+                found.append(f"{name} is not finite at {int(np.count_nonzero(~np.isfinite(x)))} samples")
+        if not found and not np.ptp(self.truth) > 0.0:
+            found.append("the truth does not move: an estimate that is always 0 would win, so nothing can be measured")
+        if not found and not np.any(self.z != self.truth):
+            found.append("the readings are the truth: there is no noise to be reduced")
+        if self.time.size < 400:
+            found.append(f"{self.time.size} samples: at least 400 are needed")
+        else:
+            steps = np.diff(self.time)
+            if np.ptp(steps) > 0.01 * float(np.median(steps)) or not steps[0] > 0.0:
+                found.append("the samples are not even in time (1 %): an estimator is judged on an even record")
+        if not math.isfinite(self.latency) or self.latency < 0.0:
+            found.append(f"latency = {self.latency:g} s: must be 0 or more")
+        return found
+
+
+@dataclass
+class Measures:
+    """What :func:`measure` found."""
+
+    coefficients: list[Coefficient] = field(default_factory=list)
+    tests: list[Test] = field(default_factory=list)
+    acf: dict[str, list[float]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    error: Array = field(default_factory=lambda: np.zeros(0))
+
+    def named(self, name: str) -> Coefficient:
+        return next(c for c in self.coefficients if c.name == name)
+
+    def add(self, name: str, meaning: str, unit: str, v: Value, truth: float | None = None, **more: Any) -> None:
+        low, high = v.interval
+        c = Coefficient(
+            name, meaning, unit, v.value, v.u, v.k, (low, high), u_a=v.u, truth=truth, **more,
+            dof=v.dof if math.isfinite(v.dof) else None,
+        )  # fmt: skip
+        self.coefficients.append(replace(c, z=(v.value - truth) / v.u) if truth is not None and v.u > 0.0 else c)
+
+
+def measure(s: Signals, frequency: float | None = None, R: float | None = None, unit: str = "1") -> Measures:
+    """All measures; raises ReductionError with everything that is wrong with the series.
+
+    frequency: Hz, of the sine that the truth is; None where the truth is random.  R: true variance of a reading.
+    unit: of z, as printed.
+    """
+    if problems := s.problems():
+        raise ReductionError(problems)
+    step = float(s.time[1] - s.time[0])
+    behind = estimator_metrics.late(s.time, s.truth, s.latency)
+    known = slice(math.ceil(s.latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
+    if s.time[known].size < 400:
+        raise ReductionError(f"the record is hardly longer than the latency of {s.latency:g} s")
+    m = Measures()
+    try:
+        _errors(m, s, behind, known, frequency, unit)
+        _distortion(m, s, behind, known, frequency)
+        most = max(3.0 * s.latency, 50.0 * step)
+        found = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
+    except ValueError as error:
+        raise ReductionError(str(error)) from None
+    said = "delay at which the truth fits best; closed formula: as the estimator states it"
+    scale, in_unit = (1.0, "s") if step > 0.1 else (1e-3, "ms")
+    m.add("delay", said, in_unit, _times(found, 1.0 / scale), closed=s.latency / scale)
+    _consistency(m, s, R)
+    phase = 360.0 * CROSSOVER * s.latency
+    if phase > LOOP:
+        m.warnings.append(
+            f"The stated delay of {s.latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
+            f"{CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
+        )
+    return m
+
+
+def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str) -> None:
+    """Errors against the truth of the same instant and of one latency ago."""
+
+    def size(time: Array, x: Array) -> Value:
+        return estimator_metrics.rms_of_sine(time, x, frequency) if frequency else estimator_metrics.rms(x)
+
+    raw, m.error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
+    now, late = size(s.time, m.error), size(s.time[known], (s.estimate - behind)[known])
+    m.add(RANKED, "rms error against the truth of the same instant", unit, now)
+    m.add("error re raw", "the same over the rms error of the readings", "dB", estimator_metrics.decibels(now, raw))
+    against = "the same against the truth of one latency ago"
+    m.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
+
+
+def _times(v: Value, factor: float) -> Value:
+    return Value(v.value * factor, v.u * factor, v.dof)
+
+
+def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None) -> None:
+    """Noise reduction and the gain (and phase) that goes with it."""
+    if frequency:
+        r = estimator_metrics.response_to_sine(s.time, s.estimate, s.truth, frequency)
+        gain = f"gain at {frequency:g} Hz"
+    else:
+        r = estimator_metrics.response_to_truth(s.estimate[known], behind[known])
+        gain = "gain on the truth of one latency ago (regression)"
+    noise = estimator_metrics.decibels(estimator_metrics.rms(r.rest), estimator_metrics.rms(s.z - s.truth))
+    m.add("noise re raw", "what is not the truth as it comes through, over the readings", "dB", noise)
+    m.add("gain", gain, "1", r.gain)
+    if r.phase is not None:
+        m.add("phase", f"phase at {frequency:g} Hz, negative: late", "°", _times(r.phase, 180.0 / math.pi))
+    if not 0.9 <= r.gain.value <= 1.1:
+        worse = m.named("error re raw").estimate > 0.0
+        so = "it is farther from the truth than the readings" if worse else "that is part of its noise reduction"
+        m.warnings.append(f"The estimator scales the signal by {r.gain.value:.3g}: {so}.")
+
+
+def _consistency(m: Measures, s: Signals, R: float | None) -> None:
+    if s.variance is not None and np.all(s.variance > 0.0):
+        _against_chi_square(m, "NEES", "error", estimator_metrics.nees(m.error, s.variance))
+    if s.nis is not None and np.any(s.nis > 0.0):
+        _against_chi_square(m, "NIS", "innovation", estimator_metrics.nis(s.nis[s.nis > 0.0]))
+    if s.innovation is not None and np.any(s.innovation != 0.0):
+        m.acf, q, p = estimator_metrics.whiteness(s.innovation[s.innovation != 0.0])
+        white = "white: the model holds" if p >= 0.001 else "not white: the model of the signal does not hold"
+        m.tests.append(Test("Ljung-Box, innovations", q, p, "correlation that a right model would not leave", white))
+        if p < 0.001:
+            m.warnings.append(f"The innovations are not white (Ljung-Box, p = {p:.1g}): {white.split(': ')[1]}.")
+    if s.R_hat is not None and R:
+        m.add("R̂/R", "estimated variance of a reading over the true one", "1",
+              estimator_metrics.variance_ratio(s.R_hat, R), truth=1.0)  # fmt: skip
+
+
+def _against_chi_square(m: Measures, name: str, what: str, c: Consistency) -> None:
+    m.add(name, f"mean squared {what} over its stated variance", "1", c.value, truth=1.0)
+    if c.holds:
+        finding = "consistent: the stated variance is right"
+    elif c.mean > 1.0:
+        finding = f"too confident: the {what} is larger than stated"
+    else:
+        finding = f"too cautious: the {what} is smaller than stated"
+    what_for = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
+    m.tests.append(Test(name, c.mean, c.p, what_for, finding))
+    if not c.holds:
+        m.warnings.append(f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}: the filter is {finding}.")

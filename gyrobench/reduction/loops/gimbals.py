@@ -1,0 +1,135 @@
+"""Measures of a gimballed platform in a flight: its error over time, and when its gimbals were locked.
+
+flight = Flight(gates, "platform.attitude", rest)
+flight.error                                                      # rad, at flight.t
+lock_table(flight, {"lock": flight["platform.lock"]}, pitch, "pitch")   # one row for each time of lock
+over_time("gimbal angles", flight.t, {"roll": roll / DEG})        # a figure
+
+SI inside, degrees where people read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.result import Response
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+DEG = math.pi / 180.0
+SHOWN = 700  # points of a drawn line
+
+
+class Flight:
+    """The part of a record in which the base flew.
+
+    gates: its phases, in their order.  rest: a phase in which the base rested and nothing acted, None: there is none.
+    t: s of the record; error: angle (rad) by which the platform has turned since the flight began, less the drift that
+    the rest phase showed; noise: rad, standard deviation of the attitude in the rest phase about its drift.
+
+    The error is the size of the integral of the platform's rate in its own axes: the angle of the rotation where it
+    is small or about one axis.  Raises ReductionError for a record without a gate.
+    """
+
+    def __init__(self, gates: Sequence[Gate], attitude: str, rest: Gate | None = None) -> None:
+        if not gates:
+            raise ReductionError("no leg of the flight is whole in this record")
+        self.gates = list(gates)
+        self.channels = gates[0].channels
+        self.first, self.last = gates[0].inside.start, gates[-1].inside.stop
+        self.t = self["time"]
+        names = [f"{attitude}[{k}]" for k in (1, 2, 3)]
+        turned = np.column_stack([self[n] - self[n][0] for n in names])
+        self.drift, self.noise = np.zeros(3), 0.0
+        if rest is not None:
+            fits = [np.polyfit(rest.t, rest[n], 1) for n in names]
+            self.drift = np.array([f[0] for f in fits])
+            left = [rest[n] - np.polyval(f, rest.t) for n, f in zip(names, fits, strict=True)]
+            self.noise = math.sqrt(sum(float(np.var(x)) for x in left))
+        self.axes = turned - np.outer(self.t - self.t[0], self.drift)
+        self.error = np.linalg.norm(self.axes, axis=1)
+
+    def __getitem__(self, name: str) -> Array:
+        """A channel over the flight, the rests between the legs included."""
+        if name not in self.channels:
+            raise ReductionError(f"the record has no channel {name}; it has {', '.join(self.channels)}")
+        return self.channels[name][self.first : self.last]
+
+    def u(self, step: float) -> float:
+        """Standard uncertainty of the largest error, rad: the noise, and what the platform turns in a step at most."""
+        moves = float(np.abs(np.gradient(self.error, self.t)).max()) * step if self.t.size > 1 else 0.0
+        return math.hypot(self.noise, moves / math.sqrt(12.0))
+
+    def leg(self, gate: Gate) -> slice:
+        """Where a phase lies in the arrays of the flight."""
+        return slice(gate.inside.start - self.first, gate.inside.stop - self.first)
+
+    def leg_at(self, k: int) -> str:
+        """Label of the phase in which sample k lies, or the one before it."""
+        return next((g.label for g in reversed(self.gates) if g.inside.start - self.first <= k), self.gates[0].label)
+
+
+def spans(flag: Array) -> list[tuple[int, int]]:
+    """First and last sample of each stretch in which a flag is 1."""
+    on = np.concatenate([[False], np.asarray(flag) > 0.5, [False]])
+    edges = np.flatnonzero(np.diff(on.astype(int)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> dict[str, Any]:
+    """Table with a row for each stretch of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
+    rows = []
+    for kind, flag in kinds.items():
+        for a, b in spans(flag):
+            numbers = [flight.t[a], flight.t[b], angle[a] / DEG, angle[b] / DEG, flight.error[a] / DEG]
+            worst = float(np.max(flight.error[a : b + 1])) / DEG
+            rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
+    return {
+        "title": "Gimbal lock",
+        "caption": "When the gimbals were locked or too near to it, in time of the record",
+        "columns": ["what", "leg", "from / s", "to / s", f"{name} then / °", "at the end / °",
+                    "platform error then / °", "largest / °"],
+        "rows": sorted(rows, key=lambda r: float(r[2])),
+    }  # fmt: skip
+
+
+def over_time(
+    name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = ""
+) -> Response:
+    """Figure of several quantities (printed units) over time; runs are compared by the first one.
+
+    Each stretch of samples is drawn by its smallest and largest value.
+    """
+    drawn = []
+    for label, y in lines.items():
+        x, thin = _envelope(t, y)
+        drawn.append({"label": label, "x": x.tolist(), "y": thin.tolist(), "phase": []})
+    return Response(
+        name=name,
+        kind="time",
+        caption=caption or f"{name[:1].upper()}{name[1:]} over time.",
+        x=drawn[0]["x"],
+        x_name="time",
+        x_unit="s",
+        y=drawn[0]["y"],
+        y_name=y_name or name,
+        y_unit=unit,
+        curves=drawn,
+    )
+
+
+def _envelope(t: Array, y: Array) -> tuple[Array, Array]:
+    if t.size <= SHOWN:
+        return t, y
+    edges = np.linspace(0, t.size, SHOWN // 2 + 1).astype(int)
+    pick = []
+    for a, b in pairwise(edges):
+        pick += sorted({a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))})
+    return t[pick], y[pick]

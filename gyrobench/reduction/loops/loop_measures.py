@@ -1,0 +1,294 @@
+"""Measures of a loop from its record: sine responses, steps, drift, coupling between axes.  Pure functions.
+
+    for gate in gates(record):                       # one for each phase of the plan
+        if gate.kind == "test":
+            point = response(gate.t, gate["stabilizer.e"], gate["exciter.test[1]"] - gate["stabilizer.e"], gate.f)
+
+All inside is SI; frequencies in Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.estimation import residual_series
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+SEGMENTS = 8  # of a sine, for scatter and coherence
+LAST = 0.1  # share of a step's record that is its end
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One phase of the plan while its gate was open.
+
+    row: the phase, as in run.json.  t: s.  channels: the whole record; gate["slot.variable"] is the part in the gate.
+    """
+
+    row: Mapping[str, Any]
+    t: Array
+    inside: slice
+    before: slice  # the second half of the settling
+    channels: Mapping[str, Array]
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.channels:
+            raise ReductionError(f"the record has no channel {name}; it has {', '.join(self.channels)}")
+        return self.channels[name][self.inside]
+
+    def rest(self, name: str) -> Array:
+        """The channel in the second half of the settling, before the gate opened (empty without settling)."""
+        return self.channels[name][self.before]
+
+    @property
+    def label(self) -> str:
+        return str(self.row["label"])
+
+    @property
+    def kind(self) -> str:
+        return str(self.row["mode"])
+
+    @property
+    def shape(self) -> str:
+        return str(self.row["shape"])
+
+    @property
+    def axis(self) -> int:
+        return int(self.row["axis"])
+
+    @property
+    def amplitude(self) -> float:
+        return float(self.row["amplitude"])
+
+    @property
+    def f(self) -> float:
+        """Frequency, Hz."""
+        return float(self.row["frequency"])
+
+
+def gates(record: Any, slot: str = "exciter") -> list[Gate]:
+    """The phases of a record (gyrobench.record.record.Record) in their order, those that were run to their end.
+
+    Raises ReductionError for a record without the channels phase and gate of the exciter in ``slot``, or without
+    a single whole phase.
+    """
+    channels = record.channels
+    for name in (f"{slot}.phase", f"{slot}.gate"):
+        if name not in channels:
+            raise ReductionError(f"the record has no channel {name}: the system must record it")
+    phase, gate, time = channels[f"{slot}.phase"], channels[f"{slot}.gate"], channels["time"]
+    found = []
+    for row in record.meta.get("plan", []):
+        here = phase == row["phase"]
+        inside = np.flatnonzero(here & (gate > 0.5))
+        if inside.size < 2:
+            continue
+        period = float(time[1] - time[0])
+        if time[inside[-1]] - time[inside[0]] < float(row["dwell"]) - 2.5 * period:
+            continue  # the run stopped in this phase
+        first = int(np.argmax(here))
+        middle = first + (int(inside[0]) - first) // 2
+        span = slice(int(inside[0]), int(inside[-1]) + 1)
+        found.append(Gate(row, time[span], span, slice(middle, int(inside[0])), channels))
+    if not found:
+        raise ReductionError("no phase of the plan is whole in this record")
+    return found
+
+
+# ------------------------------------------------------------------------------------------- sines
+@dataclass(frozen=True)
+class Point:
+    """Complex ratio of two signals at one frequency (Hz), with its uncertainty and coherence.
+
+    u: standard uncertainty of the ratio, relative; that of the phase is u rad too.  None where it was not measured
+    (a single period).  coherence: 1 when the ratio is the same in every segment.
+    """
+
+    f: float
+    value: complex
+    u: float | None
+    coherence: float
+
+
+def phasor(t: Array, y: Array, f: float) -> complex:
+    """Complex amplitude of the sine of f Hz in y, least squares, beside a mean and a slope: A cos + B sin -> A - jB."""
+    w = 2.0 * np.pi * f
+    columns = np.column_stack([np.cos(w * t), np.sin(w * t), np.ones(t.size), t - t.mean()])
+    a, b, *_ = np.linalg.lstsq(columns, y, rcond=None)[0]
+    return complex(a, -b)
+
+
+def response(t: Array, x: Array, y: Array, f: float) -> Point:
+    """y over x at f Hz from a record of some whole periods.
+
+    The record is cut into up to 8 segments of whole periods; their scatter gives the uncertainty (type A, independent
+    segments) and the coherence |sum Y X*|^2 / (sum |X|^2 sum |Y|^2).  Raises ReductionError for less than a period, for
+    samples too coarse for the frequency (less than 4 a period), and for an x without that sine.
+    """
+    dt = float(t[1] - t[0])
+    periods = int((t[-1] - t[0] + dt) * f + 1e-6)
+    if periods < 1:
+        raise ReductionError(f"{f:g} Hz: the record of {t[-1] - t[0]:g} s is shorter than one period")
+    if f * dt > 0.25:
+        raise ReductionError(f"{f:g} Hz: a sample every {dt:g} s is too coarse; record at least 4 a period")
+    whole = phasor(t, x, f)
+    if not abs(whole) > 1e-12 * float(np.max(np.abs(x)) or 1.0):
+        raise ReductionError(f"{f:g} Hz: the reference signal has no such sine in it")
+    value = phasor(t, y, f) / whole
+    n = min(SEGMENTS, periods)
+    if n < 2:
+        return Point(f, value, None, 1.0)
+    edges = [t[0] + (periods * k // n) / f for k in range(n + 1)]
+    pairs = []
+    for a, b in pairwise(edges):
+        s = slice(int(np.searchsorted(t, a - 0.5 * dt)), int(np.searchsorted(t, b - 0.5 * dt)))
+        pairs.append((phasor(t[s], x[s], f), phasor(t[s], y[s], f)))
+    xs, ys = (np.array(c) for c in zip(*pairs, strict=True))
+    power = float(np.sum(np.abs(xs) ** 2) * np.sum(np.abs(ys) ** 2))
+    coherence = float(np.abs(np.sum(ys * np.conj(xs))) ** 2) / power if power > 0.0 else 0.0
+    scatter = float(np.sum(np.abs(ys / xs - value) ** 2)) / (2.0 * n * (n - 1))
+    return Point(f, value, math.sqrt(scatter) / abs(value) if value else None, coherence)
+
+
+# ------------------------------------------------------------------------------------------- steps
+@dataclass(frozen=True)
+class Step:
+    """What a step did.  Values in the unit of the signal, times in s after the gate opened.
+
+    overshoot: share of the change beyond it.  settled_5, settled_2: time after which the signal stays within 5 or
+    2 % of the change about the final value; None when it did not settle before the last tenth of the record.
+    slope: of that last tenth, unit/s: a signal that still moves has no final value.
+    """
+
+    initial: float
+    final: float
+    u_change: float
+    overshoot: float
+    settled_5: float | None
+    settled_2: float | None
+    u_settled: float
+    slope: float
+
+    @property
+    def change(self) -> float:
+        return self.final - self.initial
+
+
+def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
+    """Measures of a step response.  rest: the signal before it (empty: 0).  start: time of the step, default t[0].
+
+    The uncertainty of the change is that of two means of white noise; that of the settling times is the sampling
+    interval's, dt / sqrt(12).
+    """
+    t0 = float(t[0]) if start is None else start
+    last = max(2, int(LAST * t.size))
+    initial = float(np.mean(rest)) if rest.size else 0.0
+    final = float(np.mean(y[-last:]))
+    change = final - initial
+    slope, _ = np.polyfit(t[-last:] - t[-1], y[-last:], 1)
+    noise = float(np.std(y[-last:] - np.polyval(np.polyfit(t[-last:], y[-last:], 1), t[-last:])))
+    u = noise * math.sqrt(1.0 / last + (1.0 / rest.size if rest.size else 0.0))
+    peak = float(np.max((y - initial) * np.sign(change))) if change else 0.0
+
+    def settled(band: float) -> float | None:
+        outside = np.flatnonzero(np.abs(y - final) > band * abs(change))
+        if outside.size == 0:
+            return 0.0
+        k = int(outside[-1])
+        if k >= t.size - last:
+            return None
+        a, b = abs(y[k] - final), abs(y[k + 1] - final)
+        share = (a - band * abs(change)) / (a - b) if a != b else 1.0
+        return float(t[k] + share * (t[k + 1] - t[k])) - t0
+
+    return Step(
+        initial,
+        final,
+        u,
+        max(0.0, peak / abs(change) - 1.0) if change else 0.0,
+        settled(0.05) if change else None,
+        settled(0.02) if change else None,
+        float(t[1] - t[0]) / math.sqrt(12.0),
+        float(slope),
+    )
+
+
+def scatter(y: Array, before: int, gap: int, after: int) -> float | None:
+    """Standard deviation that a change between two means has where nothing is excited.
+
+    y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``
+    samples that end ``gap`` samples later; it is taken from every piece of the record without overlap, so noise of any
+    colour is in it.  None for fewer than 5 pieces.
+    """
+    span = before + gap
+    starts = range(0, y.size - span + 1, max(span, 1))
+    if len(starts) < 5:
+        return None
+    line = y - np.polyval(np.polyfit(np.arange(y.size), y, 1), np.arange(y.size))
+    ends = [line[k + span - after : k + span].mean() for k in starts]
+    begins = [line[k : k + before].mean() if before else line[k] for k in starts]
+    return float(np.std(np.array(ends) - np.array(begins), ddof=1))
+
+
+# ------------------------------------------------------------------------------------------- drift
+@dataclass(frozen=True)
+class Drift:
+    """Drift of an angle: mean rate with its standard uncertainty, Allan deviation of the rate, random walk.
+
+    walk: angle random walk and its standard uncertainty, rad/sqrt(s), at the end of the first stretch in which the
+    Allan deviation falls with slope -1/2 (to 0.1): there the loop's own lag matters least.  None: no such stretch.
+    """
+
+    rate: float
+    u: float
+    allan: dict[str, Any]
+    walk: tuple[float, float] | None
+
+
+def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
+    """Drift of an angle (rad) in a hold phase.
+
+    The rate is (end - start) / time; its uncertainty the scatter of the rates of ``blocks`` equal parts over sqrt(n)
+    (independent parts: noise slower than a part is not in it).  Raises ReductionError for fewer than 4 samples a block.
+    """
+    if t.size < 4 * blocks:
+        raise ReductionError(f"a drift of {blocks} blocks needs {4 * blocks} samples, there are {t.size}")
+    edges = np.linspace(0, t.size - 1, blocks + 1).astype(int)
+    rates = np.diff(angle[edges]) / np.diff(t[edges])
+    mean = float((angle[-1] - angle[0]) / (t[-1] - t[0]))
+    dt = float(t[1] - t[0])
+    found = residual_series.allan([(dt, np.diff(angle) / dt)])
+    walk = None
+    falls = [abs(s["slope"] + 0.5) < 0.1 for s in found.get("slopes", [])]
+    if True in falls:
+        first = falls.index(True)
+        last = falls.index(False, first) if False in falls[first:] else len(falls)
+        tau, dev, low, high = (found[n][last] for n in ("tau", "dev", "lo", "hi"))
+        walk = (dev * math.sqrt(tau), (high - low) / (2.0 * residual_series.NORMAL) * math.sqrt(tau))
+    return Drift(mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), found, walk)
+
+
+# ------------------------------------------------------------------------------------------- axes
+def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> dict[str, Any]:
+    """Table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
+
+    points: (k, j) -> complex ratio at one frequency, numbered from 1.  axes: their names.  A missing pair stays empty.
+    """
+    rows = []
+    for k, name in enumerate(axes, 1):
+        own = points.get((k, k))
+        cells: list[Any] = [name]
+        for j in range(1, len(axes) + 1):
+            there = points.get((k, j))
+            cells.append(None if own is None or there is None or not own else 100.0 * abs(there / own))
+        rows.append(cells)
+    columns = ["excited axis", *(f"{a} / %" for a in axes)]
+    return {"title": f"Coupling between the axes, {what}", "caption": "", "columns": columns, "rows": rows}

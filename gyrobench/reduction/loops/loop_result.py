@@ -1,0 +1,402 @@
+"""From the measures of a loop to the Result that its report shows.
+
+found = LoopFindings(record)
+loop = found.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
+found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
+found.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
+found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
+return found.result(title=..., method=..., sources=[...], equation=..., conventions=[...], specification=...)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.loops import margins as m
+from gyrobench.reduction.loops.loop_measures import (
+    LAST,
+    Drift,
+    Gate,
+    Point,
+    Step,
+    drift,
+    gates,
+    response,
+    scatter,
+    step,
+)
+from gyrobench.reduction.result import Coefficient, Response, Result
+
+Array = NDArray[np.float64]
+ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
+CURVE = 241  # points of a drawn curve
+SHOWN = 600  # points of a drawn step response
+NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
+
+
+class LoopFindings:
+    """Collects what was found in one record; see the module.
+
+    record: gyrobench.record.record.Record.  slot: the exciter's.  Raises ReductionError, as :func:`loops.gates`.
+    """
+
+    def __init__(self, record: Any, slot: str = "exciter") -> None:
+        self.record, self.slot = record, slot
+        self.gates = gates(record, slot)
+        self.linear: dict[str, Any] = record.meta.get("linear") or {"missing": "the record holds no linear model"}
+        self.coefficients: list[Coefficient] = []
+        self.responses: list[Response] = []
+        self.tables: list[dict[str, Any]] = []
+        self.warnings: list[str] = []
+        self.allan: dict[str, Any] = {}
+        if "missing" in self.linear:
+            self.warnings.append(f"No linear model to compare with: {self.linear['missing']}")
+
+    def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
+        """The phases of a kind, in their order."""
+        return [
+            g for g in self.gates if g.kind == kind and axis in (None, g.axis) and (shape is None or g.shape == shape)
+        ]
+
+    def measure(
+        self,
+        name: str,
+        meaning: str,
+        unit: str,
+        estimate: float | None,
+        u: float | None = None,
+        *,
+        closed: float | None = None,
+        truth: float | None = None,
+        limits: Mapping[str, tuple[float | None, float | None]] | None = None,
+    ) -> None:
+        """One row of the table of coefficients, in printed units; nothing for an estimate of None.
+
+        u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.
+        """
+        if estimate is None or not math.isfinite(estimate):
+            return
+        size = u if u is not None and math.isfinite(u) else 0.0
+        half = uncertainty.NORMAL * size
+        limit = (limits or {}).get(name)
+        self.coefficients.append(
+            Coefficient(
+                name=name,
+                meaning=meaning,
+                unit=unit,
+                estimate=estimate,
+                u=size,
+                k=uncertainty.NORMAL,
+                interval=(estimate - half, estimate + half),
+                u_a=size,
+                closed=closed,
+                truth=truth,
+                z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
+                limit=limit,
+                verdict=uncertainty.verdict(estimate, half, limit),
+            )
+        )
+
+    # ------------------------------------------------------------------ frequency responses
+    def open_loop(
+        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0
+    ) -> list[Point]:
+        """The open loop L = -(inside - test) / inside of the test sines on an axis, with margins.
+
+        loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
+        test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
+        the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.
+        """
+        points = [response(g.t, g[inside], g[test] - g[inside], g.f) for g in self.of("test", axis, "sine")]
+        if not points:
+            return []
+        points.sort(key=lambda p: p.f)
+        title = name or f"open loop, {loop}"
+        models = self.linear.get("loops", {}).get(loop, {})
+        caption = (
+            f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % bars; lines: linear."
+        )
+        curves, rows = [], []
+        span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
+        at = [p.f for p in points]
+        shown = m.measured_margins(points)
+        rows.append(shown.row("measured"))
+        for kind, label in NAMES.items():
+            if kind not in models:
+                continue
+            model = models[kind]
+            dense = m.model_response(model, span)[:, 0, 0]
+            found = m.margins(span, dense)
+            rows.append(found.row(label))
+            curves.append(_curve(label, span, dense))
+            if found.crossover is not None:
+                self._agreement(points, m.model_response(model, at)[:, 0, 0], found, (label, title), up_to)
+            if kind == "discrete":
+                self._conditional(title, found)
+        self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
+        self.tables.append(
+            {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.meta), "columns": m.COLUMNS,
+             "rows": rows}
+        )  # fmt: skip
+        key = "" if loop == "stabilizer" else f" {loop}"
+        values = m.measured_values(points)
+        if "phase" in values:
+            closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
+            self.measure(f"f_c{key}", "crossover frequency", "Hz", *values["crossover"], closed=closest[1])
+            self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
+        return points
+
+    def _agreement(
+        self, points: Sequence[Point], model: Any, found: m.Margins, names: tuple[str, str], up_to: float
+    ) -> None:
+        limit = up_to * float(found.crossover or 0.0)
+        db, degrees = m.deviation(points, model, limit)
+        count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
+        table = next((t for t in self.tables if t["title"].startswith("Linear models against")), None)
+        if table is None:
+            table = {
+                "title": "Linear models against the measured loop",
+                "caption": "Largest differences of the measured points to the model, up to twice the crossover",
+                "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"],
+                "rows": [],
+            }
+            self.tables.append(table)
+        table["rows"].append([names[0], limit, count, db, degrees, names[1]])
+
+    def _conditional(self, title: str, found: m.Margins) -> None:
+        if found.lower is not None:
+            text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {found.lower:.3g}"
+            upper = f" or rises to {found.upper:.3g}" if found.upper is not None else ""
+            self.warnings.append(f"{text}{upper} of the present one; a saturating motor lowers it.")
+
+    def ratio(
+        self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
+        unit: str = "1", plus: str | None = None,
+    ) -> list[Point]:  # fmt: skip
+        """Gain of ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
+
+        reference: a channel of the exciter, or another one (then the linear curve is the ratio of two).  plus: a second
+        channel added to the output (all "slot.variable").  scale, unit: SI of the ratio per printed unit.  Returns the
+        points, SI; adds one response of kind "ratio".
+        """
+
+        def signal(g: Gate) -> Array:
+            return g[output] + (g[plus] if plus else 0.0)
+
+        points = [response(g.t, g[reference], signal(g), g.f) for g in self.of(kind, axis, "sine")]
+        if not points:
+            return []
+        points.sort(key=lambda p: p.f)
+        span = m.grid(0.5 * points[0].f, 2.0 * points[-1].f, CURVE)
+        curves = []
+        for model, label in NAMES.items():
+            found = self.excited(model, kind, axis, output, span, plus)
+            if found is not None and reference.partition(".")[0] != self.slot:
+                base = self.excited(model, kind, axis, reference, span)
+                found = None if base is None else found / base
+            if found is not None:
+                curves.append(_curve(label, span, found / scale))
+        shown = [Point(p.f, p.value / scale, p.u, p.coherence) for p in points]
+        self.responses.append(_bode(name, "ratio", caption or f"{name}, axis {axis}.", shown, curves, name, unit))
+        return points
+
+    def excited(
+        self, which: str, kind: str, axis: int, output: str, f: Array | Sequence[float], plus: str | None = None
+    ) -> Any:
+        """Linear response ("discrete" or "continuous") of a channel to an excitation, SI; None where there is none."""
+        model = self.linear.get("closed", {}).get(which)
+        if model is None or output not in model["outputs"]:
+            return None
+        try:
+            found = m.excited(model, kind, axis, output, f)
+            return found + m.excited(model, kind, axis, plus, f) if plus else found
+        except KeyError:
+            return None
+
+    # ------------------------------------------------------------------ steps
+    def step(
+        self, gate: Gate, output: str, *, scale: float = 1.0, unit: str = "1", y_name: str = "",
+        plus: str | None = None, drift: float = 0.0, quiet: Gate | None = None,
+    ) -> Step:  # fmt: skip
+        """Measures of a step phase (SI) and its figure, with the response of the linear model over it.
+
+        drift: rate (SI per s) with which the output moves without the step too; it is taken off.  quiet: a hold phase
+        several times as long, from whose noise the uncertainty of the change is taken; without, it is that of white
+        noise, too small where the noise is slow.
+        """
+        y, rest = gate[output], gate.rest(output)
+        if plus:
+            y, rest = y + gate[plus], rest + gate.rest(plus)
+        before = gate.channels["time"][gate.before]
+        y, rest = y - drift * (gate.t - gate.t[0]), rest - drift * (before - gate.t[0])
+        found = step(gate.t, y, rest)
+        if quiet is not None:
+            at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
+            u = scatter(at_rest, rest.size, y.size, max(2, int(LAST * y.size)))
+            found = found if u is None else replace(found, u_change=u)
+        t = gate.t - gate.t[0]
+        pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
+        curves = []
+        model = self.linear.get("closed", {}).get("discrete")
+        simulated = None if model is None else _simulated(model, gate, output)
+        if simulated is not None and plus:
+            more = _simulated(model, gate, plus)
+            simulated = None if more is None else simulated + more
+        if simulated is not None:
+            curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
+            curves.append({**curve, "y": ((found.initial + simulated[pick]) / scale).tolist()})
+        what = y_name or output
+        cause = f"{gate.amplitude:g} {gate.row['unit']} on axis {gate.axis} from t = 0 on"
+        self.responses.append(
+            Response(
+                name=f"{gate.label}, {what}",
+                kind="step",
+                caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear.",
+                x=t[pick].tolist(),
+                x_name="time",
+                x_unit="s",
+                y=(y[pick] / scale).tolist(),
+                y_name=what,
+                y_unit=unit,
+                curves=curves,
+            )
+        )
+        return found
+
+    # ------------------------------------------------------------------ drift
+    def drift(
+        self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
+    ) -> Drift:
+        """Drift and random walk of an angle in a hold phase, °/h and °/√h, and the Allan deviation of the report.
+
+        key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
+        """
+        found = drift(gate.t, gate[output])
+        scaled: dict[str, Any] = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
+        self.allan = {**found.allan, **scaled, "unit": "°/h"} if found.allan else {}
+        true = None if truth is None else truth / DPH
+        self.measure(f"drift{key}", "of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true)
+        if found.walk is not None:
+            size, u = (math.degrees(w) * 60.0 for w in found.walk)
+            true = math.degrees(walk) * 60.0 if walk else None
+            self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
+        return found
+
+    def result(
+        self,
+        *,
+        title: str,
+        method: str,
+        sources: Sequence[str],
+        equation: str,
+        conventions: Sequence[str],
+        summary: Sequence[str] = (),
+        instrument: str = "",
+        ranked_by: str = "",
+        specification: Mapping[str, tuple[float | None, float | None]] | None = None,
+    ) -> Result:
+        """The Result with all that was collected; limits of the specification are applied by coefficient name."""
+        for c in self.coefficients if specification else ():
+            c.limit = (specification or {}).get(c.name, c.limit)
+            c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
+        meta = self.record.meta
+        result = Result(
+            system=meta.get("system", ""),
+            title=title,
+            method=method,
+            sources=list(sources),
+            equation=equation,
+            conventions=list(conventions),
+            coefficients=self.coefficients,
+            series=[],
+            correlation=[],  # measures of their own, no common regression
+            condition=0.0,
+            rank=0,
+            dof=0.0,
+            noise={},
+            tests=[],
+            residual_std=0.0,
+            residual_unit="1",
+            allan=self.allan,
+            tables=self.tables,
+            warnings=self.warnings,
+            summary=list(summary),
+            decision_rule=uncertainty.DECISION_RULE,
+            verdict=uncertainty.overall(c.verdict for c in self.coefficients),
+            instrument=instrument or meta.get("instrument", ""),
+            simulated=not meta.get("measured", False),
+            ranked_by=ranked_by,
+            responses=self.responses,
+        )
+        result.warnings += [n for n in meta.get("notes", []) if "unstable" in n or "linear model" in n]
+        return run_metadata.finish(result, self.record)
+
+
+def _curve(label: str, f: Array, values: Any) -> dict[str, Any]:
+    """A model's curve, thinned for drawing; phase unwrapped, degrees."""
+    phase = np.degrees(np.unwrap(np.angle(values)))
+    pick = np.unique(np.linspace(0, len(f) - 1, CURVE).astype(int))
+    return {
+        "label": label,
+        "x": np.asarray(f)[pick].tolist(),
+        "y": np.abs(values)[pick].tolist(),
+        "phase": phase[pick].tolist(),
+    }
+
+
+def _bode(
+    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[dict[str, Any]], y_name: str, unit: str
+) -> Response:
+    return Response(
+        name=name,
+        kind=kind,
+        caption=caption,
+        x=[p.f for p in points],
+        x_name="frequency",
+        x_unit="Hz",
+        y=[abs(p.value) for p in points],
+        y_name=y_name,
+        y_unit=unit,
+        phase=np.degrees(np.unwrap(np.angle([p.value for p in points]))).tolist(),
+        u=[p.u for p in points],
+        coherence=[p.coherence for p in points],
+        curves=curves,
+    )
+
+
+def _simulated(model: Mapping[str, Any], gate: Gate, output: str) -> Array | None:
+    """Response of a channel to a unit step of the excitation at the gate's opening, at the gate's times; SI."""
+    name = f"{gate.kind}[{gate.axis}]"
+    wired = [j for j, n in enumerate(model["inputs"]) if n.partition(".")[2] == name]
+    if gate.shape != "step" or gate.kind == "motion" or output not in model["outputs"] or not wired:
+        return None
+    from scipy.signal import dlsim
+
+    row = model["outputs"].index(output)
+    n = len(model["states"])
+    a, c = np.reshape(model["A"], (n, n)), np.reshape(model["C"], (-1, n))[row : row + 1]
+    b = np.reshape(model["B"], (n, -1))[:, wired].sum(axis=1, keepdims=True)
+    d = np.reshape(model["D"], (-1, len(model["inputs"])))[row : row + 1, wired].sum(axis=1, keepdims=True)
+    count = round((gate.t[-1] - gate.t[0]) / model["step"]) + 1
+    _, y, *_ = dlsim((a, b, c, d, model["step"]), np.full((count, 1), gate.amplitude))
+    at = np.minimum(np.round((gate.t - gate.t[0]) / model["step"]).astype(int), count - 1)
+    return np.asarray(y[at, 0])
+
+
+def _margin_note(meta: Mapping[str, Any]) -> str:
+    delays = meta.get("delays") or {}
+    cuts = ", ".join(f"{w.replace('->', '→')}: {s:g} s" for w, s in delays.items()) or "none"
+    step_ = (
+        f" The communication step is {meta['step']:g} s; delays inserted by the order of the parts: {cuts}."
+        if "step" in meta
+        else ""
+    )
+    return f"Upper and lower gain limits as factors on the gain in dB.{step_}"

@@ -1,0 +1,204 @@
+"""Frequency responses and stability margins, of linear models and of measured points alike.
+
+A model is what gyrobench.linear.linear_model writes into run.json: A, B, C, D with the names of inputs and outputs
+and a step
+(s; 0: continuous).  Margins come from python-control on a dense frequency response, for both kinds of model and for
+points interpolated between measured frequencies: what is compared is found in one way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.loops.loop_measures import Point
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+DENSE = 2000  # points of a response on which margins are looked for
+
+
+def model_response(model: Mapping[str, Any], f: Sequence[float] | Array) -> Complex:
+    """Frequency response of a model: array (frequency, output, input)."""
+    a, b, c, d = (np.asarray(model[k], float) for k in "ABCD")
+    n = len(model["states"])
+    a, b, c = a.reshape(n, n), b.reshape(n, len(model["inputs"])), c.reshape(len(model["outputs"]), n)
+    d = d.reshape(len(model["outputs"]), len(model["inputs"]))
+    s = 2j * np.pi * np.asarray(f, float)
+    s = np.exp(s * model["step"]) if model["step"] else s
+    solved = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
+    return np.asarray(c @ solved + d)
+
+
+def excited(model: Mapping[str, Any], kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
+    """Response of a channel ("slot.output") to an excitation: torque, command, test, or motion (angle of the base).
+
+    A motion moves angle, rate and acceleration at once; they are summed as 1, s, s^2.  Raises KeyError where the model
+    has no such output or the excitation is not wired.
+    """
+    names = ("motion_angle", "motion_rate", "motion_acceleration") if kind == "motion" else (kind,)
+    if output not in model["outputs"]:
+        raise KeyError(f"{output} is no channel of the linear model; {', '.join(model['outputs'])}")
+    all_of_them = model_response(model, f)[:, model["outputs"].index(output), :]
+    s = 2j * np.pi * np.asarray(f, float)
+    total = np.zeros(s.size, complex)
+    found = False
+    for power, name in enumerate(names):
+        for j, wired in enumerate(model["inputs"]):
+            if wired.partition(".")[2] == f"{name}[{axis}]":
+                total += s**power * all_of_them[:, j]
+                found = True
+    if not found:
+        raise KeyError(f"{kind} on axis {axis} goes nowhere in this system")
+    return total
+
+
+def grid(low: float, high: float, count: int = DENSE) -> Array:
+    """Frequencies equally spaced in the logarithm."""
+    return np.geomspace(low, high, count)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Where |L| = 1 and where the phase of L is -180 degrees.
+
+    crossovers: (Hz, phase margin in degrees).  gains: (Hz, factor on the gain that brings the loop to its limit).
+    upper, lower: smallest factor above 1 and largest below 1, None where there is none; a loop with a lower one is
+    conditionally stable: it becomes unstable when its gain falls, too.
+    """
+
+    crossovers: list[tuple[float, float]] = field(default_factory=list)
+    gains: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def crossover(self) -> float | None:
+        """The frequency (Hz) of the smallest phase margin."""
+        return min(self.crossovers, key=lambda c: abs(c[1]))[0] if self.crossovers else None
+
+    @property
+    def phase(self) -> float | None:
+        return min((c[1] for c in self.crossovers), key=abs) if self.crossovers else None
+
+    @property
+    def upper(self) -> float | None:
+        return min((g for _, g in self.gains if g > 1.0), default=None)
+
+    @property
+    def lower(self) -> float | None:
+        return max((g for _, g in self.gains if 0.0 < g < 1.0), default=None)
+
+    def row(self, name: str) -> list[Any]:
+        """Of a table with :data:`COLUMNS`."""
+
+        def db(x: float | None) -> float | None:
+            return None if x is None else 20.0 * math.log10(x)
+
+        at = {g: f for f, g in self.gains}
+        upper, lower = self.upper, self.lower
+        return [name, self.crossover, self.phase, db(upper), at.get(upper or 0.0), db(lower), at.get(lower or 0.0)]
+
+
+COLUMNS = [
+    "loop gain",
+    "crossover / Hz",
+    "phase margin / °",
+    "gain margin / dB",
+    "at / Hz",
+    "lower gain limit / dB",
+    "at_Hz",
+]
+
+
+def margins(f: Array, gain: Complex) -> Margins:
+    """Margins of a loop gain given densely (some hundred points) over rising frequencies, by python-control."""
+    import control
+
+    data = control.frd(np.asarray(gain), 2.0 * np.pi * np.asarray(f), smooth=True)
+    gm, pm, _, w_phase, w_gain, _ = control.stability_margins(data, returnall=True)
+    return Margins(
+        [(float(w) / (2.0 * math.pi), float(p)) for w, p in zip(np.atleast_1d(w_gain), np.atleast_1d(pm), strict=True)],
+        [
+            (float(w) / (2.0 * math.pi), float(g))
+            for w, g in zip(np.atleast_1d(w_phase), np.atleast_1d(gm), strict=True)
+        ],
+    )
+
+
+def between(points: Sequence[Point], f: Array, spline: bool = False) -> Complex:
+    """Measured points interpolated in log gain and unwrapped phase over log frequency, monotone between points.
+
+    Consecutive points must not turn by more than 180 degrees; f must lie inside their range.  spline: by a cubic spline
+    instead, which is smoother and may overshoot.
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    known = sorted(points, key=lambda p: p.f)
+    x = np.log([p.f for p in known])
+    curve = CubicSpline if spline else PchipInterpolator
+    size = curve(x, np.log([abs(p.value) for p in known]))(np.log(f))
+    turn = curve(x, np.unwrap(np.angle([p.value for p in known])))(np.log(f))
+    return np.asarray(np.exp(size + 1j * turn))
+
+
+def measured_margins(points: Sequence[Point]) -> Margins:
+    """Margins inside the range of the measured frequencies (4 points at least, else none)."""
+    if len(points) < 4:
+        return Margins()
+    f = grid(min(p.f for p in points), max(p.f for p in points))
+    return margins(f, between(points, f))
+
+
+def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
+    """What measured points say of the loop's limits: name -> (value, standard uncertainty).
+
+    crossover (Hz) and phase (degrees) of the smallest phase margin; upper and f_upper, lower and f_lower: the factors
+    on the gain to the next limits, and their frequencies (Hz).  Missing where the range of the points has none.  The
+    uncertainty holds that of the nearest points and the difference of two interpolations between them.
+    """
+    if len(points) < 4:
+        return {}
+    f = grid(min(p.f for p in points), max(p.f for p in points))
+    shown, other = margins(f, between(points, f)), margins(f, between(points, f, spline=True))
+    found: dict[str, tuple[float, float]] = {}
+    if shown.crossovers:
+        cross, phase = min(shown.crossovers, key=lambda c: abs(c[1]))
+        u, fall, turn = _around(points, cross)
+        twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
+        u_f = u / abs(fall) if fall else 0.0
+        found["crossover"] = cross, math.hypot(cross * u_f, twin[0] - cross)
+        found["phase"] = phase, math.hypot(math.degrees(math.hypot(u, turn * u_f)), twin[1] - phase)
+    for name, factor in (("upper", shown.upper), ("lower", shown.lower)):
+        if factor is None:
+            continue
+        at = next(x for x, g in shown.gains if g == factor)
+        u, fall, turn = _around(points, at)
+        same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
+        u_f = u / abs(turn) if turn else 0.0
+        found[name] = factor, math.hypot(factor * math.hypot(u, fall * u_f), same[1] - factor)
+        found[f"f_{name}"] = at, math.hypot(at * u_f, same[0] - at)
+    return found
+
+
+def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:
+    """Relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
+    u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / f)))[:2])
+    near = np.clip([0.99 * f, 1.01 * f], min(p.f for p in points), max(p.f for p in points))
+    gain = between(points, near)
+    span = math.log(near[1] / near[0])
+    return u, math.log(abs(gain[1]) / abs(gain[0])) / span, float(np.angle(gain[1] / gain[0])) / span
+
+
+def deviation(points: Sequence[Point], model: Complex, up_to: float) -> tuple[float, float]:
+    """Largest difference of measured points to a model at the same frequencies, up to a frequency: (dB, degrees)."""
+    ratios = [p.value / m for p, m in zip(points, model, strict=True) if p.f <= up_to * (1.0 + 1e-9)]
+    if not ratios:
+        return 0.0, 0.0
+    return (
+        max(abs(20.0 * math.log10(abs(r))) for r in ratios),
+        max(abs(math.degrees(math.atan2(r.imag, r.real))) for r in ratios),
+    )

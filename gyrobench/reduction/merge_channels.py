@@ -1,0 +1,105 @@
+"""Several results of one run - channels measured at once, parts of a suite - as one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.result import Result
+
+
+def merge(
+    results: Mapping[str, Result], *, equation: str | None = None, summary: Sequence[str] | None = None,
+    tables: Sequence[dict[str, Any]] = (), warnings: Sequence[str] = (),
+) -> Result:  # fmt: skip
+    """One result of ``results`` (channel -> result, printed as "x channel: ..."), in this order.
+
+    Coefficients, series, tests, budget and tables follow one another, named by channel where channels could have the
+    same name.  The estimates of different channels are taken as uncorrelated: the correlation is block-diagonal.
+    condition: the worst; rank and dof: sums; residual_std: pooled.  Autocorrelation, Allan deviation and spectrum
+    are those of the channel with the largest residuals (of those in the unit of the first); ``noise`` says which.  A
+    warning or convention that all share is said once.  Title, method, site, instrument, provenance: of the first.
+    equation: Typst math in place of the channels' own below one another.  Raises ValueError for coefficients of the
+    same name.
+    """
+    labels, parts = list(results), list(results.values())
+    first = parts[0]
+    coefficients = [c for r in parts for c in r.coefficients]
+    names = [c.name for c in coefficients]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ValueError(f"coefficient {', '.join(twice)} in more than one channel; name them apart")
+    same = [r for r in parts if r.residual_unit == first.residual_unit]
+    loud = max(same, key=lambda r: r.residual_std)
+    dof = sum(r.dof for r in same)
+    spread = math.sqrt(sum(r.dof * r.residual_std**2 for r in same) / dof) if dof > 0.0 else 0.0
+    noise = {f"{n}: {key}": value for n, r in results.items() for key, value in r.noise.items()}
+    if len(same) > 1:
+        noise["channel of autocorrelation, Allan deviation and spectrum"] = labels[parts.index(loud)]
+    equations = list(dict.fromkeys(r.equation for r in parts if r.equation))
+    return replace(
+        first,
+        sources=_once([r.sources for r in parts]),
+        equation=" \\ ".join(equations) if equation is None else equation,
+        conventions=_shared(labels, [r.conventions for r in parts]),
+        coefficients=coefficients,
+        series=[replace(s, label=f"{n}: {s.label}") for n, r in results.items() for s in r.series],
+        correlation=_block([r.correlation for r in parts]),
+        condition=max(r.condition for r in parts),
+        rank=sum(r.rank for r in parts),
+        dof=sum(r.dof for r in parts),
+        noise=noise,
+        tests=[replace(t, name=f"{t.name}, {n}") for n, r in results.items() for t in r.tests],
+        residual_std=spread,
+        acf=loud.acf,
+        allan=loud.allan,
+        psd=loud.psd,
+        harmonics=[{**h, "series": f"{n}: {h.get('series', '')}"} for n, r in results.items() for h in r.harmonics],
+        budget=[b for r in parts for b in r.budget],
+        type_b=_side_by_side(parts),
+        repeatability={f"{n}: {key}": value for n, r in results.items() for key, value in r.repeatability.items()},
+        tables=[
+            *({**t, "title": f"{t.get('title', '')}, {n}".lstrip(", ")} for n, r in results.items() for t in r.tables),
+            *tables,
+        ],
+        warnings=[*_shared(labels, [r.warnings for r in parts]), *warnings],
+        summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
+        verdict=uncertainty.overall(r.verdict for r in parts),
+        simulated=any(r.simulated for r in parts),
+    )
+
+
+def _once(lists: list[list[str]]) -> list[str]:
+    return list(dict.fromkeys(text for texts in lists for text in texts))
+
+
+def _shared(labels: list[str], lists: list[list[str]]) -> list[str]:
+    """Every text once: as it is when all lists hold it, else after the names of those that do."""
+    out = []
+    for text in _once(lists):
+        who = [n for n, texts in zip(labels, lists, strict=True) if text in texts]
+        out.append(text if len(who) == len(labels) else f"{', '.join(who)}: {text}")
+    return out
+
+
+def _side_by_side(parts: list[Result]) -> list[dict[str, Any]]:
+    """Type B of each channel, with zeros for the others: taken as independent from channel to channel."""
+    size, out, at = sum(len(r.coefficients) for r in parts), [], 0
+    for r in parts:
+        n = len(r.coefficients)
+        for b in r.type_b:
+            changes = [[0.0] * at + list(c) + [0.0] * (size - at - n) for c in b["changes"]]
+            out.append({"source": b["source"], "changes": changes})
+        at += n
+    return out
+
+
+def _block(blocks: list[list[list[float]]]) -> list[list[float]]:
+    size, out, at = sum(len(b) for b in blocks), [], 0
+    for b in blocks:
+        out += [[0.0] * at + list(row) + [0.0] * (size - at - len(row)) for row in b]
+        at += len(b)
+    return out

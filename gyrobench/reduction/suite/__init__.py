@@ -1,0 +1,1 @@
+"""Several tests of one instrument: equal quantities, consistency."""

@@ -1,0 +1,138 @@
+"""The same quantity in several results: which combinations of coefficients each test sees, and what it says of them.
+
+A test reports b = A theta with the combinations A of :attr:`Coefficient.combination`; another quantity a' theta can be
+had from it when a lies in the row space of A: a = A' c, value c' b, u^2 = c' V c.  Where |f| is the same in all
+attitudes D_OO is folded into the others (see gyrobench.reduction.estimation.linear_fit), so that tests at one site
+compare as they are.
+
+Not modelled: correlation of type A between tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, units
+from gyrobench.reduction.result import Coefficient, Result
+from gyrobench.reduction.suite.consistency import Value
+
+Array = NDArray[np.float64]
+MODEL = {n for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
+SAME = 2e-5  # combinations closer than this are one: four seconds of arc in an attitude
+CLOSE = 1e-9  # a quantity is seen when it is put together to this fraction
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A quantity: printed name, unit and meaning, and the combination of coefficients that it is."""
+
+    name: str
+    unit: str
+    meaning: str
+    combination: Mapping[str, float]
+
+
+def combination(c: Coefficient) -> dict[str, float]:
+    """Of an estimate; one that is outside the drift models is its own symbol, with its unit."""
+    given = c.combination or {c.name: 1.0}
+    return {n if n in MODEL else f"{n} / {c.unit}": float(x) for n, x in given.items() if x != 0.0}
+
+
+def _vector(made_of: Mapping[str, float], basis: Sequence[str]) -> Array:
+    return np.array([made_of.get(n, 0.0) for n in basis])
+
+
+def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
+    """Whether two combinations differ by a factor at most, to :data:`SAME`."""
+    basis = sorted({*a, *b})
+    x, y = _vector(a, basis), _vector(b, basis)
+    x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+    return bool(min(np.max(np.abs(x - y)), np.max(np.abs(x + y))) < SAME)
+
+
+def _shown(c: Coefficient) -> Compared:
+    """Under the model's name where it is one coefficient: u_zx = -gamma Dy_y is compared as Dy_y."""
+    made_of = combination(c)
+    name = next(iter(made_of))
+    if len(made_of) == 1 and name in MODEL:
+        return Compared(name, units.display(drift.surface_unit(name)), drift.meaning(name), {name: 1.0})
+    return Compared(c.name, c.unit, c.meaning, made_of)
+
+
+def quantities(results: Mapping[str, Result]) -> list[Compared]:
+    """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
+    each: list[tuple[Compared, str]] = []
+    for label, result in results.items():
+        for c in result.coefficients:
+            new = _shown(c)
+            if not any(_same(new.combination, q.combination) for q, _ in each):
+                each.append((new, label))
+    names = [q.name for q, _ in each]
+    found = [  # ω_d in one attitude, and in another
+        q if names.count(q.name) == 1 else replace(q, name=f"{q.name}, {label}") for q, label in each
+    ]
+    place = {n: k for k, n in enumerate((*drift.NAMES, *drift.NAMES_2DOF["x"], *drift.NAMES_2DOF["y"]))}
+
+    def rank(q: Compared) -> tuple[int, int]:
+        plain = len(q.combination) == 1
+        first = place.get(next(iter(q.combination)), len(place))
+        return (0 if plain and first < len(place) else 1 if not plain else 2, first)
+
+    return sorted(found, key=rank)
+
+
+def weights(quantity: Compared, result: Result) -> Array | None:
+    """c (q,) of quantity = c' estimates; None where the test does not see it."""
+    made_of = [combination(c) for c in result.coefficients]
+    for j, own in enumerate(made_of):
+        if _same(own, quantity.combination):  # as it was reported, whatever else could be put together
+            name = max(own, key=lambda n: abs(own[n]))
+            out = np.zeros(len(made_of))
+            out[j] = quantity.combination[name] / own[name]
+            return out
+    basis = sorted({n for m in (*made_of, quantity.combination) for n in m})
+    A = np.array([_vector(m, basis) for m in made_of])
+    a = _vector(quantity.combination, basis)
+    c, *_ = np.linalg.lstsq(A.T, a, rcond=None)
+    if np.max(np.abs(A.T @ c - a)) > CLOSE * np.max(np.abs(a)):
+        return None
+    return np.asarray(np.where(np.abs(c) < CLOSE * np.max(np.abs(c)), 0.0, c), dtype=float)
+
+
+def value(label: str, quantity: Compared, result: Result, shared: Collection[str]) -> Value | None:
+    """What the test says of the quantity; None where it does not see it.  shared: sources of type B of all tests."""
+    c = weights(quantity, result)
+    if c is None:
+        return None
+    each = result.coefficients
+    used = np.flatnonzero(c)
+    u_a = np.array([e.u if e.u_a is None else e.u_a for e in each])
+    rho = np.array(result.correlation, dtype=float) if len(result.correlation) == len(each) else np.eye(len(each))
+    v = c * u_a
+    square = float(v @ rho @ v)
+    u_b = 0.0
+    common: dict[str, Array] = {}
+    for b in result.type_b:
+        change = np.array(b["changes"], dtype=float) @ c
+        if b["source"] in shared:
+            common[b["source"]] = np.append(common.get(b["source"], np.zeros(0)), change)
+        else:
+            u_b = math.hypot(u_b, float(np.linalg.norm(change)))
+    known = [each[j].truth for j in used]
+    truth = None
+    if all(t is not None for t in known):
+        truth = sum(float(c[j]) * float(each[j].truth or 0.0) for j in used)
+    dof = min((each[j].dof or math.inf for j in used), default=math.inf)
+    name = each[used[0]].name if used.size == 1 else ""
+    estimate = float(c @ np.array([e.estimate for e in each]))
+    return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
+
+
+def ideal(result: Result) -> bool:
+    """Noise was off: residuals are rounding and u means nothing."""
+    return all(c.truth is not None and c.z is None for c in result.coefficients) and bool(result.coefficients)

@@ -1,0 +1,318 @@
+"""Several tests of one instrument as one result: every quantity by every method that sees it.
+
+    together({"tumble_single_axis": Member(result, ...), "servo_polar": Member(...)}, shared=("torquer scale factor",))
+
+``Result.coefficients`` are the weighted means (the one value, where only one method sees a quantity); ``Result.suite``
+holds what the report's cross-method tables show, numbers in printed units.  [CROSS-MAP;
+gyrobench.reduction.suite.consistency]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from gyrobench import drift
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.result import Coefficient, Result, Test
+from gyrobench.reduction.suite import consistency, estimable_combinations
+from gyrobench.reduction.suite.consistency import LEVEL, Value
+from gyrobench.reduction.suite.estimable_combinations import Compared
+from gyrobench.reduction.window_checks import ReductionError
+
+Limits = Mapping[str, tuple[float | None, float | None]]
+FAMILIES = {
+    "single-degree-of-freedom gyro": drift.NAMES,
+    "two-degree-of-freedom gyro": sum(drift.NAMES_2DOF.values(), ()),
+}
+RULE = (
+    "Where the normalized error E_n of two methods exceeds 1 they differ by more than their expanded uncertainties; of "
+    "methods that agree 5 % of the pairs do. The methods agree about a quantity when the consistency test gives p ≥ "
+    f"{LEVEL:g}, p adjusted for the number of quantities (Holm). Where they do not, the u of the combined value is "
+    "enlarged by the Birge ratio and conformity is not stated (inconclusive)."
+)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A test of the suite: its result, the id of its report, where its run is kept, and more facts for the report."""
+
+    result: Result
+    report_id: str = ""
+    folder: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Compare:
+    """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
+
+    quantity: Compared
+    values: tuple[Value, ...]
+    found: consistency.Agreement | None
+    p: float | None = None  # adjusted for the number of quantities
+
+    @property
+    def disagree(self) -> bool:
+        return self.p is not None and self.p < LEVEL
+
+    @property
+    def truth(self) -> float | None:
+        known = [v.truth for v in self.values]
+        if any(t is None for t in known):
+            return None
+        low, high = min(t for t in known if t is not None), max(t for t in known if t is not None)
+        return low if high - low <= 1e-6 * max(abs(low), abs(high), 1e-3) else None
+
+    def words(self) -> str:
+        """Which methods disagree, and by how much."""
+        if self.found is None:
+            return "one method only" if len(self.values) == 1 else "no noise: nothing to weigh with"
+        far = [f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0]
+        if not self.disagree:
+            return f"agree; E_n > 1: {', '.join(far)}" if far else "agree"
+        off = consistency.outlier(self.values)
+        if off is not None:
+            others = consistency.agree([v for v in self.values if v.label != off[0]])
+            mine = next(v for v in self.values if v.label == off[0])
+            apart = mine.estimate - others.mean
+            size = f"{apart:+.2g} {self.quantity.unit}".replace("-", "−")
+            return f"{off[0]} is off by {size}; the others agree (p = {off[1]:.2g})"
+        which = "; which of them is off cannot be told" if len(self.values) < 3 or len(far) < 2 else ""
+        return f"disagree: {', '.join(f'E_n of {x}' for x in far) or 'all of them a little'}{which}"
+
+
+def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Compare]:
+    """Every quantity that the results report, by every one that sees it."""
+    shared = common(results, shared)
+    noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
+    out = []
+    for q in estimable_combinations.quantities(results):
+        seen = [estimable_combinations.value(label, q, r, shared) for label, r in results.items()]
+        values = tuple(v for v in seen if v is not None)
+        weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
+        out.append(Compare(q, values, consistency.agree(values) if weighed else None))
+    tested = [k for k, c in enumerate(out) if c.found is not None]
+    adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
+    for k, p in zip(tested, adjusted, strict=True):
+        out[k] = Compare(out[k].quantity, out[k].values, out[k].found, p)
+    return out
+
+
+def common(results: Mapping[str, Result], shared: Collection[str]) -> list[str]:
+    """Those of the sources ``shared`` that two results or more name."""
+    named = [{b["source"] for b in r.type_b} for r in results.values()]
+    return sorted(s for s in set(shared) if sum(s in sources for sources in named) > 1)
+
+
+def problems(results: Mapping[str, Result]) -> list[str]:
+    """Why the results are not of one instrument, as sentences."""
+    found = []
+    families: dict[str, list[str]] = {}
+    for label, r in results.items():
+        names = {n for c in r.coefficients for n in estimable_combinations.combination(c)}
+        for family, known in FAMILIES.items():
+            if names & set(known):
+                families.setdefault(family, []).append(label)
+    if len(families) > 1:
+        said = "; ".join(f"{', '.join(labels)}: of a {family}" for family, labels in families.items())
+        found.append(f"{said}; a suite is of one gyro, so leave out the tests of one of the two")
+    kinds = {kind: [n for n, r in results.items() if r.simulated is kind] for kind in (True, False)}
+    if all(kinds.values()):
+        found.append(f"{', '.join(kinds[True])}: simulated; {', '.join(kinds[False])}: measured; not of one gyro")
+    named: dict[str, list[str]] = {}
+    for label, r in results.items():
+        if r.instrument and not r.simulated:
+            named.setdefault(r.instrument, []).append(label)
+    if len(named) > 1:
+        said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in named.items())
+        found.append(f"tests of different instruments: {said}")
+    return found
+
+
+def differences(results: Mapping[str, Result], slots: Sequence[str] = ("gyro", "accelerometer")) -> list[str]:
+    """Where the simulated instrument was not the same in all tests, as sentences."""
+    said: dict[str, dict[str, list[str]]] = {}
+    for label, r in results.items():
+        run = r.provenance
+        for slot in slots:
+            part = (run.get("parts") or {}).get(slot)
+            if part is None:
+                continue
+            facts = {f"{slot}, its FMU": str(part.get("sha256", ""))[:16]}
+            own = (run.get("parameters") or {}).items()
+            facts |= {n: repr(v) for n, v in own if n.startswith(f"{slot}.") and not n.endswith((".seed", ".mount"))}
+            for name, value in facts.items():
+                said.setdefault(name, {}).setdefault(value, []).append(label)
+    several = {n: values for n, values in said.items() if len(values) > 1}
+    return [
+        f"Not the same in all tests: {n} = " + "; ".join(f"{v} in {', '.join(who)}" for v, who in values.items()) + "."
+        for n, values in several.items()
+    ]
+
+
+def together(
+    members: Mapping[str, Member], *, system: str, title: str, method: str, sources: Sequence[str],
+    conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Limits | None = None,
+    failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
+) -> Result:  # fmt: skip
+    """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
+
+    failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
+    """
+    results = {label: m.result for label, m in members.items()}
+    if not results:
+        raise ReductionError("no test of the suite has a result")
+    if wrong := problems(results):
+        raise ReductionError(wrong)
+    compared = compare(results, shared)
+    coefficients = [_coefficient(c, specification or {}) for c in compared]
+    first = next(iter(results.values()))
+    tests = [
+        Test(f"methods agree, {c.quantity.name}", c.found.Q, c.found.p, "methods that differ by more than u", c.words())
+        for c in compared
+        if c.found is not None
+    ]
+    sites = [r.site for r in results.values()]
+    out = Result(
+        system=system, title=title, method=method, sources=list(sources), equation="",
+        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
+        coefficients=coefficients, series=[], correlation=[], condition=math.nan, rank=len(coefficients), dof=math.nan,
+        noise={}, tests=tests, residual_std=math.nan, residual_unit=first.residual_unit,
+        decision_rule=uncertainty.DECISION_RULE, verdict=uncertainty.overall(c.verdict for c in coefficients),
+        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
+        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
+        simulated=first.simulated, provenance=dict(provenance or {}),
+    )  # fmt: skip
+    out.suite = {
+        "rule": RULE,
+        "shared": common(results, shared),
+        "members": [_member(label, m) for label, m in members.items()],
+        "failed": [{"label": n, "reason": why} for n, why in (failed or {}).items()],
+        "quantities": [_row(c) for c in compared],
+        "pairs": [
+            {"quantity": c.quantity.name, "unit": c.quantity.unit, "a": p.a, "b": p.b, "difference": p.difference,
+             "U": p.U, "E_n": p.E_n}
+            for c in compared if c.found is not None for p in c.found.pairs
+        ],
+        **_verdict(compared),
+    }  # fmt: skip
+    out.summary = _summary(out, compared)
+    out.warnings = _warnings(results, compared, failed or {})
+    return out
+
+
+def _coefficient(c: Compare, limits: Limits) -> Coefficient:
+    q, a = c.quantity, c.found
+    limit = limits.get(q.name)
+    if a is not None:
+        wide = max(1.0, a.birge) if c.disagree else 1.0
+        estimate, u, U, u_a, dof = a.mean, a.u * wide, a.U * wide, a.u_a * wide, a.dof
+        meaning = q.meaning
+    else:
+        v = min(c.values, key=lambda v: v.u)
+        estimate, u, U, u_a, dof = v.estimate, v.u, v.U, v.u_a, v.dof
+        meaning = f"{q.meaning}; {v.label} only" if len(c.values) == 1 else q.meaning
+    truth = c.truth
+    verdict = uncertainty.verdict(estimate, U, limit)
+    return Coefficient(
+        name=q.name, meaning=meaning, unit=q.unit, estimate=estimate, u=u, k=U / u if u > 0.0 else NORMAL,
+        interval=(estimate - U, estimate + U), u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
+        z=(estimate - truth) / u if truth is not None and u > 0.0 and (a is not None or len(c.values) == 1) else None,
+        limit=limit, verdict="inconclusive" if c.disagree and limit else verdict, combination=dict(q.combination),
+    )  # fmt: skip
+
+
+def _row(c: Compare) -> dict[str, Any]:
+    a = c.found
+    weights = a.weights.tolist() if a is not None else [None] * len(c.values)
+    return {
+        "name": c.quantity.name, "unit": c.quantity.unit, "meaning": c.quantity.meaning,
+        "combination": dict(c.quantity.combination), "truth": c.truth,
+        "values": [
+            {"label": v.label, "estimate": v.estimate, "u": v.u, "U": v.U,
+             "u_a": v.u_a, "u_b": v.u_b, "u_shared": v.u_shared, "dof": v.dof if math.isfinite(v.dof) else None,
+             "weight": w, "truth": v.truth, "how": _how(v.reported, c.quantity.name)}
+            for v, w in zip(c.values, weights, strict=True)
+        ],
+        "mean": None if a is None else {"estimate": a.mean, "u": a.u, "U": a.U},
+        "Q": a.Q if a else None, "dof": len(c.values) - 1 if a else None, "birge": a.birge if a else None,
+        "p": a.p if a else None, "p_adjusted": c.p, "largest E_n": max(p.E_n for p in a.pairs) if a else None,
+        "verdict": "disagree" if c.disagree else "agree" if a else "–", "words": c.words(),
+    }  # fmt: skip
+
+
+def _how(reported: str, name: str) -> str:
+    if not reported:
+        return "from several of its estimates"
+    return "as reported" if reported == name else f"reported as {reported}"
+
+
+def _member(label: str, m: Member) -> dict[str, Any]:
+    r = m.result
+    return {
+        "label": label, "system": r.system, "title": r.title, "method": r.method, "report_id": m.report_id,
+        "folder": m.folder, "verdict": r.verdict, "summary": list(r.summary), "warnings": list(r.warnings),
+        "site": dict(r.site), "instrument": r.instrument, "residual_std": r.residual_std, "unit": r.residual_unit,
+        "condition": r.condition, "rank": r.rank, "windows": sum(len(s.y) for s in r.series), **m.facts,
+        "estimates": [
+            {k: getattr(c, k) for k in ("name", "unit", "estimate", "u", "k", "interval", "truth", "z")}
+            for c in r.coefficients
+        ],
+    }  # fmt: skip
+
+
+def _verdict(compared: Sequence[Compare]) -> dict[str, Any]:
+    tested = [c for c in compared if c.p is not None]
+    bad = [c for c in tested if c.disagree]
+    pairs = [p for c in tested if c.found for p in c.found.pairs]
+    return {
+        "consistency": "inconsistent" if bad else "consistent" if tested else "not tested",
+        "p": min((c.p for c in tested if c.p is not None), default=None),
+        "tested": len(tested),
+        "disagreeing": [c.quantity.name for c in bad],
+        "pairs_apart": sum(p.E_n > 1.0 for p in pairs),
+    }
+
+
+def _summary(r: Result, compared: Sequence[Compare]) -> list[str]:
+    s, many = r.suite, len(r.suite["pairs"])
+    if s["consistency"] == "not tested":
+        return ["No quantity is seen by two methods with a noise of their own: nothing was compared."]
+    agreed = f"The methods agree wherever two or more see the same ({s['tested']} of {len(compared)} quantities)"
+    apart = f"The methods do not agree about {', '.join(s['disagreeing'])}"
+    first = agreed if s["consistency"] == "consistent" else apart
+    return [
+        f"{first}; smallest adjusted p = {s['p']:.2g}.",
+        *(f"{c.quantity.name}: {c.words()}." for c in compared if c.disagree),
+        f"E_n > 1 in {s['pairs_apart']} of {many} pairs; about {0.05 * many:.2g} would be by chance.",
+    ]
+
+
+def _warnings(results: Mapping[str, Result], compared: Sequence[Compare], failed: Mapping[str, str]) -> list[str]:
+    out = [f"{label} gave no result: {why}" for label, why in failed.items()]
+    out += differences(results)
+    sites = {label: str(r.site) for label, r in results.items()}
+    if len(set(sites.values())) > 1:
+        out.append(
+            "The site values of the tests differ, as each test says below; where gravity differs, what is folded in "
+            "from D_OO differs too."
+        )
+    own = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
+    if own:
+        out.append(f"Tests with warnings of their own, which stand with each test: {', '.join(own)}.")
+    lonely = [c.quantity.name for c in compared if len(c.values) == 1]
+    if lonely:
+        out.append(f"Seen by one method only, so confirmed by no other: {', '.join(lonely)}.")
+    negative = [c.quantity.name for c in compared if c.found is not None and min(c.found.weights) < 0.0]
+    if negative:
+        out.append(f"{', '.join(negative)}: a weight is negative, as methods share an error of different size.")
+    return out
+
+
+def _shared(result: Result, results: Mapping[str, Result]) -> list[str]:
+    """Conventions that all tests state alike."""
+    return [s for s in result.conventions if all(s in r.conventions for r in results.values())]

@@ -1,0 +1,289 @@
+"""Results side by side: what differs between the runs, then what that did to the coefficients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from gyrobench.reduction.result import Result
+from gyrobench.report import plots, ranking_section, responses
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import (
+    Cell,
+    Column,
+    Fold,
+    Page,
+    Picture,
+    Pictures,
+    Row,
+    Section,
+    Table,
+    Text,
+    number_cell,
+    text_cell,
+)
+from gyrobench.report.result_json import content_hash, document
+from gyrobench.report.style import HALF, figure, styled, svg
+from gyrobench.report.tables import compact
+
+Json = dict[str, Any]
+SCHEMA = "gyrobench-comparison-1"
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_ABREAST = 3  # runs in one table, so that it fits on paper
+
+
+def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json:
+    """The content of ``comparison.json``.
+
+    Differences are run minus baseline; their standard uncertainty takes the runs as independent and the
+    larger coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty.
+    Raises ValueError for fewer than two results, repeated names or an unknown baseline.
+    """
+    names = [name for name, _ in results]
+    if len(results) < 2:
+        raise ValueError("a comparison needs at least two results")
+    if len(set(names)) < len(names):
+        raise ValueError(f"names of results must differ: {', '.join(names)}")
+    if not 0 <= baseline < len(results):
+        raise ValueError(f"baseline {baseline} is not one of the {len(results)} results (0 to {len(results) - 1})")
+    docs = [document(result) for _, result in results]
+    facts = [_facts(doc) for doc in docs]
+    keys = list(dict.fromkeys(k for f in facts for k in f))
+    rows = [row for key in keys for row in _spread(key, [f.get(key) for f in facts])]
+    content = {
+        "baseline": baseline,
+        "runs": [
+            {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")} | {"name": name}
+            for name, doc in zip(names, docs, strict=True)
+        ],
+        "ranking": ranking_section.ranking(docs),
+        "differing": [r for r in rows if any(v != r["values"][0] for v in r["values"])],
+        "equal": [
+            {"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])
+        ],
+        "measures": [
+            _measure(docs, key, baseline) for key in dict.fromkeys(_key(c) for d in docs for c in d["coefficients"])
+        ],
+        "responses": [
+            {"name": name, "runs": [next((r for r in doc["responses"] if r["name"] == name), None) for doc in docs]}
+            for name in dict.fromkeys(r["name"] for doc in docs for r in doc["responses"])
+        ],
+    }
+    return {"schema": SCHEMA, "report_id": content_hash(content), **content}
+
+
+def _key(coefficient: Json) -> tuple[str, str]:
+    return coefficient["name"], coefficient["unit"]
+
+
+def _measure(docs: Sequence[Json], key: tuple[str, str], baseline: int) -> Json:
+    found = [next((c for c in doc["coefficients"] if _key(c) == key), None) for doc in docs]
+    runs = [None if c is None else {k: c[k] for k in ("estimate", "u", "k", "interval", "truth")} for c in found]
+    meaning = next(c["meaning"] for c in found if c is not None)
+    differences = [None if k == baseline else _difference(runs[k], runs[baseline]) for k in range(len(runs))]
+    return {"name": key[0], "unit": key[1], "meaning": meaning, "runs": runs, "differences": differences}
+
+
+def _difference(run: Json | None, base: Json | None) -> Json | None:
+    if run is None or base is None or run["estimate"] is None or base["estimate"] is None:
+        return None
+    value = run["estimate"] - base["estimate"]
+    if None in (run["u"], base["u"], run["k"], base["k"]):
+        return {"value": value, "u": None, "U": None, "significant": None}
+    u = math.hypot(run["u"], base["u"])
+    expanded = max(run["k"], base["k"]) * u
+    return {"value": value, "u": u, "U": expanded, "significant": abs(value) > expanded}
+
+
+def _facts(doc: Json) -> dict[str, Any]:
+    """Everything about a run that may explain a difference, by name."""
+    run = doc["provenance"]
+    facts: dict[str, Any] = {"system": doc["system"], "instrument": doc["instrument"], "method": doc["method"]}
+    facts |= {f"site {k}": v for k, v in doc["site"].items()}
+    facts |= {k: run.get(k) for k in ("seed", "step", "engine", "order", "operator", "date") if run.get(k) is not None}
+    for slot, part in (run.get("parts") or {}).items():
+        items = part.items() if isinstance(part, dict) else [("name", part)]
+        facts |= {f"part {slot}: {k}": v for k, v in items}
+    facts |= {f"parameter {k}": v for k, v in (run.get("parameters") or {}).items()}
+    facts |= {f"option {k}": v for k, v in (run.get("options") or {}).items()}
+    facts |= {f"version {k}": v for k, v in (run.get("versions") or {}).items()}
+    facts |= {f"plan phase {k + 1}": phase for k, phase in enumerate(run.get("plan") or [])}
+    facts["noise model"] = doc["noise"].get("model")
+    return facts
+
+
+def _spread(what: str, values: list[Any]) -> list[Json]:
+    """A fact as rows: lists and dictionaries that differ are taken apart, so that only what differs is shown."""
+    differs = any(v != values[0] for v in values)
+    if differs and all(isinstance(v, dict) for v in values):
+        keys = list(dict.fromkeys(k for v in values for k in v))
+        return [row for k in keys for row in _spread(f"{what}, {k}", [v.get(k) for v in values])]
+    if differs and all(isinstance(v, list) and len(v) == len(values[0]) for v in values):
+        parts = [(k, [v[k] for v in values]) for k in range(len(values[0]))]
+        return [
+            row for k, part in parts if any(p != part[0] for p in part) for row in _spread(f"{what}[{k + 1}]", part)
+        ]
+    return [{"what": what, "values": values}]
+
+
+def page(doc: Json) -> Page:
+    """The report of a comparison document."""
+    runs = doc["runs"]
+    base = _letter(doc["baseline"])
+    head = [
+        ("Report", doc["report_id"]),
+        ("Baseline", f"{base}, {runs[doc['baseline']]['name']}"),
+        ("Runs", ", ".join(f"{_letter(k)} {run['name']}" for k, run in enumerate(runs))),
+    ]
+    titles = dict.fromkeys(run["title"] for run in runs)
+    with styled():
+        sections = [
+            ranking_section.section(doc, [_letter(k) for k in range(len(runs))]),
+            Section("What differs", "differs", [_runs(doc), *_differing(doc)]),
+            Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
+            Section("Side by side", "figures", [*responses.side_by_side(doc, _letter), *_figures(doc)]),
+            Section("What is equal", "equal", _equal(doc)),
+        ]
+    return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
+
+
+def _letter(k: int) -> str:
+    return LETTERS[k] if k < len(LETTERS) else f"R{k + 1}"
+
+
+def _runs(doc: Json) -> Table:
+    rows = [
+        Row(
+            [
+                text_cell(_letter(k), "strong"),
+                *(text_cell(run[c]) for c in ("name", "system", "report_id")),
+                text_cell(run["verdict"], run["verdict"]),
+            ]
+        )
+        for k, run in enumerate(doc["runs"])
+    ]
+    columns = [Column(""), Column("run", wide=True), Column("system"), Column("report"), Column("verdict")]
+    return Table(columns, rows, "The runs.")
+
+
+def _differing(doc: Json) -> list[Any]:
+    if not doc["differing"]:
+        return [Text("The runs differ in nothing that was recorded.")]
+    count = len(doc["runs"])
+    blocks = []
+    for start in range(0, count, _ABREAST):
+        part = range(start, min(start + _ABREAST, count))
+        rows = [
+            Row([text_cell(row["what"]), *(_value(doc, ("differing", i, "values", k)) for k in part)])
+            for i, row in enumerate(doc["differing"])
+        ]
+        columns = [Column("what"), *(Column(_letter(k), wide=True) for k in part)]
+        blocks.append(
+            Table(columns, rows, "Parts, parameters and settings that differ; parameters in SI units.", small=True)
+        )
+    return blocks
+
+
+def _value(doc: Json, path: tuple[str | int, ...]) -> Cell:
+    """A fact as text; numbers carry their full value and their place in ``comparison.json``."""
+    cell = number_cell(doc, path, significant=8)
+    if not cell.number:
+        value: Any = doc
+        for key in path:
+            value = value[key]
+        text = value if isinstance(value, str) else compact(value, 60)
+        return Cell(_broken(text))
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer)
+
+
+def _broken(text: str) -> str:
+    """A long word without a place to break gets shortened (hashes: the first 16 digits)."""
+    return text if len(text) < 40 or " " in text else text[:16] + "…"
+
+
+def _estimates(doc: Json) -> list[Any]:
+    blocks = []
+    count = len(doc["runs"])
+    for start in range(0, count, _ABREAST):
+        part = range(start, min(start + _ABREAST, count))
+        rows = []
+        for i, m in enumerate(doc["measures"]):
+            cells = [text_cell(m["name"], "strong"), text_cell(m["unit"])]
+            for k in part:
+                u = m["runs"][k]["u"] if m["runs"][k] else None
+                cells += [number_cell(doc, ("measures", i, "runs", k, name), u) for name in ("estimate", "u")]
+            rows.append(Row(cells))
+        columns = [Column("name"), Column("unit")]
+        for k in part:
+            columns += [Column(_letter(k)), Column(f"u({_letter(k)})")]
+        blocks.append(Table(columns, rows, "Estimates and their standard uncertainties."))
+    return blocks
+
+
+def _differences(doc: Json) -> list[Any]:
+    base = doc["baseline"]
+    others = [k for k in range(len(doc["runs"])) if k != base]
+    all_of_them = [d for m in doc["measures"] for d in m["differences"] if d and d["significant"] is not None]
+    marked = sum(bool(d["significant"]) for d in all_of_them)
+    blocks: list[Any] = []
+    for start in range(0, len(others), _ABREAST):
+        part = others[start : start + _ABREAST]
+        rows = []
+        for i, m in enumerate(doc["measures"]):
+            cells = [text_cell(m["name"], "strong"), text_cell(m["unit"])]
+            for k in part:
+                d = m["differences"][k]
+                u, mark = (d["u"], "significant" if d["significant"] else "") if d else (None, "")
+                path = ("measures", i, "differences", k)
+                cells += [number_cell(doc, (*path, "value"), u, mark=mark), number_cell(doc, (*path, "U"), u)]
+                cells.append(text_cell("" if d is None else "significant" if d["significant"] else "–", mark))
+            rows.append(Row(cells))
+        columns = [Column("name"), Column("unit")]
+        for k in part:
+            name = f"{_letter(k)} − {_letter(base)}"
+            columns += [Column(name), Column("U (95 %)"), Column("")]
+        caption = (
+            f"Differences to baseline {_letter(base)} with their expanded uncertainty, the runs taken as independent."
+        )
+        blocks.append(Table(columns, rows, caption))
+    blocks.append(
+        Text(
+            f"{marked} of {len(all_of_them)} differences exceed their expanded uncertainty; about "
+            f"{write_number(0.05 * len(all_of_them), significant=2).text} would do so by chance."
+        )
+    )
+    return blocks
+
+
+def _figures(doc: Json) -> list[Any]:
+    pictures = []
+    names = [f"{_letter(k)} {run['name']}" for k, run in enumerate(doc["runs"])]
+    for i, m in enumerate(doc["measures"]):
+        shown = [
+            (n, (r["estimate"], *r["interval"]))
+            for n, r in zip(names, m["runs"], strict=True)
+            if r and None not in (r["estimate"], *r["interval"])
+        ]
+        if len(shown) < 2:
+            continue
+        fig, axes = figure(HALF, 15 + 5.5 * len(shown))
+        base = m["runs"][doc["baseline"]]
+        plots.strip(
+            axes[0, 0], [n for n, _ in shown], [v for _, v in shown], m["unit"], m["name"], base and base["estimate"]
+        )
+        key = f"measure-{i + 1}"
+        caption = f"{m['name']}, {m['meaning']}: estimates with 95 % intervals; dashed: the baseline."
+        alt = f"{m['name']} of all runs with intervals on one scale"
+        pictures.append(Picture(key, svg(fig, key), caption, alt, half=True))
+    return [Pictures(pictures)] if pictures else []
+
+
+def _equal(doc: Json) -> list[Any]:
+    if not doc["equal"]:
+        return []
+    rows = [Row([text_cell(row["what"]), _value(doc, ("equal", i, "value"))]) for i, row in enumerate(doc["equal"])]
+    table = Table(
+        [Column("what"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
+    )
+    return [Fold(f"{len(rows)} entries", [table])]

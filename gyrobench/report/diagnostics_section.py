@@ -1,0 +1,242 @@
+"""Why a result can be believed: residuals, stability, the estimates themselves, repeatability, error budget."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gyrobench.report import diagrams, plots
+from gyrobench.report.numbers import write_number, write_p
+from gyrobench.report.page_model import Column, Fold, Picture, Row, Table, Text, number_cell, pictures, text_cell
+from gyrobench.report.tables import generic, heading, unit_groups, words
+
+Json = dict[str, Any]
+
+
+def residuals(doc: Json) -> list[Any]:
+    if not doc["series"] and not doc["tests"]:
+        return generic(doc, ("noise",), "Noise model of the estimation.")
+    left = [r for s in doc["series"] for r in s["residual"]]
+    blocks = pictures(
+        Picture(
+            "residuals-time",
+            plots.residuals_in_time(doc["series"], "residuals-time"),
+            "Residuals against time, mounts or phases shaded and named. A drift or a jump would show here.",
+            "Residuals of all windows against time",
+            zoom=True,
+        )
+    )
+    blocks += pictures(
+        Picture(
+            "acf",
+            plots.acf(doc["acf"], "acf") if doc["acf"] else "",
+            "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside: correlated noise.",
+            "Autocorrelation of the residuals against lag, with bounds",
+            half=True,
+        ),
+        Picture(
+            "quantiles",
+            plots.quantiles(left, "quantiles"),
+            "Residuals against normal quantiles. On the line and inside the 95 % band: normal; bent ends: outliers.",
+            "Q-Q plot of the residuals against a normal distribution",
+            half=True,
+        ),
+    )
+    rows = []
+    for k, test in enumerate(doc["tests"]):
+        mark = "warn" if test["p"] is not None and test["p"] < 0.01 else ""
+        rows.append(
+            Row(
+                [
+                    text_cell(test["name"], "strong"),
+                    text_cell(test["what"]),
+                    number_cell(doc, ("tests", k, "statistic"), significant=3, trim=False),
+                    number_cell(doc, ("tests", k, "p"), write=write_p, mark=mark),
+                    text_cell(test["finding"]),
+                ]
+            )
+        )
+    columns = [
+        Column("test"),
+        Column("looks for", wide=True),
+        Column("statistic"),
+        Column("p"),
+        Column("finding", wide=True),
+    ]
+    if rows:
+        blocks.append(Table(columns, rows, "Tests of the residuals. A small p speaks against what the model assumes."))
+    spread = number_cell(doc, ("residual_std",))
+    dof = write_number(doc["dof"], significant=5).text
+    sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
+    return [Text(sentence), *blocks, *generic(doc, ("noise",), "Noise model of the estimation.")]
+
+
+def stability(doc: Json) -> list[Any]:
+    blocks = pictures(
+        Picture(
+            "allan",
+            plots.allan(doc["allan"], "allan") if doc["allan"].get("tau") else "",
+            "Allan deviation with its 95 % interval. Slope −½: white noise; flat: bias instability; +½: random walk.",
+            "Allan deviation against averaging time, logarithmic axes",
+            half=True,
+        ),
+        Picture(
+            "psd",
+            plots.psd(doc["psd"], "psd") if doc["psd"].get("f") else "",
+            "Power spectral density of the residuals. Flat: white; a line above it: a periodic disturbance.",
+            "Power spectral density of the residuals, logarithmic axes",
+            half=True,
+        ),
+    )
+    return blocks + generic(doc, ("allan", "slopes"), "Slopes of the Allan deviation.", significant=3)
+
+
+def estimates(doc: Json) -> list[Any]:
+    names = [c["name"] for c in doc["coefficients"]]
+    condition = number_cell(doc, ("condition",), significant=3).text
+    blocks: list[Any] = (
+        []
+        if not doc["rank"]
+        else [
+            Text(
+                f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "
+                f"{condition}. Above 100 a small error of the model makes a large one in some combination."
+            )
+        ]
+    )
+    columns = [
+        Column(h)
+        for h in (
+            "name",
+            "u, type A",
+            "dof",
+            "k",
+            "U (95 %)",
+            "t",
+            "p (t)",
+            "closed formula",
+            "difference",
+        )
+    ]
+    groups = unit_groups(doc["coefficients"])
+    if not groups:
+        columns.insert(1, Column("unit"))
+    rows: list[Row] = []
+    for unit, members in groups or [("", list(range(len(names))))]:
+        rows += [heading(f"u, U, closed formula and difference in {unit}")] if groups else []
+        for k in members:
+            c = doc["coefficients"][k]
+            path, u = ("coefficients", k), c["u"]
+            rows.append(
+                Row(
+                    [
+                        text_cell(c["name"], "strong"),
+                        *([] if groups else [text_cell(c["unit"])]),
+                        number_cell(doc, (*path, "u_a"), u),
+                        number_cell(doc, (*path, "dof"), significant=3),
+                        number_cell(doc, (*path, "k"), 0.1),
+                        number_cell(doc, ("derived", "U", k), u),
+                        number_cell(doc, (*path, "t"), significant=3, trim=False),
+                        number_cell(doc, (*path, "p"), write=write_p),
+                        number_cell(doc, (*path, "closed"), u),
+                        number_cell(doc, ("derived", "closed_minus_estimate", k), significant=2),
+                    ]
+                )
+            )
+    caption = "Uncertainty of each estimate, and the book's closed formula against the reported estimate."
+    blocks.append(Table(columns, rows, caption, small=True))
+    z = [c["z"] for c in doc["coefficients"]]
+    blocks += pictures(
+        Picture(
+            "correlation",
+            plots.correlation(doc["correlation"], names, "correlation"),
+            "Correlation of the estimates. Near ±1 two coefficients are known only in combination.",
+            "Correlation matrix of the estimates, lower triangle, as coloured cells with numbers",
+            half=len(names) < 11,
+        ),
+        Picture(
+            "scores",
+            plots.scores(names, z, [c["k"] for c in doc["coefficients"]], "scores"),
+            "Estimates against truth in units of u. Band: ±k; 95 % of the points should lie inside.",
+            "Estimate minus truth over standard uncertainty, one point per coefficient",
+            half=True,
+        ),
+    )
+    caption = "Harmonics of the record. Those the model does not hold should be noise."
+    return blocks + _method_tables(doc) + generic(doc, ("harmonics",), caption, by_u=True)
+
+
+def repeatability(doc: Json) -> list[Any]:
+    return generic(doc, ("repeatability",), "Repeatability.") + _step(doc)
+
+
+def _step(doc: Json) -> list[Any]:
+    """The coupling error: what halving the step changes."""
+    check = doc["step_check"]
+    if not check.get("rows"):
+        unchecked = Text("The step was not checked in this run (option --check-step).", quiet=True)
+        return [unchecked] if doc["simulated"] else []
+    step = write_number(check.get("step"), significant=6).text
+    worst = write_number(check.get("worst"), significant=2).text
+    caption = "Step check: change of each coefficient when the step is halved, noise off; ratio: change over u."
+    table = generic(doc, ("step_check", "rows"), caption, significant=2)
+    return [Text(f"Halving the step of {step} s changes no coefficient by more than {worst} of its u."), *table]
+
+
+def _method_tables(doc: Json) -> list[Any]:
+    """The tables a method brings itself; numbers are rounded to the column "u" where there is one."""
+    blocks: list[Any] = []
+    for k, table in enumerate(doc["tables"]):
+        heads = [str(h) for h in table.get("columns", [])]
+        rows = []
+        for i, values in enumerate(table.get("rows", [])):
+            u = next((v for h, v in zip(heads, values, strict=False) if h == "u"), None)
+            cells = []
+            for j, head in enumerate(heads):
+                apart = {"significant": 2} if head == "difference" else {"u": u}
+                cells.append(number_cell(doc, ("tables", k, "rows", i, j), **apart))
+            rows.append(Row(cells))
+        caption = ". ".join(t.rstrip(".") for t in (table.get("title", ""), table.get("caption", "")) if t)
+        if rows:
+            blocks.append(Table([Column(*words(h)) for h in heads], rows, f"{caption}."))
+    return blocks
+
+
+def budget(doc: Json) -> list[Any]:
+    lines = doc["budget"]
+    if not lines:
+        return []
+    u = {c["name"]: c["u"] for c in doc["coefficients"]}
+    rows = []
+    for name in dict.fromkeys(b["coefficient"] for b in lines):
+        mine = [k for k, b in enumerate(lines) if b["coefficient"] == name]
+        unit = lines[mine[0]]["unit"]
+        rows.append(heading(f"{name}, contribution in {unit}"))
+        for k in sorted(mine, key=lambda k: -(lines[k]["contribution"] or 0.0)):
+            b = lines[k]
+            rows.append(
+                Row(
+                    [
+                        text_cell(b["source"]),
+                        number_cell(doc, ("budget", k, "size"), significant=3, trim=False),
+                        text_cell(b["size_unit"]),
+                        number_cell(doc, ("budget", k, "sensitivity"), significant=3, trim=False),
+                        text_cell(b["sensitivity_unit"]),
+                        number_cell(doc, ("budget", k, "contribution"), significant=2, trim=False),
+                        text_cell(b["note"]),
+                    ]
+                )
+            )
+        total = number_cell(doc, ("derived", "budget_sum", name), u.get(name))
+        note = f"u stated: {write_number(u[name], u[name]).text}" if name in u else ""
+        rows.append(Row([text_cell("sum (root of squares)", "strong"), *[text_cell("")] * 4, total, text_cell(note)]))
+    heads = ("source", "size", "unit", "sensitivity", "unit", "contribution", "note")
+    columns = [Column(h, wide=h in ("source", "note")) for h in heads]
+    alt = "Error budget as bars: contribution of each source to the uncertainty of the coefficients"
+    caption = "Error budget. Which source makes the uncertainty, and whether the known sources explain the stated u."
+    table = Table(
+        columns, rows, "Error budget: size times sensitivity of each source, as standard uncertainties.", small=True
+    )
+    return [
+        *pictures(Picture("budget", diagrams.budget(lines, u, "budget"), caption, alt)),
+        Fold("Every line of the budget", [table]),
+    ]

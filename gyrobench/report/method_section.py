@@ -1,0 +1,129 @@
+"""How it was done: model, conventions, system, plan, and every digit of the estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.report import diagrams
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import (
+    Cell,
+    Column,
+    Equation,
+    Fold,
+    Items,
+    Picture,
+    Row,
+    Table,
+    Text,
+    number_cell,
+    pictures,
+    text_cell,
+)
+from gyrobench.report.result_json import look
+
+Json = dict[str, Any]
+
+
+def model(doc: Json) -> list[Any]:
+    blocks: list[Any] = [Equation(doc["equation"])] if doc["equation"] else []
+    blocks += [Items(doc["conventions"])] if doc["conventions"] else []
+    blocks += [Text("Sources: " + "; ".join(doc["sources"]) + ".", quiet=True)] if doc["sources"] else []
+    return blocks
+
+
+def system(doc: Json) -> list[Any]:
+    run = doc["provenance"]
+    order = [str(s) for s in run.get("order") or []]
+    blocks: list[Any] = []
+    if order:
+        caption = (
+            "The system as it ran: parts on the diagonal in execution order. Above it (solid) values of this step go "
+            "forward; below it (dashed) values of the step before go back."
+        )
+        svg = diagrams.system(order, run, "system")
+        blocks += pictures(
+            Picture("system", svg, caption, "Parts in execution order with their wires: " + ", ".join(order))
+        )
+        blocks.append(Items([f"Order: {', '.join(order)}.", *_cuts(run)]))
+    rows = []
+    keys = (
+        "phase",
+        "label",
+        "mode",
+        "shape",
+        "face",
+        "axis",
+        "amplitude",
+        "unit",
+        "frequency_Hz",
+        "angle_deg",
+        "angle_y_deg",
+        "rate_deg_per_h",
+        "settle_s",
+        "dwell_s",
+        "travel_deg",
+        "window_s",
+        "window_deg",
+    )
+    heads = [
+        ("phase", ""),
+        ("label", ""),
+        ("mode", ""),
+        ("shape", ""),
+        ("face", ""),
+        ("axis", ""),
+        ("amplitude", ""),
+        ("unit", ""),
+        ("frequency", "Hz"),
+        ("angle", "°"),
+        ("second angle", "°"),
+        ("rate", "°/h"),
+        ("settle", "s"),
+        ("dwell", "s"),
+    ]
+    heads += [("travel", "°"), ("window", "s"), ("window", "°")]
+    plan = doc["derived"]["plan"]
+    for k in range(len(plan)):
+        rows.append(Row([number_cell(doc, ("derived", "plan", k, key), significant=7) for key in keys]))
+    if rows:
+        empty = [all(look(plan, k, key) in (None, "") for k in range(len(plan))) for key in keys]
+        for row in rows:
+            row.cells = [c for c, e in zip(row.cells, empty, strict=True) if not e]
+        columns = [Column(h, unit) for (h, unit), e in zip(heads, empty, strict=True) if not e]
+        blocks.append(Table(columns, rows, "Plan of the test.", small=True))
+    return blocks
+
+
+def _cuts(run: Mapping[str, Any]) -> list[str]:
+    """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
+    cuts, delays = run.get("cuts") or [], run.get("delays") or []
+    said = [f"Cut at {c}" for c in map(str, cuts)] or ["No connection is cut: every value is used in its own step"]
+    times = dict(delays) if isinstance(delays, Mapping) else dict.fromkeys(delays)
+    for wire, seconds in times.items():
+        time = "one step" if seconds is None else f"{write_number(seconds).text} s"
+        k = next((k for k, s in enumerate(said) if wire in s), None)
+        if k is None:
+            said.append(f"Delay on {wire}: {time}")
+        else:
+            said[k] += f", {time}"
+    return [s.replace("->", "→") + "." for s in said]
+
+
+def full_values(doc: Json) -> list[Any]:
+    """All digits of the estimates: the proof that page and result.json hold the same numbers."""
+    rows = []
+    for k, c in enumerate(doc["coefficients"]):
+        path = ("coefficients", k)
+        cells = [number_cell(doc, (*path, *p)) for p in (("estimate",), ("u",), ("interval", 0), ("interval", 1))]
+        rows.append(
+            Row([text_cell(c["name"], "strong"), *(Cell(x.full or "–", pointer=x.pointer, full=x.full) for x in cells)])
+        )
+    columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
+    return [
+        Fold(
+            "All digits, as in result.json",
+            [Table(columns, rows, "Full values of the estimates, units as in the table of coefficients.", small=True)],
+        )
+    ]

@@ -1,0 +1,216 @@
+"""What a report is made of, before it is HTML or PDF: sections of blocks.
+
+Both renderers draw the same blocks, which is why they say the same.  Every text is plain text; each
+renderer escapes it.  A number cell carries its rounded text, its full value and the JSON pointer it
+was read from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from gyrobench.report.numbers import Written, write_number
+from gyrobench.report.result_json import look, pointer
+
+Path = Sequence[str | int]
+
+
+@dataclass
+class Cell:
+    """One table cell: a text, or a number cut at its decimal sign."""
+
+    text: str = ""
+    whole: str = ""
+    rest: str = ""
+    full: str = ""  # repr of the full value
+    pointer: str = ""  # where it stands in result.json
+    mark: str = ""  # pass | fail | inconclusive | warn | strong | ""
+    number: bool = False
+
+
+@dataclass
+class Column:
+    head: str
+    unit: str = ""
+    number: bool = False
+    wide: bool = False  # may take the room that is left
+    width: int = 0  # characters after the decimal sign, set by Table
+
+
+@dataclass
+class Row:
+    cells: list[Cell]
+    group: str = ""  # not empty: a heading across the table, no cells
+    strong: bool = False
+
+
+@dataclass
+class Table:
+    columns: list[Column]
+    rows: list[Row]
+    caption: str
+    kind: str = "table"
+    number: int = 0
+    small: bool = False
+
+    def __post_init__(self) -> None:
+        for k, column in enumerate(self.columns):
+            cells = [row.cells[k] for row in self.rows if not row.group]
+            column.number = column.number or any(c.number for c in cells)
+            column.width = max((len(c.rest) for c in cells), default=0)
+
+
+@dataclass
+class Picture:
+    key: str  # file stem, unique in the report
+    svg: str
+    caption: str
+    alt: str
+    half: bool = False  # drawn for half the page width
+    zoom: bool = False
+    number: int = 0
+
+
+@dataclass
+class Pictures:
+    """Figures side by side where there is room."""
+
+    items: list[Picture]
+    kind: str = "pictures"
+
+
+@dataclass
+class Text:
+    text: str
+    kind: str = "text"
+    quiet: bool = False
+    link: str = ""  # a file beside the report, for the page
+
+
+@dataclass
+class Items:
+    items: list[str]
+    kind: str = "items"
+    warn: bool = False
+
+
+@dataclass
+class Equation:
+    source: str  # Typst math
+    svg: str = ""
+    kind: str = "equation"
+
+
+@dataclass
+class Answer:
+    """The box a reader looks at first."""
+
+    verdict: str
+    rule: str
+    summary: list[str]
+    warnings: list[str]
+    requirements: Table | None
+    kind: str = "answer"
+
+
+@dataclass
+class Signatures:
+    """Statements, and beneath on the same page lines to sign on: role and, where it is known, name."""
+
+    statements: list[str]
+    items: list[tuple[str, str]]
+    kind: str = "signatures"
+
+
+@dataclass
+class Fold:
+    """Blocks folded away in HTML, printed in full in PDF."""
+
+    title: str
+    blocks: list[Any]
+    kind: str = "fold"
+
+
+@dataclass
+class Section:
+    title: str
+    slug: str
+    blocks: list[Any] = field(default_factory=list)
+    sub: bool = False
+    number: str = ""
+
+
+@dataclass
+class Page:
+    """A whole report."""
+
+    title: str
+    report_id: str
+    head: list[tuple[str, str]]
+    sections: list[Section]
+    pictures: list[Picture] = field(default_factory=list)
+
+    def finish(self) -> Page:
+        """Number sections, tables and figures in reading order; drop sections without content."""
+        kept = []
+        for k, section in enumerate(self.sections):
+            following = self.sections[k + 1 :]
+            if section.blocks or (not section.sub and following and following[0].sub):
+                kept.append(section)
+        self.sections = kept
+        major = minor = tables = 0
+        for section in self.sections:
+            major, minor = (major, minor + 1) if section.sub else (major + 1, 0)
+            section.number = f"{major}.{minor}" if section.sub else str(major)
+            for block in walk(section.blocks):
+                if isinstance(block, Table):
+                    tables += 1
+                    block.number = tables
+                elif isinstance(block, Pictures):
+                    for picture in block.items:
+                        self.pictures.append(picture)
+                        picture.number = len(self.pictures)
+        return self
+
+
+def walk(blocks: list[Any]) -> list[Any]:
+    """All blocks with those inside folds and answers, in order."""
+    out: list[Any] = []
+    for block in blocks:
+        out.append(block)
+        if isinstance(block, Fold):
+            out += walk(block.blocks)
+        elif isinstance(block, Answer) and block.requirements:
+            out.append(block.requirements)
+    return out
+
+
+def pictures(*items: Picture) -> list[Any]:
+    """The pictures that have something to show, as one block; no block when none has."""
+    shown = [p for p in items if p.svg]
+    return [Pictures(shown)] if shown else []
+
+
+def text_cell(value: Any, mark: str = "") -> Cell:
+    return Cell(text="" if value is None else str(value), mark=mark)
+
+
+def number_cell(
+    doc: Any,
+    path: Path,
+    u: float | None = None,
+    write: Callable[..., Written] = write_number,
+    mark: str = "",
+    significant: int = 4,
+    trim: bool = True,
+) -> Cell:
+    """The number at ``path`` of the document; a text that stands there stays a text."""
+    value = look(doc, *path)
+    if isinstance(value, str | list | dict):
+        return text_cell(value, mark)
+    written = write_number(value, u, significant, trim) if write is write_number else write(value)
+    return Cell(
+        written.text, written.whole, written.rest, written.full, pointer(*path) if written.full else "", mark, True
+    )

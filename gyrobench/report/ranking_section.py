@@ -1,0 +1,77 @@
+"""Runs in the order of the one measure that their reduction names for it (``Result.ranked_by``), smallest first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from gyrobench.report.page_model import Column, Row, Section, Table, Text, number_cell, text_cell
+
+Json = dict[str, Any]
+
+
+def ranking(docs: Sequence[Json]) -> Json:
+    """``{"name", "unit", "meaning", "order": [{"run", "value", "u", "over_best", "apart"}]}``; {} when the runs name
+    no measure, or not the same one.
+
+    apart: whether a run is farther from the one before it than the expanded uncertainty of their difference.
+    """
+    (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
+    if others or not name:
+        return {}
+    found = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
+    known = [(c["estimate"], k, c) for k, c in enumerate(found) if c is not None and c["estimate"] is not None]
+    if len(known) < 2 or len({c["unit"] for _, _, c in known}) > 1:
+        return {}
+    known.sort(key=lambda entry: entry[:2])
+    best, _, first = known[0]
+    order: list[Json] = []
+    before: Json | None = None
+    for value, k, c in known:
+        apart = None
+        if before is not None and None not in (c["u"], before["u"]):
+            U = max(c["k"], before["k"]) * math.hypot(c["u"], before["u"])
+            apart = value - before["estimate"] > U
+        over = value / best if best else None
+        order.append({"run": k, "value": value, "u": c["u"], "over_best": over, "apart": apart})
+        before = c
+    return {"name": name, "unit": first["unit"], "meaning": first["meaning"], "order": order}
+
+
+def section(doc: Json, letters: Sequence[str]) -> Section:
+    """The section of a comparison document (:mod:`.comparison`) that shows its ranking; empty without one."""
+    ranked = doc["ranking"]
+    if not ranked:
+        return Section("Ranking", "ranking", [])
+    rows = []
+    for place, entry in enumerate(ranked["order"]):
+        run = doc["runs"][entry["run"]]
+        path = ("ranking", "order", place)
+        apart = {None: "–", True: "yes", False: "no"}[entry["apart"]]
+        rows.append(
+            Row(
+                [
+                    text_cell(str(place + 1), "strong"),
+                    text_cell(letters[entry["run"]]),
+                    text_cell(run["name"]),
+                    text_cell(run["instrument"]),
+                    number_cell(doc, (*path, "value"), entry["u"]),
+                    number_cell(doc, (*path, "u"), entry["u"]),
+                    number_cell(doc, (*path, "over_best"), significant=3),
+                    text_cell(apart),
+                ]
+            )
+        )
+    unit = ranked["unit"] if ranked["unit"] != "1" else ""
+    columns = [
+        Column("place"),
+        Column(""),
+        Column("run", wide=True),
+        Column("instrument"),
+        Column(ranked["name"], unit),
+    ]
+    columns += [Column("u"), Column("over the best"), Column("apart from the one before")]
+    caption = f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest is the best."
+    note = "Less noise or a smoother curve does not rank: what is compared is how near each run comes to the truth."
+    return Section("Ranking", "ranking", [Table(columns, rows, caption), Text(note, quiet=True)])

@@ -1,0 +1,247 @@
+"""From a result to the sections of its report, in the order a reader needs them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.record.record import ABOUT
+from gyrobench.report import diagnostics_section, method_section, plots, responses
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import (
+    Answer,
+    Cell,
+    Column,
+    Page,
+    Picture,
+    Row,
+    Section,
+    Table,
+    number_cell,
+    pictures,
+    text_cell,
+)
+from gyrobench.report.signature_section import signing
+from gyrobench.report.style import styled
+from gyrobench.report.tables import heading, how_tables, limit_text, unit_groups, words
+
+Json = dict[str, Any]
+
+
+def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
+    """The report of one result document (see :func:`gyrobench.report.result_json.document`).
+
+    ``record`` may hold the decimated channels of the run: "time" in s and "slot.variable" columns; they
+    are drawn as long records.
+    """
+    with styled():
+        sections = [
+            Section("The answer", "answer", [answer(doc)]),
+            Section("Coefficients", "coefficients", coefficients(doc)),
+            Section("What was measured", "measured", _measured(doc, record or {})),
+            Section("Can it be believed", "believed", []),
+            Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True),
+            Section("Drift in time and frequency", "stability", diagnostics_section.stability(doc), sub=True),
+            Section("The estimates", "estimates", diagnostics_section.estimates(doc), sub=True),
+            Section("Repeatability and step", "repeatability", diagnostics_section.repeatability(doc), sub=True),
+            Section("Error budget", "budget", diagnostics_section.budget(doc)),
+            Section("How it was done", "how", []),
+            Section("Model and conventions", "model", method_section.model(doc), sub=True),
+            Section("System and plan", "system", method_section.system(doc), sub=True),
+            Section("Parts, parameters and provenance", "provenance", how_tables(doc), sub=True),
+            Section("Full values", "values", method_section.full_values(doc), sub=True),
+            Section("Statements and signatures", "signatures", signing(doc)),
+        ]
+    return Page(doc["title"], doc["report_id"], head(doc), sections).finish()
+
+
+def head(doc: Json) -> list[tuple[str, str]]:
+    run = doc["provenance"]
+    site = place(doc["site"])
+    rows = [
+        ("Report", doc["report_id"]),
+        ("Date", date(str(run.get("date") or "not recorded"))),
+        ("Instrument", doc["instrument"] or "not named"),
+        ("Site", site or "not stated"),
+        ("Operator", str(run.get("operator") or "not recorded")),
+        *((name.capitalize(), str(run[name])) for name in ABOUT if run.get(name)),
+        ("Method", doc["method"]),
+        ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
+    ]
+    return rows
+
+
+def place(site: Mapping[str, Any]) -> str:
+    """ "latitude 45.75°, gravity 9.8069 m/s²" """
+    return ", ".join(f"{words(k)[0]} {_plain(v)}{_unit(k)}" for k, v in site.items() if v is not None)
+
+
+def date(text: str) -> str:
+    """ "2026-03-14T09:30:00Z" for people; other texts stay as they are."""
+    match = re.fullmatch(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d)[\d:.]*(Z|\+00:00)", text)
+    return f"{match[1]} {match[2]} UTC" if match else text
+
+
+def _plain(value: Any) -> str:
+    return write_number(value, significant=8).text if isinstance(value, int | float) else str(value)
+
+
+def _unit(key: str) -> str:
+    unit = words(key)[1]
+    return "" if not unit else unit if unit == "°" else f" {unit}"
+
+
+def answer(doc: Json) -> Answer:
+    rows = []
+    for k, c in enumerate(doc["coefficients"]):
+        if c["limit"] is None:
+            continue
+        path, u = ("coefficients", k), c["u"]
+        rows.append(
+            Row(
+                [
+                    text_cell(c["name"], "strong"),
+                    number_cell(doc, (*path, "estimate"), u),
+                    number_cell(doc, ("derived", "U", k), u),
+                    text_cell(c["unit"]),
+                    text_cell(limit_text(c["limit"])),
+                    text_cell(c["verdict"], c["verdict"]),
+                ]
+            )
+        )
+    columns = [
+        Column("requirement"),
+        Column("estimate"),
+        Column("U (95 %)"),
+        Column("unit"),
+        Column("limit"),
+        Column("verdict"),
+    ]
+    table = Table(columns, rows, "Verdict per requirement.") if rows else None
+    rule = doc["decision_rule"] if rows or doc["verdict"] != "no specification given" else ""
+    return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
+
+
+def coefficients(doc: Json) -> list[Any]:
+    limits = any(c["limit"] is not None for c in doc["coefficients"])
+    truth = any(c["truth"] is not None for c in doc["coefficients"])
+    columns = [
+        Column("name"),
+        Column("meaning", wide=True),
+        Column("estimate"),
+        Column("u"),
+        Column("95 % from"),
+        Column("to"),
+    ]
+    columns += [Column("truth"), Column("z")] if truth else []
+    columns += [Column("limit"), Column("verdict")] if limits else []
+    groups = unit_groups(doc["coefficients"])
+    if not groups:
+        columns.insert(4, Column("unit"))
+    rows: list[Row] = []
+    for unit, members in groups or [("", list(range(len(doc["coefficients"]))))]:
+        rows += [heading(f"in {unit}")] if groups else []
+        for k in members:
+            c = doc["coefficients"][k]
+            path, u = ("coefficients", k), c["u"]
+            cells = [
+                text_cell(c["name"], "strong"),
+                text_cell(c["meaning"]),
+                number_cell(doc, (*path, "estimate"), u),
+                number_cell(doc, (*path, "u"), u),
+                *([] if groups else [text_cell(c["unit"])]),
+                number_cell(doc, (*path, "interval", 0), u),
+                number_cell(doc, (*path, "interval", 1), u),
+            ]
+            if truth:
+                cells += [number_cell(doc, (*path, "truth"), u), number_cell(doc, (*path, "z"), 0.1)]
+            if limits:
+                verdict = c["verdict"] if c["limit"] is not None else "–"
+                cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
+            rows.append(Row(cells))
+    note = "u: combined standard uncertainty; estimates are rounded to its second significant digit."
+    if truth:
+        note += " Truth: the value the simulation was given; z = (estimate − truth) / u."
+    if not limits:
+        note += " No specification given: no limits, no verdict."
+    return [Table(columns, rows, f"Coefficients. {note}")] if rows else []
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _shown(record: Mapping[str, Any], units: Mapping[str, str], most: int = 6) -> list[str]:
+    """The channels to draw: the first ones, those that do not move and counters and flags after the others."""
+    names = [n for n in record if n != "time"]
+
+    def dull(name: str) -> bool:
+        values = [float(v) for v in record[name]]
+        whole = units.get(name) == "1" and all(v.is_integer() for v in values)
+        return whole or not values or min(values) == max(values)
+
+    chosen = sorted(names, key=dull)[:most] if len(names) > most else names
+    return [n for n in names if n in chosen]
+
+
+def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
+    curves = [s for s in doc["series"] if plots.is_curve(s)]
+    blocks: list[Any] = responses.blocks(doc)
+    number = 0
+    axes = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
+    for axis, _ in axes.most_common():  # the richest record first
+        alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
+        for k in range(0, len(alike), 2):
+            pair = alike[k : k + 2]
+            number += 1
+            key = f"fit-{number}"
+            both = " and ".join(f"“{s['label']}”" for s in pair)
+            caption = (
+                f"{_capital(pair[0]['y_name'])} against {axis[0]}, {both}. Points: measured windows; line: the fitted "
+                f"model; beneath: what is left. A model that fits leaves no pattern beneath."
+            )
+            alt = f"Points and fitted curve with residuals: {both}"
+            blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
+    units = doc["provenance"].get("units") or {}
+    names = _shown(record, units)
+    caption = (
+        "The run in time: recorded channels, one above the other. Long records are drawn by the smallest and largest "
+        "value of each stretch."
+    )
+    svg = plots.channels(record, names, units, "channels") if names else ""
+    blocks += pictures(
+        Picture("channels", svg, caption, "Recorded channels against time: " + ", ".join(names), zoom=True)
+    )
+    rows = []
+    for k, s in enumerate(doc["series"]):
+        rows.append(
+            Row(
+                [
+                    text_cell(s["label"]),
+                    Cell(text=str(len(s["y"])), whole=str(len(s["y"])), full=str(len(s["y"])), number=True),
+                    text_cell(f"{s['y_name']} / ({s['y_unit']})"),
+                    *(
+                        number_cell(doc, ("derived", "series", k, name), doc["residual_std"])
+                        for name in ("mean", "residual_rms")
+                    ),
+                ]
+            )
+        )
+    columns = [
+        Column("series", wide=True),
+        Column("windows"),
+        Column("quantity"),
+        Column("mean"),
+        Column("residual rms"),
+    ]
+    if rows:
+        blocks.append(
+            Table(
+                columns,
+                rows,
+                "Measured series: mean of the windows and rms of the residuals, in the unit of the quantity.",
+            )
+        )
+    return blocks

@@ -1,0 +1,1 @@
+"""Families of systems: what the systems of one kind of test share."""

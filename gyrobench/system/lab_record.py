@@ -1,0 +1,99 @@
+"""A laboratory's CSV file of a test as a record, with the circumstances in its comments.
+
+    # latitude = 45.75deg
+    # k = 17.2deg/h/mA
+    # phase 1 = static 3
+    phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA]
+
+Comments named like an option set it; ``phase N`` names the attitude the rows with this number were taken in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError, read_measured
+from gyrobench.record.record import ABOUT, Record
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
+
+TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report")
+
+
+def explained(template: str) -> str:
+    """A template with a word, before its header, about what any record may say for its report."""
+    lines = template.splitlines()
+    head = next((k for k, line in enumerate(lines) if not line.startswith("#")), 0)
+    note = f"# {', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them."
+    return "\n".join([*lines[:head], note, *lines[head:]]) + "\n"
+
+
+def read_record(
+    system: System, data: Path, values: Mapping[str, str], *, needed: Mapping[str, str] | None = None,
+    attitudes: Callable[[], Mapping[str, str]] | None = None, columns: tuple[Column, ...] = WINDOW_COLUMNS,
+    time: str | None = "t_start", texts: Sequence[str] = TEXTS,
+) -> Record:  # fmt: skip
+    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
+
+    needed: options that must be given, with an example: {"latitude": "45.75deg", "k": "..."}.  attitudes: what a
+    phase may be called -> mode "hold", "index" or "rate", asked once the options are set; None: a record without
+    phases.  columns, time: as of read_measured; where windows are expected, std, n and flagged are filled in.  texts:
+    comments that are kept as they are.  Raises DataError, and ValueProblem for an option that does not fit.
+    """
+    windows, comments = read_measured(data, columns, time)
+    said = {**comments, **values}
+    for name in values:
+        if name not in system.options and name not in texts and not (attitudes and name.startswith("phase ")):
+            system.set(name, values[name])  # says which options there are
+    for name, value in said.items():
+        if name in system.options:
+            system.set(name, value)
+    problems = []
+    for name, example in (needed or {}).items():
+        default = system.options[name].default
+        if name not in system.given or (not system[name] and not default):
+            problems.append(
+                f"'{name}' is not given: write '# {name} = {example}' in the file or --set {name}={example}"
+            )
+    plan: list[dict[str, Any]] = []
+    if attitudes is not None:
+        plan, unclear = _plan(windows["phase"], said, attitudes())
+        problems += unclear
+    if problems:
+        raise DataError(data, problems)
+    if columns is WINDOW_COLUMNS or {"std", "n", "flagged"} <= {c.name for c in columns}:
+        count = len(next(iter(windows.values())))
+        windows.setdefault("std", np.full(count, np.nan))
+        windows.setdefault("n", np.ones(count, dtype=np.int64))
+        windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
+    meta = {
+        "system": system.name,
+        "title": system.title,
+        "spec": list(system.spec),
+        "measured": True,
+        "complete": True,
+        "options": dict(system.values),
+        "parameters": {},
+        "plan": plan,
+        **{n: said[n] for n in texts if n in said},
+    }
+    return Record(windows, {}, meta)
+
+
+def _plan(
+    phase: np.ndarray[Any, Any], said: Mapping[str, str], modes: Mapping[str, str]
+) -> tuple[list[dict[str, Any]], list[str]]:
+    plan, problems = [], []
+    for p in sorted({int(p) for p in phase}):
+        face = said.get(f"phase {p}", "")
+        if face not in modes:
+            there = f"{face!r} is no attitude" if face else "its attitude is not given"
+            problems.append(f"phase {p}: {there}: write '# phase {p} = ...' with one of {', '.join(modes)}")
+            continue
+        plan.append({"phase": p, "label": face, "mode": modes[face], "face": face})
+    return plan, problems
