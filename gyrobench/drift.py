@@ -1,5 +1,5 @@
 """Static drift models of one- and two-degree-of-freedom gyros.  [GYRO-STATIC-8/-9/-10, GYRO-STATIC-2DOF;
-000_791234d3afc34a0c.txt eq. 2-27..2-49]
+Hu 1981, eq. 2-27..2-49]
 
     omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
 

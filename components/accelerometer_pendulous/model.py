@@ -9,14 +9,14 @@ IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class AccelerometerPendulous(Component):
-    """Pendulous accelerometer with its own torque rebalance.  [TEST-ACC-MULTI, 000_791234d3afc34a0c.txt eq. 3-38]
+    """Pendulous accelerometer with its own torque rebalance.  [TEST-ACC-MULTI; Hu 1981, eq. 3-38]
 
     Axes x, y, z are input, output (hinge) and pendulum axis, those of the mount: v_accelerometer = mount v_case.
-    In the steady state the current i is, exactly, the book's model,
+    In the steady state the current i is, exactly, the model of Hu 1981,
 
         lambda i = g0 (k0 + k1 X + k2 X2 + k3 X3 + k4 X Y + k5 X Z + noise),       (X, Y, Z) = -f/g0, g0 = 9.80665 m/s2
 
-    SIGN: X, Y, Z are the book's specific force, which points DOWN at rest, while the connector f = a - G points up.
+    SIGN: X, Y, Z are the specific force of Hu 1981, which points DOWN at rest, while the connector f = a - G points up.
     So an instrument at rest with x up has f_x = +g, X = -g/g0, and i is negative (k1 > 0); x down, i positive.
     In terms of x' = f_x/g0 = -X (IEEE) k1 and k3 change sign; k0, k2, k4, k5 do not.
 
@@ -33,7 +33,7 @@ class AccelerometerPendulous(Component):
 
     Not modelled: vibropendulous rectification (X seen under the angle th), stops of the pendulum (it leans against its
     spring while the current is limited), angular acceleration and size effects, temperature, ageing, hysteresis.
-    Source: 000_791234d3afc34a0c.txt ch. 3, eq. 3-38..3-46.
+    Source: Hu 1981, ch. 3, eq. 3-38..3-46.
     """
 
     version = "1.0.0"

@@ -15,7 +15,7 @@ class AxisCoupling(Component):
     and the outer axis run together (gimbal lock), so a run ends where |cos(angle)| falls below `least`.
 
     Not modelled: errors of the resolver that gives cos(angle), its bandwidth.
-    Source: spec d1, 5.6 (TEST-SERVO2-2DOF); 000_791234d3afc34a0c.txt eq. 3-94..3-99.
+    Source: TEST-SERVO2-2DOF, SERVO2-KIN; Hu 1981, eq. 3-94..3-99.
     """
 
     version = "1.0.0"

@@ -16,7 +16,7 @@ class AxisWobble(Component):
     back.  q1, q2 follow the angle at the end of a step, their rates are means over it, so that their integral is exact.
 
     Not modelled: wobble that is no single harmonic, runout (shift of the axis), angular acceleration.
-    Source: spec d2b, 5.4 (wobble 0.25 to 5 arcsec); 000_791234d3afc34a0c.txt ch. 5.4.
+    Source: TABLE-PRESETS (wobble 0.25 to 5 arcsec); Hu 1981, section 5.4.
     """
 
     version = "1.0.0"

@@ -16,7 +16,7 @@ class BaseMotion(Component):
     [DECOUPLE-BENCH-83MIL, PLATFORM-3AXIS-KIN]  Axes x right, y forward, z up; pitch p about x, roll r about y,
     heading h about z, counter-clockwise from above.  The base turns heading first, then pitch, then roll:
 
-        v_base = R2(r) R1(p) R3(h) v_ENU          (passive rotations, spec d3 section 0)
+        v_base = R2(r) R1(p) R3(h) v_ENU          (passive rotations, CONV-GIMBALS)
 
         omega = ( cr p' - sr cp h',  r' + sp h',  sr p' + cr cp h' ) + C w_earth
         alpha = its derivative, exact          f = C (0, 0, g + heave)

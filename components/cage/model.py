@@ -17,7 +17,7 @@ class Cage(Component):
     A gyro that is not caged while its table is moved keeps the angle, and servo mode turns the table back by it.
 
     Not modelled: float stops, the switching transient of a real torquer.
-    Source: 000_791234d3afc34a0c.txt ch. 3, section 3 (torquer idle while the table is held); caging is our own.
+    Source: Hu 1981, ch. 3, section 3 (torquer idle while the table is held); caging is our own.
     """
 
     version = "1.0.0"

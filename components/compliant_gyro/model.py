@@ -15,9 +15,9 @@ class CompliantGyro(Component):
 
         H x' = K_O y - H (w_I cos b - w_S sin b)              H y' = -K_I x - H (r + w_O)
         b' = r,   J r' = -C r + K_O y - H (omega_d + k i (1 + k2 i + k3 i2)) - J alpha_O
-        u = K_sg b + noise, limited to +-u_max                                              [seed eq. 2-57..2-67]
+        u = K_sg b + noise, limited to +-u_max                                     [GYRO-DYN-3; Hu 1981, eq. 2-57..2-67]
 
-    In the spec's rotor angles a, beta and case angles theta: x = a - theta_I, y = beta - b - theta_O.
+    In the rotor angles of GYRO-DYN-3, a, beta and case angles theta: x = a - theta_I, y = beta - b - theta_O.
     As transfer functions, with tau = J/C + H2/(K_I C) and D(s) = H2 J/(K_I K_O C) s3 + H2/(K_I K_O) s2 + tau s + 1:
 
         b / theta_I = (H/C) / D         b / theta_O = -[H2 J/(K_I K_O C) s3 + tau s] / D
@@ -33,7 +33,7 @@ class CompliantGyro(Component):
 
     Not modelled: transverse inertia of the rotor (nutation; 1e-6 kg.m2 changes the response at 10 Hz by less than
     1e-3), drift torque on the rotor instead of the float, damping in the bearing, and what floated_gyro leaves out.
-    Source: 000_791234d3afc34a0c.txt ch. 2, eq. 2-57..2-67.
+    Source: Hu 1981, ch. 2, eq. 2-57..2-67.
     """
 
     version = "1.0.0"

@@ -17,7 +17,7 @@ class CurrentSource(Component):
     One internal step is one communication step; i is that at its end.
 
     Not modelled: bandwidth of the source, heating of the torquer, load dependence.
-    Source: 000_791234d3afc34a0c.txt appendix 1 of chapter 3, eq. A3-1..A3-6; the slew rate is our own.
+    Source: Hu 1981, appendix 1 of chapter 3, eq. A3-1..A3-6; the slew rate is our own.
     """
 
     version = "1.0.0"

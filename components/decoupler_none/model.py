@@ -11,7 +11,7 @@ class DecouplerNone(Component):
     Around pitch 0 the loop of x and y loses a degree of phase margin with each degree of azimuth.
 
     Not modelled: nothing.
-    Source: 001_5d74e91bb8fa76be.txt ch. 5.1.2 (the platform without T2).
+    Source: Xia 2008, section 5.1.2 (the platform without T2).
     """
 
     version = "1.0.0"

@@ -22,7 +22,7 @@ class DecouplerT2(Component):
     T2 decouples where the three channels are alike: drives normalized by the inertia of their axes, |f| < 90 deg.
 
     Not modelled: carrier of the resolver, its noise and lag, errors of the angle that feeds the secant.
-    Source: 001_5d74e91bb8fa76be.txt eq. 5.1.8-5.1.12; (5.1.12) is printed with cos and sin exchanged (spec d3, errata).
+    Source: Xia 2008, eq. 5.1.8-5.1.12; (5.1.12) is printed with cos and sin exchanged (RESOLVER-AZ).
     """
 
     version = "1.0.0"

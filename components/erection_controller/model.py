@@ -23,7 +23,7 @@ class ErectionController(Component):
     Refused while it runs: |f| below 0.5 g0 (no apparent vertical), and a lean beyond 60 deg after the fast start.
 
     Not modelled: hysteresis and lag of the liquid, tilt of the switches on the element, cut-off by air data.
-    Source: 004_a44a05c7e88249d1.txt 5.3.1 (text; no equations); spec d4, item 10.
+    Source: GSP ch. 5, section 5.3.1 (text; no equations); VERTICAL-GYRO.
     """
 
     version = "1.0.0"

@@ -20,14 +20,14 @@ class EstimatorKalmanAr(Component):
     and with valid = 0 only the first line: the reading is missing.  nis = y2/S; variance = P_11 of the estimate.
 
     **Sign.**  phi is the one of statsmodels.  MATLAB's arburg and spectrum.arburg return a = -phi, which is what table
-    3.4.2 of the thesis prints: put in as it stands it is not stationary and is refused, with this reason.
+    3.4.2 of Xia 2008 prints: put in as it stands it is not stationary and is refused, with this reason.
 
-    What the thesis did and this part does not: the model of the DIFFERENCED series fed with readings that are not
+    What Xia 2008 did and this part does not: the model of the DIFFERENCED series fed with readings that are not
     differenced; R set to the innovation variance, which holds the reading noise already; the model of a drift put over
     a turning platform, where it scales the rate (gain 0.39 at 1 Hz).  For a rate take estimator_kalman_rate.
 
     Not modelled: a mean other than 0, moving-average terms, parameters that change.
-    Source: EST-KF-GEN, EST-KF-AR (spec d3); 001_5d74e91bb8fa76be.txt eq. 4.2.1-4.2.18, 3.4.18.
+    Source: EST-KF-GEN, EST-KF-AR; Xia 2008, eq. 4.2.1-4.2.18, 3.4.18.
     """
 
     version = "1.0.0"

@@ -16,7 +16,7 @@ class EstimatorMovingAverage(Component):
     One reading is taken every Ts, at the ends of the communication steps k Ts, k = 1, 2 ... from the start.
 
     Not modelled: weights other than equal.
-    Source: textbook; the comparison filter of spec d3, BENCH-DYN-SINE.
+    Source: standard filter; a comparison filter of BENCH-DYN-SINE.
     """
 
     version = "1.0.0"

@@ -11,7 +11,7 @@ class EstimatorNone(Component):
     What every estimator has to beat, and what a loop has without one.
 
     Not modelled: nothing is; a reading that is marked as missing cannot be passed on, so there is no input for it.
-    Source: the socket Estimator of spec d3, section 3 (comparison row "raw" of BENCH-DYN-SINE).
+    Source: the socket Estimator of BENCH-DYN-SINE (its comparison row "raw").
     """
 
     version = "1.0.0"

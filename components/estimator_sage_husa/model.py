@@ -23,7 +23,7 @@ class EstimatorSageHusa(Component):
     R_hat is R, clip_count counts how often the last line acted.  b is the forgetting factor: 1/(1 - b) readings are
     remembered.  With valid = 0 it predicts only; neither R nor k moves.
 
-    As printed in the thesis (eq. 4.2.19) it fails: d = (1 - b)(1 - b^(k+1)) keeps R0 for some 1/(1 - b) readings;
+    As printed in Xia 2008, eq. 4.2.19, it fails: d = (1 - b)(1 - b^(k+1)) keeps R0 for some 1/(1 - b) readings;
     H P H' with P after the update in form 1 makes R 9 % (R = 4 Q) to 59 % (R = Q) too large; K (y - H x-) subtracts
     the prediction twice and destroys a real signal.
 
@@ -31,7 +31,7 @@ class EstimatorSageHusa(Component):
     is never worse.
 
     Not modelled: adaptation of Q, of a mean, more than one reading at a time.
-    Source: EST-SAGE-HUSA (spec d3); 001_5d74e91bb8fa76be.txt eq. 4.2.19 (corrected).
+    Source: EST-SAGE-HUSA; Xia 2008, eq. 4.2.19 (corrected).
     """
 
     version = "1.0.0"

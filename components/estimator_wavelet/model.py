@@ -31,7 +31,7 @@ class EstimatorWavelet(Component):
     The first reading fills the lines.  A missing reading (valid = 0) is replaced by the one before.
 
     Not modelled: thresholds estimated from the details (sigma is a parameter), other wavelets, other thresholding.
-    Source: EST-WAVELET, EST-WAVELET-ONLINE (spec d3); 001_5d74e91bb8fa76be.txt eq. 4.3.1-4.3.8 (corrected).
+    Source: EST-WAVELET, EST-WAVELET-ONLINE; Xia 2008, eq. 4.3.1-4.3.8 (corrected).
     """
 
     version = "1.0.0"

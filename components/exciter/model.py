@@ -29,7 +29,7 @@ class Exciter(Component):
     sample times.  One sample is one communication step (`step` is large for that reason).
 
     Not modelled: more than one signal at a time, rotation about two axes at a time, random test signals.
-    Source: our own; the phases are those that the spec's items ask for.
+    Source: our own; the phases are those that STAB-POWER-2DOF and PLATFORM-1AXIS ask for.
     """
 
     version = "1.0.0"

@@ -15,7 +15,7 @@ class FloatedGyro(Component):
     Axes I, O, S (input, output, spin reference) are those of the mount: v_gyro = mount v_case.
 
         b' = r,   J r' = -C r - K b + H (w_I' - omega_d - k i (1 + k2 i + k3 i2)) - J alpha_O + M_dyn
-        u = K_sg b + noise, limited to +-u_max                                 [seed eq. 2-50..2-56, DYN-CROSS]
+        u = K_sg b + noise, limited to +-u_max                         [GYRO-DYN-1; Hu 1981, eq. 2-50..2-56]
 
     b is the float angle, w_I' = w_I cos b - w_S sin b, w_S' = w_I sin b + w_S cos b.  In the steady state of a
     rebalance loop k i (1 + k2 i + k3 i2) = omega_IA - omega_d.
@@ -26,10 +26,10 @@ class FloatedGyro(Component):
         F = D_F (1 + p_F T)                          I = D_I (1 + p_I T) + D_TI dT_S
         O = D_O (1 + p_O T) - D_TO dT_O              S = D_S (1 + p_S T) - D_TS dT_I        T = age + time
 
-    The second block is the book's 2-39..2-42, which stands in torque sign omega_M = -omega_d, with every
+    The second block is Hu 1981, eq. 2-39..2-42, which stands in torque sign omega_M = -omega_d, with every
     coefficient's sign turned: D_F = -D_K, D_I = -U_z, D_O = -U_y, D_S = +U_x, and of the thermal terms
     -D_Tzx dT_z X -> +D_TI dT_S X, +D_Tyy dT_y Y -> -D_TO dT_O Y, +D_Txz dT_x Z -> -D_TS dT_I Z.  dT_j is the
-    temperature difference between the two ends of the float along j.  p_O has no physical cause in the book.
+    temperature difference between the two ends of the float along j.  p_O has no physical cause in Hu 1981.
 
     `terms` says which model is meant: 3 = F, I, S; 4 = 3 + IS; 5 = 4 + II; 8 = 5 + SS, IO, OS; 9 = 8 + O;
     10 = 9 + OO.  A coefficient outside it must be 0.  Gauss-Markov: g+ = e^(-h/tau) g + sqrt(1 - e^(-2 h/tau))
@@ -51,7 +51,7 @@ class FloatedGyro(Component):
     Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
     vibration, hysteresis and warm-up, contact of the float with its stop, torquer axis error; in M_react the float's
     own inertia about I and S (count it with the mount).
-    Source: 000_791234d3afc34a0c.txt ch. 2; 001_5d74e91bb8fa76be.txt 2.1, 2.2.2.2 (corrected).
+    Source: Hu 1981, ch. 2; Xia 2008, sections 2.1, 2.2.2.2 (corrected).
     """
 
     version = "1.1.0"

@@ -18,10 +18,10 @@ class Gyro2dof(Component):
         u_x = -K_sg_x psi_x + noise,  u_y = -K_sg_y psi_y + noise,  limited to +-u_max
 
     Wiring rule: the torquer that nulls u_x acts about y and is fed by i_y, that of u_y is fed by i_x.  u is the angle
-    of the case against the rotor (the spec's K psi with its sign turned), so that a rebalance or a servo of positive
-    gain closes the loop, as with floated_gyro.  In its steady state psi = 0 and, exactly,
+    of the case against the rotor (K psi of GYRO-DYN-2DOF with its sign turned), so that a rebalance or a servo of
+    positive gain closes the loop, as with floated_gyro.  In its steady state psi = 0 and, exactly,
 
-        k_y i_y (1 + ...) = omega_x - omega_dx,     k_x i_x (1 + ...) = omega_y - omega_dy             [spec d1, 4.1]
+        k_y i_y (1 + ...) = omega_x - omega_dx,     k_x i_x (1 + ...) = omega_y - omega_dy             [MEAS-REBALANCE]
 
     Drift of channel c = x, y in precession sign, (X, Y, Z) = -f/g0 along x, y, z, g0 = 9.80665 m/s2   [2-29..2-46]
 
@@ -29,7 +29,7 @@ class Gyro2dof(Component):
                    + turn-on constant + Gauss-Markov + white
 
     Dx_x = -m l_z/H is of the torque about the inner axis, Dy_y of that about the outer axis: it contains the outer
-    gimbal, so the two differ (u_zy and u_zx of the book).  `terms_x`, `terms_y` say which model is meant; a coefficient
+    gimbal, so the two differ (u_zy and u_zx of Hu 1981).  `terms_x`, `terms_y` say which model is meant; a coefficient
     outside it must be 0.  x channel: 8 = 0, x, z, xx, zz, xy, yz, xz; 9 = 8 + y; 10 = 9 + yy.  y channel: the same with
     x and y exchanged.  Gauss-Markov and noise as in floated_gyro, each channel its own.
 
@@ -55,8 +55,8 @@ class Gyro2dof(Component):
     Not modelled: small angles with full = 0; with full = 1 change of J_x with beta, inertia about z, coupling of the
     base's acceleration through the inertias; torquer axis error, the share of omega_z in the angular momentum, ageing
     and temperature, vibration, hysteresis, warm-up.
-    Source: 000_791234d3afc34a0c.txt ch. 2 and 3 (wiring rule of 3.6); the dynamics are the spec's own minimal model;
-    the power gyro 004_a44a05c7e88249d1.txt 5.1.1, eq. 5-7, 5-8.
+    Source: Hu 1981, ch. 2 and 3 (wiring rule of 3.6); the dynamics are our own minimal model (GYRO-DYN-2DOF);
+    the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
     version = "1.1.0"

@@ -25,7 +25,7 @@ class IndexHead(Component):
         alpha = face (w_y rate, -w_x rate, acc)
 
     Not modelled: play and lifting of the head, errors of the move itself, wobble, acceleration of the instrument.
-    Source: 000_791234d3afc34a0c.txt ch. 3.1, 3.4, 5.2; spec d1, 4.2 and 4.8.
+    Source: Hu 1981, sections 3.1, 3.4, 5.2; TEST-8POS, TEST-ACC-MULTI.
     """
 
     version = "1.0.0"

@@ -14,7 +14,7 @@ class LoadTorque(Component):
     `torque` comes from the exciter, which makes the steps and sines of the plan.
 
     Not modelled: friction and unbalance, which depend on the platform's motion and attitude and are parts of it.
-    Source: our own; the spec's items call it M_xf, M_dist.
+    Source: our own; M_xf of STAB-POWER-2DOF, M_dist of PLATFORM-1AXIS.
     """
 
     version = "1.0.0"

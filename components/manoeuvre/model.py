@@ -20,8 +20,8 @@ class Manoeuvre(Component):
 
         omega = C (0, w cos(lat), w sin(lat) + turn) + (pitch, roll, yaw)        f = C (a + (0, 0, gravity))
 
-    angle is (pitch, roll, heading) in the order heading, pitch, roll of spec d3: v = R2(roll) R1(pitch) R3(heading)
-    v_ENU, pitch within +-90 deg.  Rates begin and end at once; alpha is 0 (between the jumps it is small).
+    angle is (pitch, roll, heading) in the order heading, pitch, roll [CONV-GIMBALS]: v = R2(roll) R1(pitch)
+    R3(heading) v_ENU, pitch within +-90 deg.  Rates begin and end at once; alpha is 0 (between the jumps it is small).
 
     Not modelled: flight mechanics (bank and turn are given apart), transport rate, change of speed by acceleration.
     Source: our own.

@@ -30,7 +30,7 @@ class PlatformFourGimbal(Component):
 
     Not modelled: gimbal inertia against base motion (isolation is perfect but for limits), friction, back EMF, dynamics
     of the fourth servo, reaction of the gyros; alpha_b is not used (alpha is the difference of omega over the step).
-    Source: 004_a44a05c7e88249d1.txt ch. 5.2.2, fig. 5-14..5-17; equations of spec d4, 9, in the axes of spec d3.
+    Source: GSP ch. 5, section 5.2.2, fig. 5-14..5-17; equations of PLATFORM-4GIMBAL, axes of CONV-GIMBALS.
     """
 
     version = "1.0.0"

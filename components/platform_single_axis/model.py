@@ -23,7 +23,7 @@ class PlatformSingleAxis(Component):
 
     Not modelled: backlash and elasticity of the reducer, Stribeck curve, cogging, iron losses, end stops, motion of the
     platform against its bearing about y and z, base motion within a communication step (held).
-    Source: 001_5d74e91bb8fa76be.txt ch. 4.1; 004_a44a05c7e88249d1.txt eq. 5-7, 5-24; defaults of spec d3, 4.
+    Source: Xia 2008, section 4.1; GSP ch. 5, eq. 5-7, 5-24; defaults of PLATFORM-1AXIS.
     """
 
     version = "1.0.0"

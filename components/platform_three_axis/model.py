@@ -20,7 +20,8 @@ class PlatformThreeAxis(Component):
 
     b by Newton-Euler: n = I alpha + omega x I omega of each body with q'' = 0, passed outwards; M by the same
     recursion, azimuth eliminated (q_a'' = t_a / I_az + sin(pitch) q_r''), then two equations.  Unbalance: n + u x f,
-    u = mass times offset of a body in its own axes.  Rates of the platform: omega = T1 omega_A + T3 omega_b (spec d3).
+    u = mass times offset of a body in its own axes.  Rates of the platform [PLATFORM-3AXIS-KIN]:
+    omega = T1 omega_A + T3 omega_b.
 
     Bearings as in platform_single_axis: viscous friction and a contact that sticks, elastic to break-away.  The pitch
     gimbal stops at +-pitch_stop on a spring with damping 0.5; `lock` is 1 beyond lock_angle, where sec(pitch) is large.
@@ -28,7 +29,7 @@ class PlatformThreeAxis(Component):
 
     Not modelled: elastic gimbals and shafts, products of inertia, rotors of geared motors (direct drive: their inertia
     belongs to the gimbals), stops of roll and azimuth, base motion within a communication step (held).
-    Source: 001_5d74e91bb8fa76be.txt ch. 5.1, eq. 5.1.1-5.1.7; the dynamics are the spec's own model.
+    Source: Xia 2008, section 5.1, eq. 5.1.1-5.1.7; the dynamics are our own model (PLATFORM-3AXIS-DYN).
     """
 
     version = "1.0.0"

@@ -31,7 +31,7 @@ class PlatformThreeGimbal2dof(Component):
 
     Not modelled: gimbal inertia against base motion (isolation is perfect but for lock and limits), friction, back EMF,
     gimbal stops, reaction of the gyros; alpha_b is not used (alpha is the difference of omega over the step).
-    Source: 004_a44a05c7e88249d1.txt ch. 5.2.1, fig. 5-12, 5-13; equations of spec d4, 8, in the axes of spec d3.
+    Source: GSP ch. 5, section 5.2.1, fig. 5-12, 5-13; equations of PLATFORM-3GIMBAL-2DOF, axes of CONV-GIMBALS.
     """
 
     version = "1.0.0"

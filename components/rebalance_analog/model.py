@@ -16,7 +16,7 @@ class RebalanceAnalog(Component):
     shift the reading against the table angle (read as i it is one step early).  One internal step is one
     communication step (`step` is large for that reason); q is exact for a held u.
 
-    The pickoff gives u = K_sg b and the torquer gives -H k i on the float, so the loop of the spec,
+    The pickoff gives u = K_sg b and the torquer gives -H k i on the float, so the loop of LOOP-REBALANCE,
     M = -20 b - 200 (integral of b) in N.m, is K_p = 20 / (K_sg H k), K_i = 200 / (K_sg H k).  With
     K_sg = 10 V/rad, H = 0.2 N.m.s and k = 17.2 deg/h/mA = 0.083387953 rad/s/A, K_sg H k = 0.16677591 and
     K_p = 119.921 A/V, K_i = 1199.21 A/(V.s).  Closed with J = 2e-4 kg.m2, C = 0.2 N.m.s the poles are -11.25,
@@ -24,7 +24,7 @@ class RebalanceAnalog(Component):
     k i = omega_IA - omega_d exactly.
 
     Not modelled: bandwidth and drift of the current source, heating of the torquer, pulse-width operation.
-    Source: 000_791234d3afc34a0c.txt ch. 5, eq. 5-62..5-68.
+    Source: Hu 1981, ch. 5, eq. 5-62..5-68.
     """
 
     version = "1.0.0"

@@ -5,7 +5,7 @@ from gyrobench.component.math import fabs, maximum, sqrt
 
 
 class Sampler(Component):
-    """Averages a signal over windows of time or of angle.  [TABLE-PROGRAM; 000_791234d3afc34a0c.txt ch. 6.1]
+    """Averages a signal over windows of time or of angle.  [TABLE-PROGRAM; Hu 1981, section 6.1]
 
     The first sample with the gate open, at (t_a, angle_a), begins window 1.  Window k ends, and window k + 1
     begins, at the first sample at which

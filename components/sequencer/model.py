@@ -9,7 +9,7 @@ GUARD = 3.0  # samples
 
 
 class Sequencer(Component):
-    """Runs the plan of a test: up to 99 labelled phases.  [TABLE-PROGRAM; 000_791234d3afc34a0c.txt ch. 5.4, 6.1]
+    """Runs the plan of a test: up to 99 labelled phases.  [TABLE-PROGRAM; Hu 1981, sections 5.4, 6.1]
 
     Each phase gives the table a mode, a target (and a second one, for a table with two axes) and a mount (face), and
     goes through

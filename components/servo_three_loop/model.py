@@ -22,7 +22,7 @@ class ServoThreeLoop(Component):
     step of 0.2 ms or less), the rate loop crosses 10 Hz, the position loop has 1 Hz.
 
     Not modelled: delay of a computer beside that of the exchange, resolution of the measurements.
-    Source: 001_5d74e91bb8fa76be.txt 1.3.2 (structure; it gives no gains); spec d3, section 4.
+    Source: Xia 2008, section 1.3.2 (structure; it gives no gains); SERVO-3LOOP.
     """
 
     version = "1.0.0"

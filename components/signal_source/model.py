@@ -22,7 +22,7 @@ class SignalSource(Component):
     matter, and the run ends when a value is no longer finite.
 
     Not modelled: quantization, filter and jitter of an acquisition channel.
-    Source: DRIFT-RANDOM-CLASSES, DRIFT-ARIMA310 (spec d3); 001_5d74e91bb8fa76be.txt section 2.2.2.3, eq. 3.4.18.
+    Source: DRIFT-RANDOM-CLASSES, DRIFT-ARIMA310; Xia 2008, section 2.2.2.3, eq. 3.4.18.
     """
 
     version = "1.0.0"

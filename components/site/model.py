@@ -12,7 +12,7 @@ M = 3.449786506841e-3  # omega2 a2 b / GM
 
 
 class Site(Component):
-    """Where the test stands: specific force and Earth rate, local frame ENU.  [spec d1, 0.1 and 0.3; NIMA TR8350.2]
+    """Where the test stands: specific force and Earth rate, local frame ENU.  [CONV-FRAMES; TR8350.2]
 
         f = (0, 0, g)                    specific force a - G of a body at rest: it points up
         omega = W (0, cos L, sin L)      Earth rate, along the pole

@@ -20,7 +20,7 @@ class StabilizerPower(Component):
     takes one torque.
 
     Not modelled: motor time constant, back EMF, friction and play of the reducer (its inertia belongs to J_x).
-    Source: 004_a44a05c7e88249d1.txt eq. 5-5, 5-7, 5-20..5-23; the limit in its exact form (spec d4, item 3).
+    Source: GSP ch. 5, eq. 5-5, 5-7, 5-20..5-23; the limit in its exact form (STAB-POWER-2DOF).
     """
 
     version = "1.0.0"

@@ -34,7 +34,7 @@ class TableRate(Component):
 
     Not modelled: servo error and bandwidth, axis wobble, bearing torque, acceleration of the mounted
     instrument (it stands on the axis), time of a change of mount.
-    Source: 000_791234d3afc34a0c.txt ch. 5.4 two-2, 5.5 two-1, 6.1; frames of spec d1, 0.1 and 0.3.
+    Source: Hu 1981, sections 5.4 (two-2), 5.5 (two-1), 6.1; frames: CONV-FRAMES.
     """
 
     version = "1.0.0"

@@ -17,7 +17,7 @@ class TableServo(Component):
         J w' = M + M_load + torque - D (w - e) - (H_g / K_g) u'        x' = w - e        M = -G C(s) u / (1 + lag s)
 
     nulls the pickoff voltage u of a gyro with its input axis along the table axis: w = omega_d, x' = -omega_E - omega_M
-    (spec d1, 5.0).  H_g, J_g, C_g, K_g are the gyro; G follows from the crossover or from K_T = G K_g H_g / C_g:
+    (MEAS-SERVO).  H_g, J_g, C_g, K_g are the gyro; G follows from the crossover or from K_T = G K_g H_g / C_g:
 
         L(s) = G K_g H_g C(s) / ( s [ (J s + D) (J_g s + C_g) + H_g2 ] (1 + lag s) ),   |L(j crossover)| = 1
 
@@ -27,7 +27,7 @@ class TableServo(Component):
 
     Not modelled: stiction before breakaway, wobble, torsion between motor and plate, air bearing and slip-ring
     follower (their torque comes in by `torque`), carrier ripple, stops, drop-out from the fine loop.
-    Source: 000_791234d3afc34a0c.txt eq. 3-54, 3-55, 5-1..5-21, ch. 5.5 one-1, 6.1 item 6.
+    Source: Hu 1981, eq. 3-54, 3-55, 5-1..5-21, sections 5.5 (one-1), 6.1 (item 6).
     """
 
     version = "1.0.0"

@@ -13,7 +13,7 @@ class TableTwoAxis(Component):
     closed form (0 hold: brake and stay; 1 index: to an angle; 2 rate).  Attitude of the plate, R passive rotations:
 
         v_face = face A base v_local
-        A = Ry(y) Wy(y) Rz(squareness) Rx(x) Wx(x)                  [spec d1, 5.6 (SERVO2-A) without errors]
+        A = Ry(y) Wy(y) Rz(squareness) Rx(x) Wx(x)                  [SERVO2-A, where there are no errors]
 
       base    rows: the axes X (outer), Y (inner at x = 0), Z in ENU at angles 0
       W       wobble of an axis: its two cross rotations amplitude cos(n q + phase), amplitude sin(n q + phase)
@@ -28,7 +28,7 @@ class TableTwoAxis(Component):
 
     Not modelled: servo error and bandwidth, bearing torque, sag under load, encoder errors other than the quantum,
     acceleration of the mounted instrument (it stands where the axes meet), time of a change of mount.
-    Source: 000_791234d3afc34a0c.txt eq. 3-47, 3-94..3-99, ch. 5.4; frames of spec d1, 0.1, 4.6 and 5.6.
+    Source: Hu 1981, eq. 3-47, 3-94..3-99, section 5.4; frames: CONV-FRAMES, TUM2AX-GEOM, SERVO2-A.
     """
 
     version = "1.0.0"

@@ -29,7 +29,7 @@ class VerticalGyro(Component):
 
     Not modelled: nutation, inertia and friction of gimbals and ring, the tilt of the roll axis' torquer when pitched
     (torques act along the inner element's axes), pendulosity, rotor speed, stops.
-    Source: 004_a44a05c7e88249d1.txt 5.3.1 (text; no equations); spec d4, items 9 and 10.
+    Source: GSP ch. 5, section 5.3.1 (text; no equations); VERTICAL-GYRO, PLATFORM-4GIMBAL.
     """
 
     version = "1.0.0"

@@ -109,7 +109,7 @@ class Result:
     system: str
     title: str
     method: str  # one line, with its source
-    sources: list[str]  # "TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21"
+    sources: list[str]  # "TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21"
     equation: str  # model equation, Typst math
     conventions: list[str]  # sign and axis conventions, a sentence each
     coefficients: list[Coefficient]

@@ -8,7 +8,7 @@ angle theta, the input axis x of both mounts rises:
 
 with t = theta + theta_0, gamma = g/g0 and the book's sign, (X, Y, Z) = -f/g0: an axis that points up reads -gamma.
 theta_0 is the zero of the head and the error of the input axis together; one mount cannot tell them apart.
-[ACC; 000_791234d3afc34a0c.txt eq. 3-38..3-43]
+[ACC; Hu 1981, eq. 3-38..3-43]
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 All readings of one visit of a position are one datum (an error of the position is common to them).  Least squares over
 both mounts, by Gauss-Newton in the two theta_0, all else being linear; the closed formulas of each mount stand beside
-it.  k are multiples of g0 = 9.80665 m/s2 (per g0^n).  [TEST-ACC-MULTI; 000_791234d3afc34a0c.txt eq. 3-38..3-46]
+it.  k are multiples of g0 = 9.80665 m/s2 (per g0^n).  [TEST-ACC-MULTI; Hu 1981, eq. 3-38..3-46]
 
 Not modelled: a tilt of the axis of the head (k4, k5 times the tilt in k1, and half its square), a change of the
 coefficients during the test, a mount error other than theta_0.
@@ -59,8 +59,8 @@ SEEN = {  # what four positions see, see closed.py
 for _shown in SEEN.values():
     _shown["k1"] = "k1 + k3γ²"
 SOURCES = [
-    "TEST-ACC-MULTI, ACC-EXACT; 000_791234d3afc34a0c.txt eq. 3-38..3-46",
-    "RED-OLS, RED-GLS; 000_791234d3afc34a0c.txt eq. 4-64..4-88, divisor n − p",
+    "TEST-ACC-MULTI, ACC-EXACT; Hu 1981, eq. 3-38..3-46",
+    "RED-OLS, RED-GLS; Hu 1981, eq. 4-64..4-88, divisor n − p",
 ]
 
 

@@ -28,7 +28,7 @@ class AccelerometerMultipoint(System):
     """An accelerometer stands in 4, 8, 12 or 24 equally spaced positions about a horizontal axis; gravity gives bias,
     scale factor, second and third order; two mounts give the cross terms with the output and with the pendulum axis.
 
-    [TEST-ACC-MULTI; 000_791234d3afc34a0c.txt eq. 3-38..3-46]
+    [TEST-ACC-MULTI; Hu 1981, eq. 3-38..3-46]
     """
 
     title = "Multi-position test of an accelerometer"

@@ -13,7 +13,7 @@ class DriftTestSuite(Suite):
     """A chosen set of drift tests on one gyro; the same coefficient by every method that sees it, with normalized
     errors and a test whether the methods agree.
 
-    [CROSS-MAP; 000_791234d3afc34a0c.txt ch. 3; spec d1, 2 and 7]
+    [CROSS-MAP; Hu 1981, ch. 3; spec d1, 2 and 7]
     """
 
     title = "Drift tests of one gyro by several methods"
@@ -29,7 +29,7 @@ class DriftTestSuite(Suite):
         "and compared where two methods or more see the same quantity"
     )
     sources = (
-        "CROSS-MAP; the book's choice guide, 000_791234d3afc34a0c.txt ch. 3",
+        "CROSS-MAP; the book's choice guide, Hu 1981, ch. 3",
         "E_n: ISO 13528; consistency: B. L. Welch, Biometrika 38 (1951) 330; R. T. Birge, Phys. Rev. 40 (1932) 207; "
         "S. Holm, Scand. J. Stat. 6 (1979) 65",
     )

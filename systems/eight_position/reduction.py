@@ -4,7 +4,7 @@ As in the book the readings of a position are averaged to one datum of the cycle
 reading is a datum).  The data are rows of two fits, current about x and current about y, under a noise model estimated
 from the same record; with six unknowns a channel the estimates are the book's closed formulas whenever all positions
 weigh alike.  Repeats on several days are reduced day by day and then together.
-[TEST-8POS, POS8-MODEL+REDUCE, POS8-LS; 000_791234d3afc34a0c.txt eq. 3-1..3-11, Table 3-1, corrected by E17-E19]
+[TEST-8POS, POS8-MODEL+REDUCE, POS8-LS; Hu 1981, eq. 3-1..3-11, Table 3-1, corrected by E17-E19]
 
 Not modelled: products of two components of gravity (no position shows them), drift that changes over the cycles
 otherwise than as noise, motion between the positions.
@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
 AVERAGED = 4  # cycles from which on the readings of a position are averaged first
 SOURCES = [
-    "TEST-8POS, POS8-MODEL+REDUCE; 000_791234d3afc34a0c.txt eq. 3-1..3-11, corrected by E17, E18",
-    "POS8-LS, POS8-QUAD; GYRO-STATIC-2DOF, 000_791234d3afc34a0c.txt eq. 2-29..2-46",
-    "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+    "TEST-8POS, POS8-MODEL+REDUCE; Hu 1981, eq. 3-1..3-11, corrected by E17, E18",
+    "POS8-LS, POS8-QUAD; GYRO-STATIC-2DOF, Hu 1981, eq. 2-29..2-46",
+    "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
 ]
 
 

@@ -25,7 +25,7 @@ class EightPosition(System):
     """The gyro stands in eight attitudes, several times over; Earth rate and gravity give both torquers' scale
     factors, the constant drifts and the mass unbalances of both channels.
 
-    [TEST-8POS; 000_791234d3afc34a0c.txt eq. 3-1..3-11, Table 3-1]
+    [TEST-8POS; Hu 1981, eq. 3-1..3-11, Table 3-1]
     """
 
     title = "Eight-position test"

@@ -85,8 +85,8 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
         title="Bench of estimators",
         method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
         sources=[
-            "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; 001_5d74e91bb8fa76be.txt sections 3.4.5, 4.4.2",
-            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; 001_5d74e91bb8fa76be.txt sections 4.2, 4.3",
+            "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; Xia 2008, sections 3.4.5, 4.4.2",
+            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; Xia 2008, sections 4.2, 4.3",
         ],
         equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
         conventions=[

@@ -30,7 +30,7 @@ class EstimatorBench(System):
     """An estimator gets the readings of a source whose truth is known; its error, delay, noise reduction and distortion
     are measured, and whether it is what it says of itself.
 
-    [BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; 001_5d74e91bb8fa76be.txt sections 3.4, 4.2-4.4]
+    [BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; Xia 2008, sections 3.4, 4.2-4.4]
     """
 
     title = "Bench of estimators"

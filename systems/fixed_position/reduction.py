@@ -4,7 +4,7 @@
 
 mean over the readings under a noise model estimated from them.  One attitude: no coefficient can be told from another.
 Repeats on several days are reduced day by day and then together (gyrobench.reduction.estimation.repeatability).
-[TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2; RED-GLS]
+[TEST-FIXED; Hu 1981, ch. 3 par. 2.2; RED-GLS]
 
 Not modelled: drift slower than the record beyond what the trend test shows, change of the attitude under load.
 """
@@ -115,8 +115,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
         system="fixed_position",
         title="Fixed-position test of a floated gyro",
         method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
-        sources=["TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2",
-                 "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p"],
+        sources=["TEST-FIXED; Hu 1981, ch. 3 par. 2.2",
+                 "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p"],
         equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
         conventions=_conventions(setup),
         effects=_effects(setup, found, i),

@@ -26,7 +26,7 @@ class FixedPosition(System):
     """The gyro stands still in its service attitude with its rebalance loop closed: one composite drift, and by
     repeats its stability.
 
-    [TEST-FIXED; 000_791234d3afc34a0c.txt ch. 3 par. 2.2]
+    [TEST-FIXED; Hu 1981, ch. 3 par. 2.2]
     """
 
     title = "Fixed-position test"

@@ -9,7 +9,7 @@ W_I, W_S: Earth rate along input and spin axis; b = (H/C) (theta - (n_j + n_(j+1
 between the readings (the case is stepped on right after a reading).  G comes from the same readings, by least squares
 of the differences of u between steps over and under the null; a hand that nulls well needs none (u = 0).  An error of
 G cancels where first and last reading lie on the same side of the null.  The mean over the intervals stands under a
-noise model estimated from them.  [TEST-OPEN, DYN-CROSS; 000_791234d3afc34a0c.txt ch. 3 par. 1, eq. 2-50..2-56]
+noise model estimated from them.  [TEST-OPEN, DYN-CROSS; Hu 1981, ch. 3 par. 1, eq. 2-50..2-56]
 
 Not modelled: a drift that changes with the case angle, omega_d'.  The result is that at the mean attitude; between the
 steps it looks like a gain, G (1 - omega_d' T/2) for steps every T, and shifts the result by (omega_d' T/2) times the
@@ -178,9 +178,9 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
         method="Case turned about the input axis to the null of the pickoff, no loop closed; mean over the intervals "
         "between readings under an estimated noise model [TEST-OPEN]",
         sources=[
-            "TEST-OPEN; 000_791234d3afc34a0c.txt ch. 3 par. 1",
-            "DYN-CROSS; 000_791234d3afc34a0c.txt eq. 2-50..2-56",
-            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88",
+            "TEST-OPEN; Hu 1981, ch. 3 par. 1",
+            "DYN-CROSS; Hu 1981, eq. 2-50..2-56",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88",
         ],
         equation='omega_d = (Delta theta) / (Delta t) + omega_"E,I" - omega_"E,S" b',
         conventions=[

@@ -34,7 +34,7 @@ class OpenLoopDrift(System):
     """No loop is closed: the table turns about the gyro's input axis in small steps, a little over and a little under
     the null of the pickoff in turn; the inertial angle of the null against time is the drift.
 
-    [TEST-OPEN; 000_791234d3afc34a0c.txt ch. 3 par. 1]
+    [TEST-OPEN; Hu 1981, ch. 3 par. 1]
     """
 
     title = "Open-loop drift test"

@@ -6,7 +6,7 @@ u_0 and S are the book's line; q, the drift of the free float during the test, i
 over twice in opposite order, and otherwise bounded.  The float sees the table rate by the cosine of its angle, b' =
 (H/C) cos(b) alpha', so that its angle is gd(H/C alpha), the Gudermannian function: c = gd(g alpha)/g, g = H/C, which
 falls short of alpha by a sixth of the cube (6e-6 of 20 arcmin).  The book's line, beside it, takes c = alpha.
-[TEST-PICKOFF; 000_791234d3afc34a0c.txt appendix 1 of chapter 3]
+[TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
 
 Not modelled: drift that changes during the test is noise; an angle of the float at table angle 0.
 """
@@ -123,8 +123,8 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> Result:
         found, system="pickoff_scale_factor", title="Pickoff scale factor of a gyro",
         method="Line through the pickoff voltage over the angle of the table, float free; slope from the differences "
         "of the readings [TEST-PICKOFF]",
-        sources=["TEST-PICKOFF, PICKOFF; 000_791234d3afc34a0c.txt appendix 1 of chapter 3",
-                 "GYRO-DYN-1; 000_791234d3afc34a0c.txt eq. 2-50..2-56"],
+        sources=["TEST-PICKOFF, PICKOFF; Hu 1981, appendix 1 of chapter 3",
+                 "GYRO-DYN-1; Hu 1981, eq. 2-50..2-56"],
         equation="u = u_0 + S c(alpha)" + (" - S omega_d (t - t_m)" if both else "")
         + ', quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
         conventions=_conventions(s, both), effects=_effects(found, s, both), specification=s.specification,

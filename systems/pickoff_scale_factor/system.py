@@ -38,7 +38,7 @@ class PickoffScaleFactor(System):
     """The gyro is open loop with its input axis along the table axis, at right angles to the pole.  The table steps
     quickly through angles within the range of the pickoff; the slope of its voltage is the scale factor.
 
-    [TEST-PICKOFF; 000_791234d3afc34a0c.txt appendix 1 of chapter 3]
+    [TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
     """
 
     title = "Pickoff scale factor"

@@ -56,7 +56,7 @@ class PlatformFourGimbal(System):
     and three channels; the servo of the fourth nulls the inner roll, g4' = k G(g3) g2.
 
     First the loops and the drift at rest, then one of the flights.
-    [PLATFORM-4GIMBAL; 004_a44a05c7e88249d1.txt ch. 5.2.2]
+    [PLATFORM-4GIMBAL; GSP ch. 5, section 5.2.2]
     """
 
     title = "Four-gimbal platform"

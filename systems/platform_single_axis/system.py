@@ -25,7 +25,7 @@ class PlatformSingleAxisLoop(System):
     """A floated gyro on the platform is held at zero by its torquer; the torquer current, which is the measured rate,
     passes an estimator, and a stabilizer drives the motor so that the platform keeps its attitude.
 
-    [PLATFORM-1AXIS, GYRO-REBALANCE; 001_5d74e91bb8fa76be.txt ch. 4.1, fig. 4.1.1 rebuilt]
+    [PLATFORM-1AXIS, GYRO-REBALANCE; Xia 2008, section 4.1, fig. 4.1.1 rebuilt]
     """
 
     title = "Stabilized platform on one axis, estimator in the loop"

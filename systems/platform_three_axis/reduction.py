@@ -35,7 +35,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
         method="Load steps, commanded sines, sines of the base, test sines of each axis and drift of a platform of "
         "three gimbals",
         sources=[
-            "PLATFORM-3AXIS-DYN, PLATFORM-3AXIS-KIN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; 001_5d74e91bb8fa76be.txt "
+            "PLATFORM-3AXIS-DYN, PLATFORM-3AXIS-KIN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; Xia 2008, "
             "ch. 5, eq. 5.1.1-5.2.8 (corrected)"
         ],
         equation="M(q) dot.double(q) + b = M_m, quad u_A = T_2 u, quad T_2 = T_1^(-1)",

@@ -62,7 +62,7 @@ class PlatformThreeAxis(System):
     """Three floated gyros on the inner element of three gimbals; their signals are distributed to the motors of the
     gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
 
-    [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; 001_5d74e91bb8fa76be.txt ch. 5]
+    [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; Xia 2008, ch. 5]
     """
 
     title = "Three-axis stabilized platform"

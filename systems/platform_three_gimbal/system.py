@@ -68,7 +68,7 @@ class PlatformThreeGimbal(System):
 
     First the flight: a roll, by default to 90 deg and so into gimbal lock, a yaw, and the way back.  Then, at rest,
     load steps, sweeps of the three loops, a commanded rate and a drift hold.
-    [PLATFORM-3GIMBAL-2DOF; 004_a44a05c7e88249d1.txt ch. 5.2.1]
+    [PLATFORM-3GIMBAL-2DOF; GSP ch. 5, section 5.2.1]
     """
 
     title = "Three-gimbal platform with two gyros"

@@ -100,7 +100,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         method="The gyro holds a table with its axis along the pole in two mounts; least squares over all windows "
         "under an estimated noise model with shared angle readings [TEST-SERVO-POLAR]",
         sources=[
-            "TEST-SERVO-POLAR, SERVO-C3-REDUCE; 000_791234d3afc34a0c.txt eq. 3-84..3-90, Tables 3-2, 3-3, corrected by "
+            "TEST-SERVO-POLAR, SERVO-C3-REDUCE; Hu 1981, eq. 3-84..3-90, Tables 3-2, 3-3, corrected by "
             "E39, E40, E42-E44, E52, E53",
             "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
             "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",

@@ -23,7 +23,7 @@ class ServoPolar(System):
     table rate gives seven coefficients and R + K_zx g2 sin2(latitude), two dwells with x east separate these.  The same
     record tells the random drift and its correlation, and turns compared tell the long-term stability.
 
-    [TEST-SERVO-POLAR, TEST-COMPOSITE; 000_791234d3afc34a0c.txt eq. 3-84..3-93, Tables 3-2, 3-3]
+    [TEST-SERVO-POLAR, TEST-COMPOSITE; Hu 1981, eq. 3-84..3-93, Tables 3-2, 3-3]
     """
 
     title = "Polar servo test"

@@ -147,9 +147,9 @@ def _channel(
         method="The gyro holds a two-axis table still among the stars; least squares of each channel over all windows "
         "under an estimated noise model with shared angle readings [TEST-SERVO2-2DOF]",
         sources=[
-            "TEST-SERVO2-2DOF, SERVO2-A, SERVO2-KIN, APP2; 000_791234d3afc34a0c.txt eq. 3-94..3-102 and appendix 2, "
+            "TEST-SERVO2-2DOF, SERVO2-A, SERVO2-KIN, APP2; Hu 1981, eq. 3-94..3-102 and appendix 2, "
             "corrected by E47, E50, E51",
-            "GYRO-STATIC-2DOF; 000_791234d3afc34a0c.txt eq. 2-29..2-46",
+            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46",
             "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
         ],
         equation=_equation(c, names),

@@ -26,7 +26,7 @@ class ServoTwoAxis(System):
     x and y axes free of rotation but for the drift, while the base turns with the Earth below.  The angles of both axes
     over a day in two of the book's twelve mounts give nine coefficients a channel; the torquers are idle.
 
-    [TEST-SERVO2-2DOF; 000_791234d3afc34a0c.txt eq. 3-94..3-102, appendix 2]
+    [TEST-SERVO2-2DOF; Hu 1981, eq. 3-94..3-102, appendix 2]
     """
 
     title = "Two-axis servo test"

@@ -93,7 +93,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         method="The gyro holds a table with its axis vertical or level; least squares over all windows under an "
         "estimated noise model with shared angle readings [TEST-SERVO-VERT, TEST-SERVO-LEVEL]",
         sources=[
-            "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; 000_791234d3afc34a0c.txt eq. 3-60..3-83, corrected "
+            "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; Hu 1981, eq. 3-60..3-83, corrected "
             "by E36-E38, E41",
             "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
             "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",

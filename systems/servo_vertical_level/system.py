@@ -32,7 +32,7 @@ class ServoVerticalLevel(System):
     """The gyro holds the table with the input axis down or up (class 1) or level (class 2); the table rate less the
     Earth's is the drift, and attitudes compared give its coefficients: R, U_z, U_x by the three-term route.
 
-    [TEST-SERVO-VERT, TEST-SERVO-LEVEL; 000_791234d3afc34a0c.txt eq. 3-60..3-83]
+    [TEST-SERVO-VERT, TEST-SERVO-LEVEL; Hu 1981, eq. 3-60..3-83]
     """
 
     title = "Vertical and level servo test"

@@ -1,6 +1,6 @@
 """Record of an axis with a floated two-degree-of-freedom gyro -> its measures, beside the closed forms.
 
-[STAB-FLOATED-2DOF; 004_a44a05c7e88249d1.txt eq. 5-24..5-26, corrected as in the spec]
+[STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected as in the spec]
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     result = found.result(
         title="Stabilizer with a floated two-degree-of-freedom gyro",
         method="Load step, command by the gyro's torquer, sine sweeps of loop and base, and drift hold",
-        sources=["STAB-FLOATED-2DOF; 004_a44a05c7e88249d1.txt eq. 5-24..5-26, errata of spec d4 item 4"],
+        sources=["STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, errata of spec d4 item 4"],
         equation="J_x dot.double(theta) = M - K_m K_x G(s) theta, quad "
         "G(s) = K_G ((1 + tau_1 s)(1 + tau_2 s)) / ((1 + T_1 s)(1 + T_2 s))",
         conventions=CONVENTIONS,

@@ -45,7 +45,7 @@ class StabilizerFloated2dof(System):
 
         J_x th'' = M - K_m K_x G(s) th       L = K_m K_x G/(J_x s2),  K_m the motor with its amplifier, K_x the pickoff
 
-    [STAB-FLOATED-2DOF; 004_a44a05c7e88249d1.txt eq. 5-24..5-26, corrected]
+    [STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected]
     """
 
     title = "Stabilizer with a floated two-degree-of-freedom gyro"

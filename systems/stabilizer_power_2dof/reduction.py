@@ -1,6 +1,6 @@
 """From the record of a power gyro stabilizer to its measures, beside the closed forms.
 
-[STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-5..5-23, corrected as in the spec]
+[STAB-POWER-2DOF; GSP ch. 5, eq. 5-5..5-23, corrected as in the spec]
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CONVENTIONS = [
     "Loop gain L = −(signal that comes back) / (signal put in), opened at the potentiometer.",
     "Drift: rate of α with the base at rest; a torque M_y on the precession axis turns the platform by −M_y/H.",
 ]
-SOURCES = ["STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-1..5-23, errata of spec d4 item 3"]
+SOURCES = ["STAB-POWER-2DOF; GSP ch. 5, eq. 5-1..5-23, errata of spec d4 item 3"]
 
 
 def k_m(parameters: Mapping[str, Any]) -> float:

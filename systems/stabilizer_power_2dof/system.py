@@ -27,7 +27,7 @@ class StabilizerPower2dof(System):
 
         J_x a'' + C_x a' + H b' = -K_m b + M_x        J_y b'' + C_y b' - H a' = M_y
 
-    a: platform (outer gimbal with the load), b: precession.  [STAB-POWER-2DOF; 004_a44a05c7e88249d1.txt eq. 5-1..5-23]
+    a: platform (outer gimbal with the load), b: precession.  [STAB-POWER-2DOF; GSP ch. 5, eq. 5-1..5-23]
     """
 
     title = "Power gyro stabilizer with a two-degree-of-freedom gyro"

@@ -2,7 +2,7 @@
 
     J0 a'' + H c b' = M,     J b'' + C b' + K b - H c a' = 0          a platform, b gyro angle, c = cos(b) held
 
-[STAB-SDF-INT, -RATEINT, -RATE; 004_a44a05c7e88249d1.txt eq. 5-27..5-43, corrected]
+[STAB-SDF-INT, -RATEINT, -RATE; GSP ch. 5, eq. 5-27..5-43, corrected]
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class StabilizerSdf(System):
     and damper the axis leans like a spring H2/J, with a damper it creeps by M C/H2, with a spring it feels like an
     inertia J0 + H2/K.
 
-    [STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; 004_a44a05c7e88249d1.txt 5.1.4, eq. 5-27..5-43]
+    [STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, section 5.1.4, eq. 5-27..5-43]
     """
 
     title = "Stabilizer with a gyro of one degree of freedom"

@@ -140,7 +140,7 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: 
         system="torquer_scale_factor",
         title="Scale factor and linearity of a torquer",
         method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
-        sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; 000_791234d3afc34a0c.txt eq. A3-1..A3-6, corrected by E48, E49"],
+        sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
         equation='K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n',
         conventions=[
             "Positive current makes positive precession: K = ω/i (the book's A3-5 prints a minus that its own table "

@@ -69,7 +69,7 @@ class TorquerScaleFactor(System):
     """The gyro holds a servo table on the axis its torquer precesses about; the table rate over the current is the
     scale factor, its spread over the currents the linearity.
 
-    [TEST-TORQUER; 000_791234d3afc34a0c.txt eq. A3-1..A3-6]
+    [TEST-TORQUER; Hu 1981, eq. A3-1..A3-6]
     """
 
     title = "Torquer scale factor and linearity"

@@ -4,7 +4,7 @@
 
 Every window is a row; regressors are averaged over the window as the current is, so no [AVG-SINC] damping is left.
 The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The book's closed
-formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21]
+formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
 
 Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), independent mount errors.
 """
@@ -94,9 +94,9 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         method="Torque-rebalance tumble about the polar axis in two mounts with two dwells; least squares over all "
         "windows under an estimated noise model [TEST-TUMBLE1-SDF]",
         sources=[
-            "TEST-TUMBLE1-SDF, TUM1-REDUCE; 000_791234d3afc34a0c.txt eq. 3-12..3-21, corrected by E20-E23",
-            "GYRO-STATIC-9; 000_791234d3afc34a0c.txt eq. 2-36, 2-47",
-            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+            "TEST-TUMBLE1-SDF, TUM1-REDUCE; Hu 1981, eq. 3-12..3-21, corrected by E20-E23",
+            "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
         ],
         equation=_equation(names),
         conventions=_conventions(setup),

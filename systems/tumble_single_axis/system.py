@@ -28,7 +28,7 @@ class TumbleSingleAxis(System):
     perpendicular to it, so that neither Earth rate nor table rate enters.  Two mounts (output axis along +pole and
     -pole) and two dwells with the output axis vertical give nine drift coefficients.
 
-    [TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21]
+    [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
     """
 
     title = "Single-axis tumble test"

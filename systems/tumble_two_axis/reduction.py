@@ -4,7 +4,7 @@
 
 Least squares on X, Y, Z themselves, from the angles that were read: any positions will do that have rank 9.  The book's
 harmonic route stands beside it where ratio and positions allow it.  The noise (white, Gauss-Markov or both) is
-estimated from the same record.  [TEST-TUMBLE2-SDF, TUM2AX-LS; 000_791234d3afc34a0c.txt eq. 3-47..3-53]
+estimated from the same record.  [TEST-TUMBLE2-SDF, TUM2AX-LS; Hu 1981, eq. 3-47..3-53]
 
 Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget).
 """
@@ -127,9 +127,9 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> Result:
         method=f"Torque-rebalance tumble on two axes in the ratio {s.m}:{s.n}, averaged at rest; least squares over "
         "all windows under an estimated noise model [TEST-TUMBLE2-SDF]",
         sources=[
-            "TEST-TUMBLE2-SDF, TUM2AX-REDUCE, TUM2AX-LS; 000_791234d3afc34a0c.txt eq. 3-47..3-53, corrected by E30-E34",
-            "GYRO-STATIC-9; 000_791234d3afc34a0c.txt eq. 2-36, 2-47",
-            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+            "TEST-TUMBLE2-SDF, TUM2AX-REDUCE, TUM2AX-LS; Hu 1981, eq. 3-47..3-53, corrected by E30-E34",
+            "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
         ],
         equation='omega_"IA" - k i = omega_d = D_F + D_I X + D_O Y + D_S Z + D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + '
         'D_"OS" Y Z + D_"IS" X Z',

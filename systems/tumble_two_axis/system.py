@@ -25,7 +25,7 @@ class TumbleTwoAxis(System):
     input axis, their angles in the ratio m:n.  The input axis stays perpendicular to the pole, so that the Earth rate
     never enters; the inner rate does, hence the table stands still while the current is averaged.
 
-    [TEST-TUMBLE2-SDF; 000_791234d3afc34a0c.txt eq. 3-47..3-53]
+    [TEST-TUMBLE2-SDF; Hu 1981, eq. 3-47..3-53]
     """
 
     title = "Two-axis tumble test"

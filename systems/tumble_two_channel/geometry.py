@@ -1,4 +1,4 @@
-"""Mounts and models of the two-channel tumble.  [TUM2A-GEOM, TUM2B-GEOM; 000_791234d3afc34a0c.txt eq. 3-22..3-36]
+"""Mounts and models of the two-channel tumble.  [TUM2A-GEOM, TUM2B-GEOM; Hu 1981, eq. 3-22..3-36]
 
 The spin axis z lies along the table axis, and that along the pole p; table axes at angle 0: E, p x E, p.  Rows of a
 face: gyro axes x, y, z (outer gimbal, inner gimbal, spin) in table axes.  With theta = -angle (against the Earth),

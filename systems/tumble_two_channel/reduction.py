@@ -4,7 +4,7 @@
 
 Each channel is a least squares problem of its own: every window is a row, regressors are averaged over the window as
 the current is, and the noise of each channel is estimated from the same record.  The book's closed formulas stand
-beside the estimates.  [TEST-TUMBLE1-2DOF-A, -B; 000_791234d3afc34a0c.txt eq. 3-22..3-37]
+beside the estimates.  [TEST-TUMBLE1-2DOF-A, -B; Hu 1981, eq. 3-22..3-37]
 
 Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), noise common to both channels,
 independent mount errors.
@@ -105,11 +105,11 @@ def _channel(
         method=f"Torque-rebalance tumble of both channels about the polar axis, {part[0]}; least squares of each "
         f"channel over all windows under an estimated noise model [TEST-TUMBLE1-2DOF-{part[1]}]",
         sources=[
-            "TEST-TUMBLE1-2DOF-A, TUM2A; 000_791234d3afc34a0c.txt eq. 3-22..3-25, signs corrected by E24"
+            "TEST-TUMBLE1-2DOF-A, TUM2A; Hu 1981, eq. 3-22..3-25, signs corrected by E24"
             if simple
-            else "TEST-TUMBLE1-2DOF-B, TUM2B-REDUCE; 000_791234d3afc34a0c.txt eq. 3-26..3-37, corrected by E25-E29",
-            "GYRO-STATIC-2DOF; 000_791234d3afc34a0c.txt eq. 2-29..2-46",
-            "RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88, divisor n − p",
+            else "TEST-TUMBLE1-2DOF-B, TUM2B-REDUCE; Hu 1981, eq. 3-26..3-37, corrected by E25-E29",
+            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
         ],
         equation=_equation(c, names),
         conventions=_conventions(s),

@@ -31,7 +31,7 @@ class TumbleTwoChannel(System):
     mounts (spin axis along +pole and -pole) give the eight coefficients of the simple model; with two dwells (inner
     gimbal axis vertical) nine coefficients a channel.
 
-    [TEST-TUMBLE1-2DOF-A, -B; 000_791234d3afc34a0c.txt eq. 3-22..3-37]
+    [TEST-TUMBLE1-2DOF-A, -B; Hu 1981, eq. 3-22..3-37]
     """
 
     title = "Single-axis tumble test of a two-degree-of-freedom gyro"

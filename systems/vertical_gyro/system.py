@@ -24,7 +24,7 @@ class VerticalGyroBench(System):
     """A vertical gyro is erected from a tilt, rests, and then flies an acceleration, a turn, a loop and a roll; what it
     shows is compared with the vehicle's true pitch and roll.
 
-    [VERTICAL-GYRO; 004_a44a05c7e88249d1.txt 5.3.1]
+    [VERTICAL-GYRO; GSP ch. 5, section 5.3.1]
     """
 
     title = "Vertical gyro"

@@ -178,7 +178,7 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
             "Torque-rebalance tumble about the pole at ten times Earth rate, two mounts, two dwells "
             "(TEST-TUMBLE1-SDF, eq. 3-12 to 3-21)"
         ),
-        sources=["TEST-TUMBLE1-SDF; 000_791234d3afc34a0c.txt eq. 3-12..3-21"],
+        sources=["TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21"],
         equation=(
             'k i = omega_"IA" - omega_d, quad omega_d = D_F + D_I X + D_O Y + D_S Z '
             '+ D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + D_"IS" X Z + D_"OS" Y Z'

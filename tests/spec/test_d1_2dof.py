@@ -1,4 +1,4 @@
-"""TEST-TUMBLE1-2DOF-A, -B (spec d1, 4.4 and 4.5): geometry, recovery, condition, errata, refusals, folding."""
+"""TEST-TUMBLE1-2DOF-A, -B: geometry, recovery, condition, errata, refusals, folding."""
 
 from __future__ import annotations
 

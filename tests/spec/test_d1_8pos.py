@@ -1,4 +1,4 @@
-"""TEST-8POS (spec d1, 4.1, 4.2): frames, formulas and their errata, least squares, compliance, Table 3-1, refusals."""
+"""TEST-8POS: frames, formulas and their errata, least squares, compliance, Table 3-1, refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TEST-ACC-MULTI (spec d1, 4.8): closed formulas, least squares, what few positions see, uncertainties."""
+"""TEST-ACC-MULTI: closed formulas, least squares, what few positions see, uncertainties."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TEST-TORQUER (spec d1, 6): the book's table, its errata, refusals, recovery of a made torquer."""
+"""TEST-TORQUER: the book's table, its errata, refusals, recovery of a made torquer."""
 
 from __future__ import annotations
 

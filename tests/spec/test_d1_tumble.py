@@ -1,4 +1,4 @@
-"""TEST-TUMBLE1-SDF (spec d1, 4.3): recovery, errata, refusals, folding, budget."""
+"""TEST-TUMBLE1-SDF: recovery, errata, refusals, folding, budget."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TEST-TUMBLE2-SDF (spec d1, 4.6): geometry, ratios, recovery, condition, errata, refusals."""
+"""TEST-TUMBLE2-SDF: geometry, ratios, recovery, condition, errata, refusals."""
 
 from __future__ import annotations
 

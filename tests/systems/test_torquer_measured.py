@@ -67,4 +67,4 @@ def test_it_is_listed(command: Command) -> None:
 
 def test_book_table_says_where_it_comes_from() -> None:
     head = (Bench.find().system_folder(NAME) / "book_table.csv").read_text("utf-8")
-    assert "000_791234d3afc34a0c.txt" in head and "K_n" in head
+    assert "Hu 1981, table after eq. A3-6" in head and "K_n" in head

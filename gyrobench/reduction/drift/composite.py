@@ -4,7 +4,7 @@
     C(q) = 1/(n - q) sum_{i=1..n-q} (d_i - mean)(d_{i+q} - mean),   correlation C(q)/C(0)   (E46: less the mean)
 
 d_i are drift rates over windows of the same length dT, Earth rate removed; what repeats with the table angle must be
-removed by the caller.  sigma depends on dT.  Lags to n/4.  [000_791234d3afc34a0c.txt eq. 3-91..3-93]
+removed by the caller.  sigma depends on dT.  Lags to n/4.  [Hu 1981, eq. 3-91..3-93]
 """
 
 from __future__ import annotations

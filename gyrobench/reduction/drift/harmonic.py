@@ -4,7 +4,7 @@
 
 The average of cos n theta over a window of width w is cos(n theta_m) sin(n w/2)/(n w/2): with averaged regressors the
 damping [AVG-SINC] is divided out, and unequal angle steps do no harm.  For equidistant windows over whole turns it is
-the discrete Fourier sum.  [RED-HARMONIC; 000_791234d3afc34a0c.txt eq. 4-12..4-22]
+the discrete Fourier sum.  [RED-HARMONIC; Hu 1981, eq. 4-12..4-22]
 """
 
 from __future__ import annotations

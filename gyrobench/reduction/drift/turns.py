@@ -4,7 +4,7 @@
     turns.test()                                # adds its F tests to found.tests
     turns.harmonics(fits), turns.repeatability(), turns.table()
 
-[RED-HARMONIC; 000_791234d3afc34a0c.txt eq. 4-12..4-22]
+[RED-HARMONIC; Hu 1981, eq. 4-12..4-22]
 """
 
 from __future__ import annotations

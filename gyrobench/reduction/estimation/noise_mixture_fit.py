@@ -17,7 +17,7 @@ the instruments of that population, whatever the design; of one certain instrume
 often.  tests/benchmarks/coverage.py counts, for every test method; its README has the figures.
 
 Standard uncertainty u: standard deviation of the mixture, or the 95 % half width over 1.96 where heavy tails make
-that smaller.  [RED-GLS; 000_791234d3afc34a0c.txt eq. 4-79..4-88]
+that smaller.  [RED-GLS; Hu 1981, eq. 4-79..4-88]
 """
 
 from __future__ import annotations

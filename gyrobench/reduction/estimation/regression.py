@@ -3,7 +3,7 @@
     y = X a + e,  cov e = s^2 R,  a = (X' R^-1 X)^-1 X' R^-1 y,  s^2 = v' R^-1 v / (n - p),   cov a = s^2 (X'R^-1X)^-1
 
 solved by singular value or QR decomposition of the whitened, column-scaled X, never by the normal equations.
-[RED-OLS, RED-GLS; 000_791234d3afc34a0c.txt eq. 4-64..4-97 with the divisor n - p and t tests on the residual sum]
+[RED-OLS, RED-GLS; Hu 1981, eq. 4-64..4-97 with the divisor n - p and t tests on the residual sum]
 """
 
 from __future__ import annotations

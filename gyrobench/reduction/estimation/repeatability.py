@@ -4,7 +4,7 @@
 
 sigma is the random drift from day to day (the book's measure of long-term performance), u that of the mean.  Whether
 it is more than each day's own uncertainty explains is a chi-squared test, sum ((x_i - x)/u_i)^2 with n - 1 degrees of
-freedom for equal u_i.  [TEST-8POS, T3-1-MEAN, T3-1-SIGMA; 000_791234d3afc34a0c.txt ch. 3 par. 2.3, Table 3-1]
+freedom for equal u_i.  [TEST-8POS, T3-1-MEAN, T3-1-SIGMA; Hu 1981, ch. 3 par. 2.3, Table 3-1]
 
 Not modelled: trend over the days (a table in the order of time shows it), days of different weight.
 """

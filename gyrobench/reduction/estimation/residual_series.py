@@ -1,7 +1,7 @@
 """Residuals as a time series: autocorrelation, whiteness tests, Allan deviation, spectrum.
 
 Residuals come as stretches: runs of windows of equal length without a gap.  Nothing is computed across a gap.
-[RED-ACF; 000_791234d3afc34a0c.txt eq. 4-23..4-63, 3-91..3-93; IEEE 952 for the Allan deviation]
+[RED-ACF; Hu 1981, eq. 4-23..4-63, 3-91..3-93; IEEE 952 for the Allan deviation]
 """
 
 from __future__ import annotations

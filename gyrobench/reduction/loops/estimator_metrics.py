@@ -11,7 +11,7 @@ a standard uncertainty.  Errors are correlated in time: where a mean of squares 
 independent ones.  Values that are no mean of squares get theirs from the scatter of ten stretches of the record.
 
 Not modelled: signals that are not Gaussian about their deterministic part, records shorter than some ten correlation
-times of the error.  Source: EST-KF-GEN, EST-SAGE-HUSA, EST-WAVELET-ONLINE (spec d3); own derivations, proved by tests.
+times of the error.  Source: EST-KF-GEN, EST-SAGE-HUSA, EST-WAVELET-ONLINE; own derivations, proved by tests.
 """
 
 from __future__ import annotations
