@@ -9,14 +9,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from gyrobench.errors import GyrobenchError
+
 ROOMS = ("components", "systems", "reports")
 
 
-class BenchError(Exception):
+class BenchError(GyrobenchError):
     """There is no such bench, part or system; the text lists what there is."""
 
 
-class UsageError(Exception):
+class UsageError(GyrobenchError):
     """The user asks for something that does not exist or does not fit; the text says what would."""
 
 

@@ -21,13 +21,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
+from gyrobench.errors import GyrobenchError
+
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  #: base units in the order of FMI's BaseUnit attributes
 G0 = 9.80665  #: standard acceleration, m/s2; "per g" means per this
 EARTH_RATE = 7.2921159e-5  #: rad/s; the unit ERU
 DEG = math.pi / 180.0
 
 
-class UnitError(ValueError):
+class UnitError(GyrobenchError, ValueError):
     """A unit that is unknown or does not fit; the message says what would fit."""
 
 

@@ -109,10 +109,10 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> engine ->
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
-COMMON = {"bench", "units", "frames", "drift"}
+COMMON = {"errors", "bench", "units", "frames", "drift"}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
-    "component": set(),  # a Python FMU carries a copy of it
+    "component": {"errors"},  # a Python FMU carries a copy of both
     "packaging": COMMON | {"component"},
     "record": COMMON,  # the format: neither the system nor the engine that made it
     "system": COMMON | {"component", "packaging", "record"},

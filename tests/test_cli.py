@@ -241,7 +241,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
     code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
     assert code == 3
     assert "D_I is given in 'mA'; the report uses '°/h/g'" in err
-    assert "the record is kept in r; when mended: gyrobench report r" in err
+    assert "the record is kept in r; after correcting the cause: gyrobench report r" in err
     assert gyrobench("report", "r")[0] == 0
 
 

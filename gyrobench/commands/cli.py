@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import traceback
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +13,7 @@ from typing import Annotated
 import typer
 
 from gyrobench.bench import Bench, UsageError, short
-from gyrobench.commands.user_errors import explain
+from gyrobench.commands.user_errors import exit_code, user_message
 
 app = typer.Typer(
     add_completion=False,
@@ -123,8 +125,8 @@ def root(
       gyrobench run tumble_single_axis
       gyrobench COMMAND --help
 
-    Exit codes: 0 done, 1 a verdict or a validation fails, 2 refused as it was asked for, 3 a run failed,
-    130 interrupted.
+    Exit codes: 0 done, 1 a verdict or a validation fails, 2 invalid request, configuration or data,
+    3 a run, its reduction or its report failed, 130 interrupted.
     """
 
 
@@ -385,18 +387,20 @@ def init(
 
 
 def main() -> None:
-    """Runs a command; what the user did wrong ends in one message and exit code 2, a failed run in 3."""
+    """Run a command; an error ends in one message and an exit code, and with GYROBENCH_TRACEBACK=1 in a traceback."""
     try:
         app(standalone_mode=True)
     except KeyboardInterrupt:
         print("gyrobench: interrupted", file=sys.stderr)
         sys.exit(130)
     except Exception as error:
-        found = explain(error)
-        if found is None:
+        code = exit_code(error)
+        if code is None:
             raise
-        print(f"gyrobench: {found[0]}", file=sys.stderr)
-        sys.exit(found[1])
+        if os.environ.get("GYROBENCH_TRACEBACK"):
+            traceback.print_exception(error)
+        print(f"gyrobench: {user_message(error)}", file=sys.stderr)
+        sys.exit(code)
 
 
 if __name__ == "__main__":

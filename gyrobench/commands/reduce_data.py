@@ -13,15 +13,15 @@ from gyrobench.commands import console
 from gyrobench.commands.run_folders import claim
 from gyrobench.commands.run_system import (
     Done,
-    WorkError,
     limits_of,
     load,
-    ours,
     publish,
     reduced,
     show_paths,
     specification,
 )
+from gyrobench.commands.user_errors import PostRunError, record_kept
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record, RecordError
 from gyrobench.reduction.result import Result
 from gyrobench.system.suite import Suite
@@ -68,20 +68,27 @@ def reduce(
     text = one.read_bytes()
     record = system.measured(one, values)
     record.meta["data"] = {"file": one.name, "sha256": hashlib.sha256(text).hexdigest()}
-    result: Result = system.reduce(record, limits)
-    result.provenance = dict(record.meta)
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
     folder = out or Bench.find().out / name / f"measured-{identity}"
-    claim(folder, {"system": name, "data": {"file": one.name}}, force)
-    record.save(folder)
-    show_paths(publish(result, folder, record, file), None if as_json else console.answer(result))
+
+    def save() -> None:
+        claim(folder, {"system": name, "data": {"file": one.name}}, force)
+        record.save(folder)
+
+    with record_kept(folder, save):
+        result: Result = system.reduce(record, limits)
+    result.provenance = dict(record.meta)
+    save()
+    with record_kept(folder):
+        paths = publish(result, folder, record, file)
+    show_paths(paths, None if as_json else console.answer(result))
     return result.verdict
 
 
 def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
     """Reduces a saved record again and writes its report, or that of a suite; returns the verdict.
 
-    Raises RecordError when the folder is no run, and WorkError naming what an incomplete record lacks.
+    Raises RecordError when the folder is no run, and PostRunError naming what an incomplete record lacks.
     """
     if not (folder / "run.json").is_file():
         raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
@@ -99,15 +106,17 @@ def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
 def again(folder: Path, system: System, spec: Path | None) -> Done:
     """Record in ``folder``, of a run of ``system``, reduced and reported again."""
     record = Record.load(folder)
-    try:
-        result = reduced(system, record, limits_of(spec))
-    except Exception as error:
-        if not ours(error) or record.complete:
-            raise
-        raise WorkError(
-            f"{folder}: the record is not complete, so there is no report\n{console.lacking(record)}"
-        ) from None
-    old = folder / "result.json"
-    if old.exists():  # the step check is a run of its own and is kept
-        result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
-    return Done(folder, record, result, publish(result, folder, record, spec))
+    limits = limits_of(spec)
+    with record_kept(folder):
+        try:
+            result = reduced(system, record, limits)
+        except GyrobenchError:
+            if record.complete:
+                raise
+            raise PostRunError(
+                f"{folder}: the record is not complete, so there is no report\n{console.lacking(record)}"
+            ) from None
+        old = folder / "result.json"
+        if old.exists():  # the step check is a run of its own and is kept
+            result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
+        return Done(folder, record, result, publish(result, folder, record, spec))

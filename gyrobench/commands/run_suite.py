@@ -22,31 +22,29 @@ from gyrobench.commands import console
 from gyrobench.commands.reduce_data import again
 from gyrobench.commands.run_folders import beside, claim, labels, whole_record
 from gyrobench.commands.run_system import (
-    Interrupted,
     Job,
-    WorkError,
     check_fmus,
     limits_of,
     note,
-    ours,
     perform,
     publish,
     show_paths,
     tell,
 )
 from gyrobench.commands.run_system import specification as named
+from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 from gyrobench.engine import checkpoint
 from gyrobench.record.record import RecordError
 from gyrobench.reduction.result import Result
 from gyrobench.report import NAMES
 from gyrobench.system.suite import Suite
-from gyrobench.system.system import RefusedError, System
-from gyrobench.system.values import ValueProblem, parse
+from gyrobench.system.system import InvalidConfigurationError, System
+from gyrobench.system.values import InvalidValueError, parse
 
 RUN = "run.json"
 
 
-class SuiteError(WorkError):
+class SuiteError(PostRunError):
     """Some test of a suite failed; the report is of the others."""
 
 
@@ -54,12 +52,15 @@ def members_of(suite: Suite) -> dict[str, System]:
     """The tests with their values; what is wrong with a value is said as of the command line."""
     try:
         return suite.members(Bench.find().folder)
-    except ValueProblem as error:
+    except InvalidValueError as error:
         raise UsageError(f"--set {error}") from None
 
 
 def describe(suite: Suite) -> dict[str, Any]:
-    """Tests with plans and seeds (of --seed 1), sets and options, JSON-able.  Raises RefusedError, UsageError."""
+    """Return tests with plans and seeds (of --seed 1), sets and options, JSON-able.
+
+    Raises InvalidConfigurationError and UsageError.
+    """
     members = members_of(suite)
     return {
         "system": suite.name,
@@ -87,8 +88,8 @@ def describe(suite: Suite) -> dict[str, Any]:
 def run(job: Job, suite: Suite, as_json: bool = False) -> str:
     """Runs all tests, then writes the report of the suite; returns the verdict, fail too where methods disagree.
 
-    Raises RefusedError with what any of the tests refuses before the first one runs, Interrupted when the user stops
-    one, SuiteError after the report when some failed.
+    Raises InvalidConfigurationError with the problems of all tests before the first one runs, CommandInterrupted when
+    the user stops one, SuiteError after the report when some failed.
     """
     step = parse("--step", job.step, "s") if job.step else None
     members = members_of(suite)
@@ -118,16 +119,15 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
                 done = again(there, system, None)
             else:
                 done = perform(replace(jobs[name], out=there, resume=go_on), system, step)
-        except Interrupted as error:
-            raise Interrupted(f"{error}\nthe suite goes on with the same command and --resume") from None
-        except Exception as error:
-            if not ours(error):
-                raise
-            failed[name] = " ".join(line.strip(" -") for line in str(error).splitlines()[:2])
-            note(f"{about}: no result: {error}")
+        except CommandInterrupted as error:
+            raise CommandInterrupted(f"{error}\nthe suite goes on with the same command and --resume") from None
+        except Exception as error:  # the other tests must still run
+            message = user_message(error)
+            failed[name] = " ".join(line.strip(" -") for line in message.splitlines()[:2])
+            note(f"{about}: no result: {message}")
             continue
-        if isinstance(done.stopped, Interrupted):
-            raise Interrupted(f"{name}: {done.stopped}\nthe suite goes on with the same command and --resume")
+        if isinstance(done.stopped, CommandInterrupted):
+            raise CommandInterrupted(f"{name}: {done.stopped}\nthe suite goes on with the same command and --resume")
         if done.stopped:
             note(f"{about}: {done.stopped}")
         if done.result is None:
@@ -142,8 +142,8 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
     verdict = _finish(suite, folder, meta, spec, as_json)
     if failed:
         raise SuiteError(
-            f"{', '.join(failed)} failed; the report in {short(folder)} is of the others. When mended: the same "
-            "command with --resume runs only what is missing"
+            f"{', '.join(failed)} failed; the report in {short(folder)} is of the others. After correcting the cause: "
+            "the same command with --resume runs only what is missing"
         )
     return verdict
 
@@ -152,7 +152,7 @@ def _jobs(job: Job, suite: Suite, members: Mapping[str, System]) -> dict[str, Jo
     try:
         parts, maps = suite.swaps(members, job.parts), suite.swaps(members, job.maps)
         isolate = suite.swaps(members, dict.fromkeys(job.isolate))
-    except ValueProblem as error:
+    except InvalidValueError as error:
         raise UsageError(str(error)) from None
     check_fmus(job.parts)
     return {
@@ -167,7 +167,7 @@ def _jobs(job: Job, suite: Suite, members: Mapping[str, System]) -> dict[str, Jo
 def _identity(
     job: Job, suite: Suite, members: Mapping[str, System], jobs: Mapping[str, Job], step: float | None
 ) -> dict[str, Any]:
-    """What makes this suite another one.  Raises RefusedError with all that its tests refuse."""
+    """What makes this suite another one.  Raises InvalidConfigurationError with all that its tests refuse."""
     from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.part_files import resolve_parts, sha256
     from gyrobench.system.wiring import assemble
@@ -184,17 +184,17 @@ def _identity(
             assembly = assemble(system, paths, jobs[name].maps)
             parameters = resolve(assembly, system, jobs[name].seed, defaults(assembly))[1]
             if found := system.check_parameters(parameters):
-                raise RefusedError(name, found)
-        except RefusedError as error:
+                raise InvalidConfigurationError(name, found)
+        except InvalidConfigurationError as error:
             problems += [f"{name}: {p}" for p in error.problems]
             continue
-        except ValueProblem as error:
+        except InvalidValueError as error:
             problems.append(f"{name}: --set {error}")
             continue
         hashes = {slot: {"sha256": sha256(p)} for slot, p in paths.items()}
         tests[name] = {"parts": hashes, "parameters": parameters, "options": dict(system.values), "step": system.step}
     if problems:
-        raise RefusedError(suite.name, problems)
+        raise InvalidConfigurationError(suite.name, problems)
     text = json.dumps([tests, [m.read_text(encoding="utf-8") for m in job.maps.values()]], sort_keys=True)
     return {"system": suite.name, "seed": job.seed, "identity": hashlib.sha256(text.encode()).hexdigest()}
 
@@ -272,15 +272,19 @@ def _finish(suite: Suite, folder: Path, meta: dict[str, Any], spec: Path | None,
         said = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
         if text := suite[name] or "; ".join(filter(None, said)):
             meta[name] = text
-    result = together(
-        members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
-        conventions=suite.conventions, shared=suite.shared, specification=limits_of(spec),
-        failed=meta.get("failed"), provenance=meta,
-    )  # fmt: skip
-    if suite["instrument"]:
-        result.instrument = suite["instrument"]
+    limits = limits_of(spec)
+    with record_kept(folder, lambda: _write(folder, meta)):
+        result = together(
+            members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
+            conventions=suite.conventions, shared=suite.shared, specification=limits,
+            failed=meta.get("failed"), provenance=meta,
+        )  # fmt: skip
+        if suite["instrument"]:
+            result.instrument = suite["instrument"]
     _write(folder, meta)
-    show_paths(publish(result, folder, None, spec), None if as_json else console.suite_answer(result))
+    with record_kept(folder):
+        paths = publish(result, folder, None, spec)
+    show_paths(paths, None if as_json else console.suite_answer(result))
     bad = result.suite["consistency"] == "inconsistent"
     return "fail" if bad else result.verdict
 

@@ -14,26 +14,15 @@ from gyrobench.bench import Bench, UsageError, nearest, short
 from gyrobench.commands import console
 from gyrobench.commands.progress_display import Meter
 from gyrobench.commands.run_folders import keep, labels, run_folder
+from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System, load_system
-from gyrobench.system.values import ValueProblem, parse
+from gyrobench.system.values import InvalidValueError, parse
 
 HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
 Limits = Mapping[str, tuple[float | None, float | None]]
-
-
-class WorkError(Exception):
-    """Something after the run failed; what was computed before is on disk, and the text says where."""
-
-    exit_code = 3
-
-
-class Interrupted(WorkError):
-    """The user stopped a run; what was recorded is on disk."""
-
-    exit_code = 130
 
 
 @dataclass(frozen=True)
@@ -69,13 +58,11 @@ def tell(notes: Iterable[str]) -> None:
         note("note: " + ", ".join(filter(None, names)) + (": " if names[0] else "") + rest)
 
 
-def ours(error: BaseException) -> bool:
-    """True for errors that speak to the user, of the bench or of a system's own files."""
-    return type(error).__module__.startswith("gyrobench")
-
-
 def load(name: str, values: Mapping[str, Any] | None = None, step: float | None = None) -> System:
-    """A system of the bench at hand, or of an SSP archive, with values set.  Raises BenchError and ValueProblem."""
+    """Return a system of the bench at hand, or of an SSP archive, with values set.
+
+    Raises BenchError and UsageError.
+    """
     if name.endswith(".ssp"):
         from gyrobench.exchange.ssp_import import read_ssp
 
@@ -88,7 +75,7 @@ def load(name: str, values: Mapping[str, Any] | None = None, step: float | None 
             raise UsageError(f"--set {key}: no slot '{slot}'; {nearest(slot, system.slots)}")
         try:
             system.set(key, value)
-        except ValueProblem as error:
+        except InvalidValueError as error:
             raise UsageError(f"--set {error}{_bare(system, key, value)}") from None
     return system
 
@@ -153,7 +140,7 @@ class Done:
     record: Record
     result: Result | None = None
     paths: Mapping[str, Path] = field(default_factory=dict)
-    stopped: WorkError | None = None
+    stopped: PostRunError | None = None
 
 
 def run(job: Job, as_json: bool = False) -> str:
@@ -176,7 +163,7 @@ def run(job: Job, as_json: bool = False) -> str:
 def perform(job: Job, system: System, step: float | None) -> Done:
     """Runs a system with its values set; writes record and report.
 
-    Raises what Session.run raises, and WorkError when reduction or report fail after the run.
+    Raises what Session.run raises, and PostRunError for whatever goes wrong after the run.
     """
     from gyrobench.engine.session import RunError, RunInterrupted, Session
 
@@ -198,12 +185,12 @@ def perform(job: Job, system: System, step: float | None) -> Done:
             kept = keep(error.record, folder)
             more = f"{error}\nthe record until then is kept in {short(kept)}"
             if isinstance(error, RunInterrupted):
-                raise Interrupted(f"{more} (gyrobench report says what it lacks)") from None
-            raise WorkError(more) from None
+                raise CommandInterrupted(f"{more} (gyrobench report says what it lacks)") from None
+            raise PostRunError(more) from None
         record.save(folder)
         keeper.done()
-        stopped: WorkError | None = None
-        try:
+        stopped: PostRunError | None = None
+        with record_kept(folder):
             if not reduces(system):
                 return Done(folder, record)
             result = reduced(system, record, limits)
@@ -211,18 +198,11 @@ def perform(job: Job, system: System, step: float | None) -> Done:
                 try:
                     result.step_check = step_check(session, system, result, job.seed, h)
                 except RunInterrupted as error:
-                    stopped = Interrupted(f"step check {error}; the report is without it")
+                    stopped = CommandInterrupted(f"step check {error}; the report is without it")
                 except Exception as error:
-                    if not ours(error):
-                        raise
-                    stopped = WorkError(f"step check: {error}\nthe report is without it")
+                    stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
+                    stopped.__cause__ = error
             return Done(folder, record, result, publish(result, folder, record, spec), stopped)
-        except Exception as error:
-            if not ours(error):
-                raise
-            raise WorkError(
-                f"{error}\nthe record is kept in {short(folder)}; when mended: gyrobench report {short(folder)}"
-            ) from error
 
 
 def reduces(system: System) -> bool:
@@ -303,7 +283,11 @@ def compare(runs: list[Path], out: Path | None, as_json: bool = False) -> None:
         raise UsageError(f"{missing[0]}: has no result.json; gyrobench report {missing[0]} makes it")
     results = []
     for folder, name in zip(runs, labels(runs), strict=True):
-        results.append((name, reports.load((folder / "result.json").read_text(encoding="utf-8"))))
+        file = folder / "result.json"
+        try:
+            results.append((name, reports.load(file.read_text(encoding="utf-8"))))
+        except reports.ResultError as error:
+            raise UsageError(f"{file}: {error}") from None
     _comparable(results)
     digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
     target = out or Bench.find().out / "comparison" / digest

@@ -1,29 +1,103 @@
-"""Errors as one message and an exit code, without a traceback, where the user can do something about them."""
+"""Errors as a person reads them: one message and an exit code; after a run also where its record is."""
 
 from __future__ import annotations
 
 import os
 import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
-from gyrobench.bench import Bench
+from gyrobench.bench import Bench, short, standard_folder
+from gyrobench.errors import GyrobenchError
+from gyrobench.report import ReportError
 
-
-def content_line(error: BaseException) -> str | None:
-    """``file:line`` in a part or a system of a bench where an error comes from, if that is where it comes from."""
-    rooms = tuple(str(Bench.find().folder / room) + os.sep for room in ("components", "systems"))
-    if isinstance(error, SyntaxError) and str(error.filename).startswith(rooms):
-        return f"{error.filename}:{error.lineno}"
-    places = [f"{f.filename}:{f.lineno}" for f in traceback.extract_tb(error.__traceback__)]
-    found = [p for p in places if p.startswith(rooms)]
-    return found[-1] if found and found[-1] == places[-1] else None
+CONTENT = ("components", "systems", str(Path("reports", "templates")))
+TOOL = Path(__file__).parents[1]
 
 
-def explain(error: Exception) -> tuple[str, int] | None:
-    """Message and exit code of an error that the user can do something about; None for a fault of this program."""
-    code = int(getattr(error, "exit_code", 2))
-    if isinstance(error, FileNotFoundError | NotADirectoryError | IsADirectoryError | PermissionError):
-        return f"{error.filename}: {error.strerror}", code
-    if type(error).__module__.startswith(("gyrobench", "_gyrobench")) or isinstance(error, OSError):
-        return str(error), code
-    place = content_line(error)
-    return (f"{place}: {type(error).__name__}: {getattr(error, 'msg', error)}", 2) if place else None
+class PostRunError(GyrobenchError):
+    """A failure after the run: what was computed before is on disk, and the text says where."""
+
+    exit_code = 3
+
+
+class CommandInterrupted(PostRunError):
+    """The user stopped a command: what was recorded is on disk."""
+
+    exit_code = 130
+
+
+def _content_folders(bench: Path) -> tuple[str, ...]:
+    return tuple(str(bench / room) + os.sep for room in CONTENT)
+
+
+def _frames(error: BaseException) -> list[tuple[str, int | None]]:
+    """Return file and line of every call on the way to an error, the innermost last."""
+    frames = [(f.filename, f.lineno) for f in traceback.extract_tb(error.__traceback__)]
+    if isinstance(error, SyntaxError) and error.filename:  # the file that cannot be compiled has no frame
+        frames.append((error.filename, error.lineno))
+    return frames
+
+
+def content_location(error: BaseException) -> str | None:
+    """Return ``file:line`` of the innermost call in the user's own bench, else in the standard one; None if in neither.
+
+    An OSError that gyrobench itself met on the user's behalf (a file named in an option) has no location.
+    """
+    frames = _frames(error)
+    own, standard = (_content_folders(folder) for folder in (Bench.find().folder, standard_folder()))
+    if isinstance(error, OSError):
+        ours = [file for file, _ in frames if file.startswith((*own, *standard, str(TOOL) + os.sep))]
+        if not ours or not ours[-1].startswith((*own, *standard)):
+            return None
+    for folders in (own, standard):
+        lines = [f"{file}:{line}" for file, line in frames if file.startswith(folders)]
+        if lines:
+            return lines[-1]
+    return None
+
+
+def user_message(error: BaseException) -> str:
+    """Return what a person reads of an error: the text of one of gyrobench's, of others also type and place."""
+    if isinstance(error, GyrobenchError):
+        if isinstance(error, ReportError):
+            lines = [f"  - {name}: {user_message(cause)}" for name, cause in error.failures.items()]
+            return "\n".join(["report not complete:", *lines])
+        return str(error)
+    place = content_location(error)
+    if isinstance(error, OSError) and place is None:
+        return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    if place is None:
+        inside = [f"{file}:{line}" for file, line in _frames(error) if file.startswith(str(TOOL) + os.sep)]
+        place = inside[-1] if inside else "unknown place"
+    return f"{place}: {type(error).__name__}: {getattr(error, 'msg', error)}"
+
+
+def exit_code(error: Exception) -> int | None:
+    """Return the exit code of a command that ends with this error; None for a fault of gyrobench itself."""
+    if isinstance(error, GyrobenchError):
+        return error.exit_code
+    return 2 if isinstance(error, OSError) or content_location(error) else None
+
+
+@contextmanager
+def record_kept(folder: Path, save: Callable[[], object] | None = None) -> Iterator[None]:
+    """Turn any failure after a run into a PostRunError that names the folder of the record and the next step.
+
+    save: writes the record of measured data, unless the failure is a GyrobenchError: those concern the data, and pass.
+    """
+    try:
+        yield
+    except PostRunError:
+        raise
+    except (Exception, KeyboardInterrupt) as error:
+        if save is not None:
+            if isinstance(error, GyrobenchError):
+                raise
+            save()
+        kept = f"the record is kept in {short(folder)}"
+        go_on = f"gyrobench report {short(folder)}"
+        if isinstance(error, KeyboardInterrupt):
+            raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}") from error
+        raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}") from error

@@ -1,9 +1,9 @@
 """What a part is: declarations, the language of its equations, the class that steps them.
 
-This package imports nothing else of gyrobench: a Python FMU carries a copy of it.
+Of gyrobench this package imports only ``errors``: a Python FMU carries a copy of both.
 """
 
-from gyrobench.component.component import Component, PartError, sampled
+from gyrobench.component.component import Component, ComponentError, sampled
 from gyrobench.component.declarations import (
     Declaration,
     Discrete,
@@ -17,13 +17,13 @@ from gyrobench.component.declarations import (
 
 __all__ = [
     "Component",
+    "ComponentError",
     "Declaration",
     "Discrete",
     "Input",
     "Noise",
     "Output",
     "Parameter",
-    "PartError",
     "Scalar",
     "State",
     "sampled",

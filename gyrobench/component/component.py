@@ -2,8 +2,8 @@
 
 A part is one class of declarations and equations.  The class is the single source of the plain Python
 part, the Python FMU, the native FMU (its equations translated to C), the model description and the
-linearization.  This module with ``declare``, ``numerics`` and ``math`` is all that a part needs to run: a
-Python FMU carries copies of these four files and nothing else of gyrobench.
+linearization.  This package and ``gyrobench.errors`` are all that a part needs to run: a Python
+FMU carries copies of them and nothing else of gyrobench.
 
 Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut into
 ``n = ceil(H / step)`` equal internal steps ``h = H / n`` with the inputs held.  In each one
@@ -40,23 +40,24 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.math import Dual, lift
 from gyrobench.component.numerics import normal, phi1
+from gyrobench.errors import GyrobenchError
 
 __all__ = [
     "Component",
+    "ComponentError",
     "Declaration",
     "Discrete",
     "Input",
     "Noise",
     "Output",
     "Parameter",
-    "PartError",
     "Scalar",
     "State",
     "sampled",
 ]
 
 
-class PartError(Exception):
+class ComponentError(GyrobenchError):
     """A part refuses its parameters, its inputs, or what became of its states."""
 
 
@@ -95,7 +96,7 @@ class Component:
             found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
         for n, d in found.items():
             if hasattr(Component, n) or n in ("der", "noise", "instance"):
-                raise PartError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
+                raise ComponentError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
             d.name = n
         cls.declarations = found
         cls.layout = make_layout(found)
@@ -114,9 +115,9 @@ class Component:
         for key, x in parameters.items():
             if not isinstance(self.declarations.get(key), Parameter):
                 known = ", ".join(n for n, d in self.declarations.items() if isinstance(d, Parameter))
-                raise PartError(f"{self.instance}: no parameter {key!r}; it has {known}")
+                raise ComponentError(f"{self.instance}: no parameter {key!r}; it has {known}")
             if shape_of(x) != self.declarations[key].shape:
-                raise PartError(f"{self.instance}: {key} has shape {self.declarations[key].shape}")
+                raise ComponentError(f"{self.instance}: {key} has shape {self.declarations[key].shape}")
             setattr(self, key, floats(x))
 
     # ------------------------------------------------------------------ equations of a part
@@ -133,7 +134,7 @@ class Component:
         """Ends the run with ``message`` if the condition holds; ``{H}`` in it prints self.H with %g."""
         if condition:
             values = {s.name: f"{self._at(s):g}" for s in self.layout if len(s.path) == 1}
-            raise PartError(f"{self.instance}: {message.format(**values)} (t = {self.t:.9g} s)")
+            raise ComponentError(f"{self.instance}: {message.format(**values)} (t = {self.t:.9g} s)")
 
     # ------------------------------------------------------------------ values
     def _at(self, s: Scalar) -> float:
@@ -176,20 +177,20 @@ class Component:
         for r, x in zip(references, values, strict=True):
             s = self._referenced(r)
             if self._running and s.section == "parameter":
-                raise PartError(
+                raise ComponentError(
                     f"{self.instance}: parameter {s.name} is fixed once initialization has ended: reset first"
                 )
             self._put(s, x)
 
     def _referenced(self, reference: int) -> Scalar:
         if not 0 <= reference < len(self.layout):
-            raise PartError(f"{self.instance}: no variable has the value reference {reference}")
+            raise ComponentError(f"{self.instance}: no variable has the value reference {reference}")
         return self.layout[reference]
 
     def _find(self, name: str) -> Scalar:
         s = self._by_name.get(name)
         if s is None:
-            raise PartError(f"{self.instance}: no variable {name!r}; it has {', '.join(self._by_name)}")
+            raise ComponentError(f"{self.instance}: no variable {name!r}; it has {', '.join(self._by_name)}")
         return s
 
     def reset(self) -> None:
@@ -224,7 +225,7 @@ class Component:
 
     def set_state(self, state: dict[str, Any]) -> None:
         if state["part"] != f"{type(self).__name__} {self.version}":
-            raise PartError(f"{self.instance}: a state of {state['part']} is not one of this part")
+            raise ComponentError(f"{self.instance}: a state of {state['part']} is not one of this part")
         for s, x in zip(self.layout, state["v"], strict=True):
             self._put(s, x)
         for n, x in zip(self.noises, state["noise"], strict=True):
@@ -235,14 +236,14 @@ class Component:
 
     # ------------------------------------------------------------------ running
     def initialize(self, t0: float = 0.0) -> None:
-        """Checks parameters and inputs, runs ``start`` and ``outputs``.  Raises PartError."""
+        """Checks parameters and inputs, runs ``start`` and ``outputs``.  Raises ComponentError."""
         self.t = t0
         for s in self.layout:
             if s.section in ("parameter", "input", "state"):
                 x = self._at(s)
                 wrong = s.decl.bound_broken(x)
                 if wrong:
-                    raise PartError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
+                    raise ComponentError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
         self._evaluate_start()
         self._finite()
         self._running = True
@@ -264,16 +265,16 @@ class Component:
                 self._evaluate_start()
 
     def do_step(self, t: float, step: float) -> None:
-        """Advances from t to t + step with the inputs held.  Raises PartError."""
+        """Advances from t to t + step with the inputs held.  Raises ComponentError."""
         if not self._running:
-            raise PartError(f"{self.instance}: a step before initialization has succeeded")
+            raise ComponentError(f"{self.instance}: a step before initialization has succeeded")
         if not (math.isfinite(t) and math.isfinite(step) and step > 0.0):
-            raise PartError(f"{self.instance}: a step must be positive and finite, not {step:g} s")
+            raise ComponentError(f"{self.instance}: a step must be positive and finite, not {step:g} s")
         for s in self.layout:
             if s.section == "input":
                 x = self._at(s)
                 if not math.isfinite(x):
-                    raise PartError(f"{self.instance}: input {s.name} is {x:g} at t = {t:.9g} s")
+                    raise ComponentError(f"{self.instance}: input {s.name} is {x:g} at t = {t:.9g} s")
         largest = getattr(self, "step", step)
         n = max(1, math.ceil(step / largest - 1e-9))
         h = step / n
@@ -298,13 +299,13 @@ class Component:
             method()
         except (ArithmeticError, IndexError, ValueError) as e:
             where = f"{method.__name__} at t = {self.t:.9g} s"
-            raise PartError(f"{self.instance}: {e} in {where}") from e
+            raise ComponentError(f"{self.instance}: {e} in {where}") from e
 
     def _finite(self) -> None:
         for s in self._watched:
             x = self._at(s)
             if not math.isfinite(x):
-                raise PartError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
+                raise ComponentError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:

@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.engine.fmu_instance import LocalSlave, PartFailure, Slave
+from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave, Slave
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import Array, Progress, take
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import _replace
 
 FILE = "checkpoint.npz"
@@ -41,10 +42,8 @@ NAMES = {
 }
 
 
-class ResumeError(Exception):
+class ResumeError(GyrobenchError):
     """A run that cannot be continued; the text says why."""
-
-    exit_code = 2
 
 
 def wiring(program: Program) -> str:
@@ -73,7 +72,7 @@ def obstacle(slaves: Mapping[str, Slave]) -> str:
 
 
 def save_state(slave: LocalSlave) -> bytes:
-    """The serialized state of an FMU.  Raises PartFailure."""
+    """The serialized state of an FMU.  Raises FmuCallError."""
     try:
         state = slave.fmu.getFMUstate()
         try:
@@ -85,7 +84,7 @@ def save_state(slave: LocalSlave) -> bytes:
 
 
 def load_state(slave: LocalSlave, data: bytes) -> None:
-    """Puts an initialized FMU into a serialized state.  Raises PartFailure."""
+    """Puts an initialized FMU into a serialized state.  Raises FmuCallError."""
     try:
         state = slave.fmu.deSerializeFMUstate(data)
         try:
@@ -205,7 +204,7 @@ class Keeper:
     def restore(self, state: Progress) -> Progress:
         """The run as it was saved, after initialization; ``state`` itself when not resuming.
 
-        Raises PartFailure, and ResumeError for an FMU that does not show its outputs again.
+        Raises FmuCallError, and ResumeError for an FMU that does not show its outputs again.
         """
         self.due = time.monotonic() + self.period
         if not self.resume:
@@ -288,7 +287,7 @@ class Keeper:
                 arrays[f"state.{slot}"] = np.frombuffer(save_state(slave), np.uint8)
             self.folder.mkdir(parents=True, exist_ok=True)
             _replace(self.folder / FILE, save)
-        except (PartFailure, OSError) as error:
+        except (FmuCallError, OSError) as error:
             return str(error)
         return ""
 

@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gyrobench.engine.program import Group
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Bound
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 KEPT = 50  # messages kept for each FMU
 
 
-class PartFailure(Exception):
+class FmuCallError(GyrobenchError):
     """A call of an FMU failed: slot, call ("doStep", ...), status in words, time (None before the first step)."""
 
     def __init__(self, slot: str, call: str, status: str, time: float | None, messages: Iterable[str] = ()) -> None:
@@ -122,7 +123,7 @@ class LocalSlave:
                 instanceName=slot,
             )
         except Exception as error:
-            raise PartFailure(slot, "loading", str(error), None) from None
+            raise FmuCallError(slot, "loading", str(error), None) from None
         self.setters = {k: getattr(self.fmu, f"fmi2Set{k}") for k in ("Real", "Integer", "Boolean")}
         self.getters = {k: getattr(self.fmu, f"fmi2Get{k}") for k in ("Real", "Integer", "Boolean")}
         self.component: Any = None
@@ -132,10 +133,10 @@ class LocalSlave:
         bad = [text for status, text in self.book if status > 0]
         return list(dict.fromkeys(bad or [text for _, text in self.book]))[-5:]
 
-    def fail(self, call: str, error: Exception) -> PartFailure:
+    def fail(self, call: str, error: Exception) -> FmuCallError:
         code = getattr(error, "status", None)
         status = f"status {code} ({STATUS[code]})" if isinstance(code, int) and code < 6 else str(error)
-        return PartFailure(self.slot, call, status, self.time, self.messages())
+        return FmuCallError(self.slot, call, status, self.time, self.messages())
 
     def call(self, name: str, function: Any, *args: Any, **kwargs: Any) -> None:
         try:

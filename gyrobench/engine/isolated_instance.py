@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 from typing import IO, Any
 
-from gyrobench.engine.fmu_instance import PartFailure
+from gyrobench.engine.fmu_instance import FmuCallError
 from gyrobench.engine.isolation_server import receive, send
 from gyrobench.engine.program import Group
 from gyrobench.system.binding import Bound
@@ -99,7 +99,7 @@ class RemoteSlave:
         lines = self.errors.read().decode("utf-8", "replace").strip().splitlines()
         return lines[-5:]
 
-    def _died(self, call: str) -> PartFailure:
+    def _died(self, call: str) -> FmuCallError:
         assert self.process is not None and self.watchdog is not None
         code = self.process.wait()
         said = self._said()
@@ -109,10 +109,10 @@ class RemoteSlave:
             status = f"its process crashed ({signal.Signals(-code).name})"
         else:
             status = f"its process ended with exit code {code}"
-        return PartFailure(self.slot, call, status, self.time, said)
+        return FmuCallError(self.slot, call, status, self.time, said)
 
     def ask(self, call: str, *arguments: Any) -> Any:
-        """One request; raises PartFailure when it fails, crashes or hangs."""
+        """One request; raises FmuCallError when it fails, crashes or hangs."""
         grace = 0.0
         if self.process is None:
             self._start()
@@ -130,7 +130,7 @@ class RemoteSlave:
         if answer[0] == "ok":
             return answer[1]
         _, failed, status, when, messages = answer
-        raise PartFailure(self.slot, failed, status, self.time if when is None else when, messages)
+        raise FmuCallError(self.slot, failed, status, self.time if when is None else when, messages)
 
     def number(self, group: Group) -> int:
         """The number under which the child knows a group."""
@@ -181,7 +181,7 @@ class RemoteSlave:
     def free(self) -> None:
         """Ends the process; the next instance gets a new one."""
         if self.process is not None and self.process.poll() is None:
-            with contextlib.suppress(PartFailure):
+            with contextlib.suppress(FmuCallError):
                 self.ask("free")
         self._stop()
 

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gyrobench.engine.fmu_instance import LocalSlave, PartFailure
+from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave
 from gyrobench.engine.program import Group
 from gyrobench.system.binding import Bound
 
@@ -86,7 +86,7 @@ def main() -> None:
             if server is None:
                 server = _Server(sys.argv[1], Path(sys.argv[2]))
             send(out, ("ok", server.handle(call, *arguments)))
-        except PartFailure as error:
+        except FmuCallError as error:
             send(out, ("failed", error.call, error.status, error.time, error.messages))
         except Exception as error:
             send(out, ("failed", call, f"{type(error).__name__}: {error}", None, []))

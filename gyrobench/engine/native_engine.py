@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.engine.engine_library import engine_library
-from gyrobench.engine.fmu_instance import STATUS, LocalSlave, PartFailure
+from gyrobench.engine.fmu_instance import STATUS, FmuCallError, LocalSlave
 from gyrobench.engine.program import KINDS, Group, Program, Row
 from gyrobench.engine.reference_engine import Progress
 
@@ -145,7 +145,7 @@ class NativeEngine:
                 table.rows = 0
 
     def advance(self, progress: Progress, k_end: int, t0: float, h: float, every: int) -> None:
-        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises PartFailure."""
+        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises FmuCallError."""
         r = self.run
         r.t0, r.h, r.k, r.every, r.last = t0, h, progress.k, every, progress.last
         r.timed = progress.timed
@@ -165,7 +165,7 @@ class NativeEngine:
             kind = KINDS[r.failed_kind]
             call = (f"set{kind}", "doStep", f"get{kind}")[r.failed_call]
             status = f"status {r.failed_status} ({STATUS[r.failed_status] if r.failed_status < 6 else 'unknown'})"
-            raise PartFailure(slave.slot, call, status, t0 + progress.k * h, slave.messages())
+            raise FmuCallError(slave.slot, call, status, t0 + progress.k * h, slave.messages())
 
     def close(self) -> None:
         """Drops the arrays; the slaves are freed by their owner."""

@@ -128,7 +128,7 @@ class ReferenceEngine:
         self.pairs = [(p, slaves[p.slot]) for p in program.parts]
 
     def advance(self, progress: Progress, k_end: int, t0: float, h: float, every: int) -> None:
-        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises PartFailure."""
+        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises FmuCallError."""
         program, out = self.program, self.program.out
         clock = time.perf_counter
         for k in range(progress.k, k_end):

@@ -12,6 +12,7 @@ from typing import Any
 
 from gyrobench.engine.checkpoint import Keeper
 from gyrobench.engine.reference_engine import Progress
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.system import System
 
 CHUNK = 0.2  # s of wall time between two looks at the world
@@ -47,7 +48,7 @@ class Status:
         return self.elapsed * max(0.0, self.total - self.time) / done if done > 0.0 else float("inf")
 
 
-class Interrupt(Exception):
+class EngineStopped(GyrobenchError):
     """The run stopped before its end: by the user, or because the plan does not come to an end."""
 
     def __init__(self, message: str, by_user: bool) -> None:
@@ -84,7 +85,7 @@ def drive(
     progress: Callable[[Status], None] | None,
     keeper: Keeper | None = None,
 ) -> None:
-    """Runs to the end.  Raises PartFailure from the engine, Interrupt when stopped or when the plan never ends."""
+    """Runs to the end.  Raises FmuCallError from the engine, EngineStopped when stopped or when the plan never ends."""
     h = system.step
     planned = system.plan().duration()
     total = system.stop if system.stop is not None else planned
@@ -105,13 +106,13 @@ def drive(
                 windows = sum(len(r) if r.ndim == 2 else 1 for r in state.window_rows)
                 progress(Status(state.k * h, total, state.k - k_first, windows, rate, now - began, k_first * h))
             if ctrl_c.hit:
-                raise Interrupt(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
+                raise EngineStopped(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
             if keeper is not None:
                 keeper.look(state)
     if not state.finished and state.k < k_limit:
-        raise Interrupt(f"stopped at t = {state.k * h:.9g} s, as asked for", by_user=True)
+        raise EngineStopped(f"stopped at t = {state.k * h:.9g} s, as asked for", by_user=True)
     if not state.finished and system.stop is None:
-        raise Interrupt(
+        raise EngineStopped(
             f"the plan has not ended at t = {state.k * h:.9g} s, {PATIENCE:g} times its duration of {planned:.6g} s: "
             f"does the table reach its targets? (last values of {system.done} stayed 0)",
             by_user=False,

@@ -16,19 +16,20 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.engine.checkpoint import Keeper
-from gyrobench.engine.fmu_instance import LocalSlave, PartFailure, Slave
+from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave, Slave
 from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import ReferenceEngine, initialize, start
-from gyrobench.engine.run_driver import Interrupt, Status, drive
+from gyrobench.engine.run_driver import EngineStopped, Status, drive
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts, sha256
-from gyrobench.system.system import RefusedError, System, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
 
 
-class RunError(Exception):
+class RunError(GyrobenchError):
     """A run that did not end as it should; ``record`` holds what there was until then (or None)."""
 
     exit_code = 3
@@ -43,7 +44,7 @@ class RunInterrupted(RunError):
     """The user stopped the run."""
 
 
-class PartRefusal(RunError):
+class ParameterRefusedError(RunError):
     """A part refuses its parameters, before the first step."""
 
     exit_code = 2
@@ -56,7 +57,7 @@ class Session:
     engine: "native", "reference" or None (native where it can).  isolate: slots whose FMU runs in a child process.
     target: of the parts that are built, "native" or "python".  timeout: s for one call of an isolated FMU.
     Use as a context manager, or call :meth:`close`.
-    Raises BenchError, BuildError, MisfitError, WiringError, AlgebraicLoopError before anything is loaded.
+    Raises BenchError, BuildError, SocketMismatchError, WiringError, AlgebraicLoopError before anything is loaded.
     """
 
     def __init__(
@@ -72,12 +73,12 @@ class Session:
         timeout: float = 10.0,
     ) -> None:
         if engine not in (None, "native", "reference"):
-            raise ValueProblem(f"engine '{engine}': one of native, reference")
+            raise InvalidValueError(f"engine '{engine}': one of native, reference")
         self.system = load_system(system, bench) if isinstance(system, str) else system
         self.isolate = tuple(isolate)
         for slot in self.isolate:
             if slot not in self.system.slots:
-                raise ValueProblem(f"isolate: no slot '{slot}'; slots: {', '.join(self.system.slots)}")
+                raise InvalidValueError(f"isolate: no slot '{slot}'; slots: {', '.join(self.system.slots)}")
         self.notes: list[str] = []
         paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
         self.swapped = sorted(parts or {})
@@ -96,7 +97,7 @@ class Session:
                 self.slaves[slot] = self._slave(slot, path, timeout)
         except BaseException as error:
             self.close()
-            if isinstance(error, PartFailure):
+            if isinstance(error, FmuCallError):
                 raise RunError(str(error)) from None
             raise
 
@@ -155,11 +156,11 @@ class Session:
         if step is not None:
             system.step = float(step)
         if not 0.0 < system.step < float("inf"):
-            raise ValueProblem(f"step = {system.step} s: must be > 0")
+            raise InvalidValueError(f"step = {system.step} s: must be > 0")
         system.refuse()
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
         if problems := system.check_parameters(parameters):
-            raise RefusedError(system.name, problems)
+            raise InvalidConfigurationError(system.name, problems)
         linear = self._linear(system, parameters, notes) if system.loops else {}
         meta = {**self._meta(system, seed, parameters, notes), **linear}
         every = max(1, round(system.channel_period / system.step))
@@ -186,9 +187,9 @@ class Session:
             else:
                 engine = ReferenceEngine(self.program, self.slaves)
             drive(engine, state, system, every, progress, keeper)
-        except (PartFailure, Interrupt) as error:
+        except (FmuCallError, EngineStopped) as error:
             problem = error
-            if keeper is not None and state is not None and isinstance(error, Interrupt) and error.by_user:
+            if keeper is not None and state is not None and isinstance(error, EngineStopped) and error.by_user:
                 keeper.stopped(state)
         finally:
             if engine is not None:
@@ -196,20 +197,22 @@ class Session:
             for slave in self.slaves.values():
                 slave.free()
         if state is None:
-            said = isinstance(problem, PartFailure) and problem.messages and "(Error)" in problem.status
-            raise (PartRefusal if said else RunError)(str(problem))
+            said = isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status
+            raise (ParameterRefusedError if said else RunError)(str(problem))
         return self._finish(state, system, meta, out, problem, keeper)
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
         """The linear model for run.json; what it warns about goes to the log at once, and into the notes."""
         import logging
 
-        from gyrobench.linear.linear_model import NotLinear, loops
+        from gyrobench.linear.linear_model import LinearizationError, loops
         from gyrobench.packaging import load_part
 
         def part_of(slot: str) -> Any:
             if slot not in self.names:
-                raise NotLinear(f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known")
+                raise LinearizationError(
+                    f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known"
+                )
             return load_part(self.names[slot], self.bench)
 
         found, said = loops(self.assembly, parameters, part_of, system.step)
@@ -245,7 +248,7 @@ class Session:
         )
         if out is not None:
             record.save(out)
-        if isinstance(problem, Interrupt) and problem.by_user:
+        if isinstance(problem, EngineStopped) and problem.by_user:
             raise RunInterrupted(f"{problem}; {keeper.says}" if keeper is not None else str(problem), record)
         if problem is not None:
             raise RunError(str(problem), record)
@@ -319,12 +322,12 @@ def run(
     progress: called about five times a second with a :class:`Status`.
     resume: go on with the interrupted run in ``out``, see :mod:`gyrobench.engine.checkpoint`.
     stop_at: s of simulated time at which the run is interrupted as if by the user.
-    Raises the errors of :class:`Session`, RefusedError, ResumeError and ValueProblem before anything runs, and RunError
-    (with what was recorded, saved too) when an FMU fails, the plan does not end, or the user interrupts
-    (RunInterrupted).
+    Raises the errors of :class:`Session`, InvalidConfigurationError, ResumeError and InvalidValueError before anything
+    runs, and RunError (with what was recorded, saved too) when an FMU fails, the plan does not end, or the user
+    interrupts (RunInterrupted).
     """
     if out is None and (resume or stop_at is not None):
-        raise ValueProblem("resume and stop_at: name the folder of the run in out")
+        raise InvalidValueError("resume and stop_at: name the folder of the run in out")
     keeper = Keeper(out, resume, stop_at=stop_at) if out is not None else None
     with Session(
         system, parts, maps, engine=engine, isolate=isolate, target=target, bench=bench, timeout=timeout

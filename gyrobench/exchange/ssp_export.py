@@ -26,6 +26,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Bound
 from gyrobench.system.parameters import Starts, defaults, resolve
 from gyrobench.system.part_files import resolve_parts
@@ -38,7 +39,7 @@ PARAMETERS = "resources/parameters.ssv"
 STAMP = (1980, 1, 1, 0, 0, 0)
 
 
-class ExportError(Exception):
+class ExportError(GyrobenchError):
     """A system that cannot be written in the form that is asked for; the text says why."""
 
 

@@ -20,7 +20,7 @@ from gyrobench.bench import Bench
 from gyrobench.exchange.ssp_export import SSC, SSD, SSV
 from gyrobench.system.binding import fit
 from gyrobench.system.sockets import Socket
-from gyrobench.system.system import RefusedError, Slot, System
+from gyrobench.system.system import InvalidConfigurationError, Slot, System
 
 NS = {"ssd": SSD, "ssc": SSC, "ssv": SSV}
 ANY = Socket("FMU", "any FMU: its own inputs and outputs", ())
@@ -37,7 +37,7 @@ def _unpack(path: Path) -> Path:
             with zipfile.ZipFile(path) as archive:
                 for member in archive.namelist():
                     if not (fresh / member).resolve().is_relative_to(fresh.resolve()):
-                        raise RefusedError(path.name, [f"'{member}' leaves the archive"])
+                        raise InvalidConfigurationError(path.name, [f"'{member}' leaves the archive"])
                 archive.extractall(fresh)
             if not folder.is_dir():
                 os.replace(fresh, folder)
@@ -77,23 +77,24 @@ def _bound_values(element: ET.Element, folder: Path) -> dict[str, Any]:
 def read_ssp(path: Path, step: float) -> System:
     """The archive as a system that can be run, shown and exported again; its channels are all connected outputs.
 
-    step: communication step, s.  Raises RefusedError for what is not read, and for an archive that is none.
+    step: communication step, s.  Raises InvalidConfigurationError for what is not read, and for a file that is not an
+    SSP archive.
     """
     from fmpy import read_model_description
 
     path = Path(path)
     if not path.is_file():
-        raise RefusedError(path.name, ["no such file"])
+        raise InvalidConfigurationError(path.name, ["no such file"])
     try:
         folder = _unpack(path)
         root = ET.parse(folder / "SystemStructure.ssd").getroot()
     except (OSError, zipfile.BadZipFile, ET.ParseError) as error:
-        raise RefusedError(path.name, [f"not an SSP archive: {error}"]) from None
+        raise InvalidConfigurationError(path.name, [f"not an SSP archive: {error}"]) from None
     top = root.find("ssd:System", NS)
     if top is None:
-        raise RefusedError(path.name, ["it has no system"])
+        raise InvalidConfigurationError(path.name, ["it has no system"])
     if top.find("ssd:Elements/ssd:System", NS) is not None:
-        raise RefusedError(path.name, ["nested systems are not read; flatten it"])
+        raise InvalidConfigurationError(path.name, ["nested systems are not read; flatten it"])
     slots: dict[str, Slot] = {}
     raw: dict[str, Any] = {}
     gains: dict[tuple[str, str], float] = {}
@@ -131,7 +132,7 @@ def read_ssp(path: Path, step: float) -> System:
         elif c.get("suppressUnitConversion") == "true" and gains[a, x] != gains[b, y]:
             factors[wire] = gains[b, y] / gains[a, x]
     if problems:
-        raise RefusedError(path.name, problems)
+        raise InvalidConfigurationError(path.name, problems)
     experiment = root.find("ssd:DefaultExperiment", NS)
     stop = experiment.get("stopTime") if experiment is not None else None
     members = {

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.component import Component
+from gyrobench.errors import GyrobenchError
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import Step, sampled_step
 from gyrobench.system.sockets import socket
@@ -41,7 +42,7 @@ SLOW = 1e-2  # rad/s: a pole nearer to the origin is an integrator of the model 
 PASSES = 3  # along the wires, to find the operating point
 
 
-class NotLinear(Exception):
+class LinearizationError(GyrobenchError):
     """The system has no linear model; the text says why."""
 
 
@@ -74,7 +75,8 @@ def operating_point(
 ) -> dict[str, Component]:
     """The parts as plain classes with these parameters ("slot.name", SI, arrays nested), started and propagated.
 
-    part_of: slot -> class; raises NotLinear for a slot that has none of ours.  Raises PartError when a part refuses.
+    part_of: slot -> class; raises LinearizationError for a slot that holds no part of this bench.  Raises
+    ComponentError when a part refuses.
     """
     parts = {}
     for slot in assembly.order.order:
@@ -123,7 +125,7 @@ class Linear:
             try:
                 found = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
             except ValueError as error:
-                raise NotLinear(f"{s} works in samples, and {error}") from error
+                raise LinearizationError(f"{s} works in samples, and {error}") from error
             if found is not None:
                 self.sampled[s] = found
         self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
@@ -158,7 +160,9 @@ class Linear:
 
     def _row(self, break_at: str) -> int:
         if break_at not in self.inputs:
-            raise NotLinear(f"the loop is opened at {break_at}, which is no wired input; {', '.join(self.inputs)}")
+            raise LinearizationError(
+                f"the loop is opened at {break_at}, which is no wired input; {', '.join(self.inputs)}"
+            )
         return self.inputs.index(break_at)
 
     # ------------------------------------------------------------------ models
@@ -260,7 +264,7 @@ def loops(
 
     or {"missing": why} where there is none; a model is A, B, C, D with names and step.
     """
-    from gyrobench.component import PartError
+    from gyrobench.component import ComponentError
 
     try:
         parts = operating_point(assembly, parameters, part_of)
@@ -275,9 +279,9 @@ def loops(
                 for name, at in assembly.system.loops.items()
             },
         }
-    except PartError as error:  # the run will say it too
+    except ComponentError as error:  # the run will say it too
         return {"missing": str(error)}, []
-    except NotLinear as error:
+    except LinearizationError as error:
         return {"missing": str(error)}, [f"no margins from linearized parts: {error}"]
     said = []
     for kind, text in (("continuous", "the linear loop"), ("discrete", f"the loop with its step of {step:g} s")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.component import Component, PartError
+from gyrobench.component import Component, ComponentError
 
 
 def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Any, Any, Any, Any]:
@@ -16,7 +16,7 @@ def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) ->
         known = [s.name for s in part.layout if s.section == section]
         for n in names:
             if n not in known:
-                raise PartError(f"{part.instance}: no {section} {n!r}; it has {', '.join(known) or 'none'}")
+                raise ComponentError(f"{part.instance}: no {section} {n!r}; it has {', '.join(known) or 'none'}")
     states = [s.name for s in part.states]
     all_outputs = [s.name for s in part.layout if s.section == "output"]
     rows = [all_outputs.index(n) for n in outputs]
@@ -42,7 +42,7 @@ def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) 
     differentiation of ``flow`` and ``outputs``: exact at a smooth point; where a limit or a quantizer is active,
     those of the branch taken.  Set inputs, and step or set states, to move the point.
 
-    Raises PartError for a name that is no input, or no output, of the part.
+    Raises ComponentError for a name that is no input, or no output, of the part.
 
     Not modelled: sampled methods and the held inputs of a communication step.
     """

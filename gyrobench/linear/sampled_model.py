@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.component import Component, PartError
+from gyrobench.component import Component, ComponentError
 
 Array = NDArray[np.float64]
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
@@ -60,7 +60,7 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         last = _differences(twin, inputs, outputs, step, discrete)
         twin.do_step(SETTLED * step, step)
         after = _differences(twin, inputs, outputs, step, discrete)
-    except PartError as error:
+    except ComponentError as error:
         raise ValueError(str(error)) from error
     for m in "abcd":
         x, y = getattr(last, m), getattr(after, m)

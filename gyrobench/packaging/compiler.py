@@ -12,6 +12,8 @@ import sys
 import sysconfig
 from pathlib import Path
 
+from gyrobench.errors import GyrobenchError
+
 #: No vector code: these programs store numbers one by one and would wait for them when loading them in pairs.
 SCALAR = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
 FLAGS = ("-O3", *SCALAR, "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
@@ -25,7 +27,7 @@ PLATFORMS = {
 }
 
 
-class CompilerError(Exception):
+class CompilerError(GyrobenchError):
     """No compiler, or one that failed; the text is the compiler's own."""
 
 

@@ -16,6 +16,7 @@ from types import ModuleType
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
+from gyrobench.errors import GyrobenchError
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description
 from gyrobench.packaging.description3 import build_description, model_description3
@@ -23,7 +24,7 @@ from gyrobench.packaging.description3 import build_description, model_descriptio
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
 
-class BuildError(Exception):
+class BuildError(GyrobenchError):
     """A part that cannot be built; the text says which and why."""
 
 
@@ -74,7 +75,7 @@ def _tool_text() -> str:
     here = Path(__file__).parent
     after = ("__init__", "instance", "reference", "validate")  # these run what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
-    files += [*sorted(python_target.RUNTIME.rglob("*.py")), here.parent / "units.py"]
+    files += [*python_target.RUNTIME, here.parent / "units.py"]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 
 

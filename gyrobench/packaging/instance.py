@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from gyrobench.component import Component, PartError
+from gyrobench.component import Component, ComponentError
+from gyrobench.errors import GyrobenchError
 from gyrobench.packaging.fmu import build, load_part
 
 
-class InstanceError(Exception):
+class InstanceError(GyrobenchError):
     """A call failed: ``messages`` is what the part logged, ``status`` the FMI status (3 error, 4 fatal)."""
 
     def __init__(self, call: str, status: int | None, messages: Sequence[str]) -> None:
@@ -53,7 +54,7 @@ class Plain:
     def _call(self, name: str, function: Callable[..., Any], *args: Any) -> Any:
         try:
             return function(*args)
-        except PartError as e:
+        except ComponentError as e:
             raise InstanceError(name, None, [str(e)]) from e
 
     def set(self, values: dict[str, float]) -> None:

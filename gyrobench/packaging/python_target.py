@@ -1,4 +1,4 @@
-"""The Python target: the part's own class behind pythonfmu, with a copy of the package gyrobench.component.
+"""The Python target: the part's own class behind pythonfmu, with copies of gyrobench.component and gyrobench.errors.
 
 pythonfmu shares ``sys.modules`` between the FMUs of a process: every file in ``resources`` therefore
 carries a name that is unique to the part and its content.  Our modelDescription replaces pythonfmu's.
@@ -16,7 +16,8 @@ from pathlib import Path
 
 from gyrobench.component import Component
 
-RUNTIME = Path(__file__).parent.parent / "component"
+TOOL = Path(__file__).parent.parent
+RUNTIME = (*sorted((TOOL / "component").rglob("*.py")), TOOL / "errors.py")  # what a Python FMU carries of gyrobench
 
 SLAVE = '''\
 """Python FMU of {cls} {version}: the plain part behind the FMI calls."""
@@ -27,7 +28,7 @@ import traceback
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from {unique}.component import PartError
+from {unique}.component import ComponentError
 from {unique}.model import {cls} as Part
 
 
@@ -43,7 +44,7 @@ def told(call):
         try:
             return call(self, *args)
         except Exception as e:
-            text = str(e) if isinstance(e, PartError) else f"{{self.instance_name}}: {{traceback.format_exc()}}"
+            text = str(e) if isinstance(e, ComponentError) else f"{{self.instance_name}}: {{traceback.format_exc()}}"
             if self.logger:  # the C++ object: a pointer to its methods, then the bool "logging is on"
                 ctypes.c_bool.from_address(self.logger + ctypes.sizeof(ctypes.c_void_p)).value = True
             self.log(text.replace("%", "%%"), Fmi2Status.error)  # the logger takes a printf format
@@ -93,7 +94,7 @@ class {cls}(Fmi2Slave):
 
     @told
     def get_string(self, vrs):
-        raise PartError(f"{{self.instance_name}}: this FMU has no string variables")
+        raise ComponentError(f"{{self.instance_name}}: this FMU has no string variables")
 
     def set_string(self, vrs, values):
         self.get_string(vrs)
@@ -123,7 +124,7 @@ def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
                 f"{inspect.getfile(cls)} imports gyrobench.{module}: a part uses gyrobench.component "
                 "only, so that its Python FMU can carry it"
             )
-    texts = {f"component/{f.relative_to(RUNTIME)}": f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.py")}
+    texts = {f.relative_to(TOOL).as_posix(): f.read_text(encoding="utf-8") for f in RUNTIME}
     files = {f"{unique}/{n}": renamed(t, unique) for n, t in {**texts, "model.py": model}.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"

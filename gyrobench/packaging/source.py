@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gyrobench.component import Component, Discrete, Input, Output, State
+from gyrobench.errors import GyrobenchError
 
 KEYWORDS = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
@@ -24,7 +25,7 @@ MEMBERS = KEYWORDS | {"tick"}  # of struct Vars
 LOCALS = KEYWORDS | {"part", "self", "seed", "dual", "Vars", "Part", "plain", "fail", "at", "whole"}
 
 
-class SubsetError(Exception):
+class SubsetError(GyrobenchError):
     """An equation uses Python outside the subset; the text says file, line and what to write instead."""
 
 

@@ -23,11 +23,12 @@ from typing import Any
 import numpy as np
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 
 SHOWN = 8  # problems of one kind listed before "and n more"
 
 
-class DataError(Exception):
+class DataError(GyrobenchError):
     """Data that cannot be reduced; ``problems`` says for each finding where it is and what would be right."""
 
     def __init__(self, file: Path | str, problems: list[str]) -> None:

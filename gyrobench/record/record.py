@@ -22,13 +22,15 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.errors import GyrobenchError
+
 Array = np.ndarray[Any, Any]
 #: what a record may say of its circumstances, beside instrument and operator, for a report that is signed
 ABOUT = ("laboratory", "customer", "conditions", "equipment")
 WHOLE = ("phase", "n", "flagged")  # integer columns
 
 
-class RecordError(Exception):
+class RecordError(GyrobenchError):
     """A record that cannot be read; the text says which file and why."""
 
 

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.errors import GyrobenchError
+
 Array = NDArray[np.float64]
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
 
 
-class ReductionError(ValueError):
+class ReductionError(GyrobenchError, ValueError):
     """Data that cannot be reduced; ``problems`` says for each finding what is wrong, where, and what would be
     right.
     """

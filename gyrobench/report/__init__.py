@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench.errors import GyrobenchError
 from gyrobench.report.assets import content_dir
-from gyrobench.report.result_json import load, report_id
+from gyrobench.report.result_json import ResultError, load, report_id
 from gyrobench.report.specification import SpecificationError, check_units, load_specification
 
 if TYPE_CHECKING:
@@ -22,12 +23,16 @@ FORMATS = ("json", "html", "pdf")
 NAMES = {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}
 
 
-class ReportError(RuntimeError):
-    """Some format could not be written; ``written`` has the paths of those that were."""
+class ReportError(GyrobenchError):
+    """A report of which some file could not be written.
 
-    def __init__(self, message: str, written: dict[str, Path]) -> None:
-        super().__init__(message)
-        self.written = written
+    ``failures``: file name -> its error; ``written``: format -> path of those that were written.
+    """
+
+    def __init__(self, failures: Mapping[str, Exception], written: Mapping[str, Path]) -> None:
+        self.failures, self.written = dict(failures), dict(written)
+        causes = [f"{name}: {type(error).__name__}: {error}" for name, error in failures.items()]
+        super().__init__("report not complete: " + "; ".join(causes))
 
 
 def write(
@@ -70,6 +75,7 @@ __all__ = [
     "FORMATS",
     "NAMES",
     "ReportError",
+    "ResultError",
     "SpecificationError",
     "check_units",
     "compare",

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gyrobench.report.assets import read_content
+from gyrobench.report.assets import content_dir, read_content
 from gyrobench.report.page_model import Equation, Page, walk
 from gyrobench.report.style import clean_svg, themed
 
@@ -50,10 +50,15 @@ def html(page: Page, bench: Path | None = None) -> str:
     import jinja2
     import markupsafe
 
+    name = "templates/report.html.j2"
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.FileSystemLoader(content_dir(bench, name)),  # from its file, which then stands in a traceback
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    template = environment.from_string(read_content("templates/report.html.j2", bench))
+    template = environment.get_template(name)
     data = asdict(page)
     for section in data["sections"]:
         for block in section["blocks"]:

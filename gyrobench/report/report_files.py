@@ -57,7 +57,7 @@ def _write(
         raise ValueError(f"unknown report format {unknown[0]!r}; there are {', '.join(FORMATS)}")
     folder.mkdir(parents=True, exist_ok=True)
     written: dict[str, Path] = {}
-    failed: list[str] = []
+    failures: dict[str, Exception] = {}
     built: list[Page] = []
 
     def page() -> Page:
@@ -75,16 +75,14 @@ def _write(
 
         return render.html(page(), bench).encode() if kind == "html" else render.pdf(page(), bench)
 
-    first: Exception | None = None
     for kind in sorted(formats, key=FORMATS.index):
         try:
             replace(folder / names[kind], make(kind))
             written[kind] = folder / names[kind]
         except Exception as error:  # the other formats must still be written
-            failed.append(f"{names[kind]}: {type(error).__name__}: {error}")
-            first = first or error
-    if failed:
-        raise ReportError("report not complete: " + "; ".join(failed), written) from first
+            failures[names[kind]] = error
+    if failures:
+        raise ReportError(failures, written) from next(iter(failures.values()))
     return written
 
 

@@ -14,10 +14,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from gyrobench.errors import GyrobenchError
 from gyrobench.reduction.result import Result
 
 SCHEMA = "gyrobench-result-1"
 MODES = {0: "hold", 1: "index", 2: "rate", 3: "servo"}
+
+
+class ResultError(GyrobenchError, ValueError):
+    """A result.json that cannot be read; the text says why."""
 
 
 def plain(value: Any) -> Any:
@@ -50,13 +55,19 @@ def report_id(result: Result) -> str:
 
 
 def load(text: str) -> Result:
-    """The Result in the text of a ``result.json``; raises ValueError when it is not one of ours."""
-    data = json.loads(text)
+    """Return the Result in the text of a ``result.json``; raises ResultError for any other text."""
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise ResultError(f"not a JSON text: {error}") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise ValueError(f"not a result of this bench: 'schema' must be {SCHEMA!r}")
+        raise ResultError(f"not a result of gyrobench: 'schema' must be {SCHEMA!r}")
     for key in ("schema", "report_id", "derived"):
         data.pop(key, None)
-    return Result.from_dict(data)
+    try:
+        return Result.from_dict(data)
+    except (KeyError, TypeError) as error:
+        raise ResultError(f"a result with missing or unknown fields: {error}") from None
 
 
 def pointer(*path: str | int) -> str:

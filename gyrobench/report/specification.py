@@ -15,12 +15,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from gyrobench.errors import GyrobenchError
+
 Limits = dict[str, tuple[float | None, float | None]]
 
 _UNITS = {"deg/h": "°/h", "deg/h/g": "°/h/g", "deg/h/g2": "°/h/g²", "deg/h/g^2": "°/h/g²"}
 
 
-class SpecificationError(ValueError):
+class SpecificationError(GyrobenchError, ValueError):
     """An acceptance specification that cannot be used; says file, entry and what would be right."""
 
 

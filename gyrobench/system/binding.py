@@ -27,12 +27,13 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.sockets import Connector, Socket, element_names
 
 FMI_TYPES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 
 
-class MisfitError(Exception):
+class SocketMismatchError(GyrobenchError):
     """An FMU does not fit its socket; ``problems`` is the list of single findings."""
 
     def __init__(self, head: str, problems: list[str]) -> None:
@@ -66,13 +67,13 @@ class Binding:
 
 
 def load_mapping(file: Path | None) -> dict[str, Any]:
-    """Reads a mapping file; None gives the empty mapping.  Raises MisfitError when it is not readable."""
+    """Reads a mapping file; None gives the empty mapping.  Raises SocketMismatchError when it is not readable."""
     if file is None:
         return {}
     try:
         return tomllib.loads(Path(file).read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise MisfitError(f"mapping file {file}", [str(error)]) from None
+        raise SocketMismatchError(f"mapping file {file}", [str(error)]) from None
 
 
 class _Fitter:
@@ -251,7 +252,7 @@ class _Fitter:
 def fit(socket: Socket, description: Any, mapping: Mapping[str, Any] | None = None, slot: str = "") -> Binding:
     """Binds the variables of an FMU (FMPy model description) to the connectors of ``socket``.
 
-    Raises :class:`MisfitError` naming every missing or wrong connector and what would fit.  Parameters
+    Raises :class:`SocketMismatchError` naming every missing or wrong connector and what would fit.  Parameters
     and further inputs and outputs of the FMU are bound under their own names, converted to SI by their
     declared units.
     """
@@ -268,5 +269,7 @@ def fit(socket: Socket, description: Any, mapping: Mapping[str, Any] | None = No
     fitter.fit_parameters()
     if fitter.problems:
         where = f"slot {slot}: " if slot else ""
-        raise MisfitError(f"{where}FMU '{description.modelName}' does not fit socket {socket.name}", fitter.problems)
+        raise SocketMismatchError(
+            f"{where}FMU '{description.modelName}' does not fit socket {socket.name}", fitter.problems
+        )
     return fitter.binding

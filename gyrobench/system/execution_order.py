@@ -17,12 +17,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from gyrobench.errors import GyrobenchError
+
 EXACT = 12
 
 Port = tuple[str, str]  # (part, variable)
 
 
-class AlgebraicLoopError(Exception):
+class AlgebraicLoopError(GyrobenchError):
     """A loop in which every part passes its input on at once; ``loop`` lists its ports."""
 
     def __init__(self, loop: list[Port]) -> None:

@@ -43,7 +43,7 @@ def read_record(
     needed: options that must be given, with an example: {"latitude": "45.75deg", "k": "..."}.  attitudes: what a
     phase may be called -> mode "hold", "index" or "rate", asked once the options are set; None: a record without
     phases.  columns, time: as of read_measured; where windows are expected, std, n and flagged are filled in.  texts:
-    comments that are kept as they are.  Raises DataError, and ValueProblem for an option that does not fit.
+    comments that are kept as they are.  Raises DataError, and InvalidValueError for an option that does not fit.
     """
     windows, comments = read_measured(data, columns, time)
     said = {**comments, **values}

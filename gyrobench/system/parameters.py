@@ -10,7 +10,7 @@ from typing import Any
 from gyrobench import units
 from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.system import System
-from gyrobench.system.values import ValueProblem, flatten, nest, parse
+from gyrobench.system.values import InvalidValueError, flatten, nest, parse
 from gyrobench.system.wiring import Assembly
 
 Starts = dict[str, list[tuple[Bound, Any]]]  # by slot, in the FMU's own units
@@ -57,7 +57,7 @@ def _target(name: str, binding: Binding) -> Bound | None:
 
 
 def _override(name: str, value: Any, binding: Binding) -> dict[str, Any]:
-    """Elements and SI values of one "slot.parameter" as given by the user.  Raises ValueProblem."""
+    """Elements and SI values of one "slot.parameter" as given by the user.  Raises InvalidValueError."""
     slot, _, parameter = name.partition(".")
     if isinstance(value, str) and value.strip().startswith("["):
         value = parse(name, value)
@@ -67,9 +67,11 @@ def _override(name: str, value: Any, binding: Binding) -> dict[str, Any]:
         if bound is None:
             names = list(binding.parameters)
             if any(n.startswith(parameter + "[") for n in names) and element == parameter:
-                raise ValueProblem(f"{name}: is an array; give all of it as [a, b, ...] or one element {parameter}[1]")
+                raise InvalidValueError(
+                    f"{name}: is an array; give all of it as [a, b, ...] or one element {parameter}[1]"
+                )
             near = difflib.get_close_matches(element, names, n=4, cutoff=0.3) or names[:12]
-            raise ValueProblem(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
+            raise InvalidValueError(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
         found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
     return found
 
@@ -80,7 +82,7 @@ def resolve(
     """What is set in each FMU, all parameters for run.json (SI, arrays nested), and notes.
 
     In rising order of rank: the FMU's start value, the seed of the slot, what the system derives, what the user set.
-    base: :func:`defaults` of the assembly.  Raises ValueProblem.
+    base: :func:`defaults` of the assembly.  Raises InvalidValueError.
     """
     chosen: dict[str, Any] = {}
     notes = []
@@ -103,7 +105,7 @@ def resolve(
         name = name.rstrip("?")
         slot, _, parameter = name.partition(".")
         if slot not in assembly.bindings:
-            raise ValueProblem(f"{name}: {system.name} has no slot '{slot}'")
+            raise InvalidValueError(f"{name}: {system.name} has no slot '{slot}'")
         bound = _target(parameter, assembly.bindings[slot])
         if bound is not None:
             chosen[name] = _si(name, value, bound)

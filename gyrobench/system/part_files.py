@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from gyrobench.system.system import RefusedError, System
+from gyrobench.system.system import InvalidConfigurationError, System
 
 
 def sha256(path: Path) -> str:
@@ -24,11 +24,14 @@ def resolve_parts(
     """Paths of the FMUs of all slots, and the target of those that were built (slot -> "native" | "python").
 
     Something that ends in .fmu is a file; anything else is the name of a part of the bench, built if needed.
-    Without a compiler the Python target is built, with a note.  Raises RefusedError, BenchError, BuildError.
+    Without a compiler the Python target is built, with a note.  Raises InvalidConfigurationError, BenchError and
+    BuildError.
     """
     unknown = [s for s in parts if s not in system.slots]
     if unknown:
-        raise RefusedError(system.name, [f"no slot '{s}'; slots: {', '.join(system.slots)}" for s in unknown])
+        raise InvalidConfigurationError(
+            system.name, [f"no slot '{s}'; slots: {', '.join(system.slots)}" for s in unknown]
+        )
     paths: dict[str, Path] = {}
     built: dict[str, str] = {}
     for slot, declared in system.slots.items():
@@ -36,7 +39,7 @@ def resolve_parts(
         if str(part).endswith(".fmu"):
             paths[slot] = Path(part)
             if not paths[slot].is_file():
-                raise RefusedError(system.name, [f"{slot}: no such file {part}"])
+                raise InvalidConfigurationError(system.name, [f"{slot}: no such file {part}"])
             continue
         from gyrobench.packaging import CompilerError, build
 

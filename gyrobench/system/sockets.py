@@ -10,6 +10,7 @@ Conventions of the connectors: SI units; vectors along I, O, S (gyro), face axes
 
 from __future__ import annotations
 
+from gyrobench.bench import UsageError, nearest
 from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, out
 from gyrobench.system.loop_sockets import LOOPS
 
@@ -169,9 +170,9 @@ SOCKETS: dict[str, Socket] = {
 
 
 def socket(name: str | Socket) -> Socket:
-    """The socket called ``name``, or a system's own; raises KeyError naming those that exist."""
+    """Return the socket called ``name``, or a system's own; raises UsageError for an unknown name."""
     if isinstance(name, Socket):
         return name
     if name not in SOCKETS:
-        raise KeyError(f"socket '{name}': unknown; sockets: {', '.join(SOCKETS)}")
+        raise UsageError(f"no socket '{name}'; {nearest(name, SOCKETS)}")
     return SOCKETS[name]

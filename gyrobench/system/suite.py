@@ -18,8 +18,8 @@ from typing import Any, ClassVar
 
 from gyrobench.bench import Bench, nearest
 from gyrobench.system.parameters import slot_seed
-from gyrobench.system.system import Option, RefusedError, System, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, Option, System, load_system
+from gyrobench.system.values import InvalidValueError
 
 
 class Suite(System):
@@ -48,7 +48,7 @@ class Suite(System):
         self.passed: dict[str, Any] = {}  # values for the tests, as given
 
     def set(self, name: str, value: Any) -> None:
-        """Keeps a value for the tests; whether it fits is seen in :meth:`members`.  Raises ValueProblem."""
+        """Keeps a value for the tests; whether it fits is seen in :meth:`members`.  Raises InvalidValueError."""
         if name in self.options:
             super().set(name, value)
         else:
@@ -70,8 +70,8 @@ class Suite(System):
     def members(self, bench: Path | None = None) -> dict[str, System]:
         """The tests with their values set.
 
-        Raises RefusedError for tests that there are not, that are named twice or are not of one instrument, and
-        ValueProblem for a value that goes to none of them.
+        Raises InvalidConfigurationError for tests that do not exist, that are named twice or are not of one instrument,
+        and InvalidValueError for a value that goes to none of them.
         """
         names = self.tests()
         known = {n for n in Bench.find(bench).systems() if n != self.name}
@@ -80,7 +80,7 @@ class Suite(System):
         if len(set(names)) < 2:
             wrong.append(f"{len(set(names))} test: at least two are needed to compare methods")
         if wrong:
-            raise RefusedError(self.name, wrong)
+            raise InvalidConfigurationError(self.name, wrong)
         found = {n: load_system(n, bench) for n in names}
         self._one_instrument(found)
         given = self.given_to(found)
@@ -93,7 +93,7 @@ class Suite(System):
         bare = [n for n, s in members.items() if self.item not in s.slots]
         if bare:
             problem = f"{', '.join(bare)}: no slot {self.item}, so no test of a {self.item}"
-            raise RefusedError(self.name, [problem])
+            raise InvalidConfigurationError(self.name, [problem])
         kinds: dict[tuple[str, str], list[str]] = {}
         for name, system in members.items():
             slot = system.slots[self.item]
@@ -101,12 +101,12 @@ class Suite(System):
             kinds.setdefault((socket, slot.part), []).append(name)
         if len(kinds) > 1:
             said = "; ".join(f"{', '.join(names)}: {part} ({socket})" for (socket, part), names in kinds.items())
-            raise RefusedError(
+            raise InvalidConfigurationError(
                 self.name, [f"the tests are not of one {self.item}: {said}; leave out the tests of the other"]
             )
 
     def given_to(self, members: Mapping[str, System]) -> dict[str, dict[str, Any]]:
-        """test -> the values that go to it.  Raises ValueProblem for one that goes to none."""
+        """test -> the values that go to it.  Raises InvalidValueError for one that goes to none."""
         found: dict[str, dict[str, Any]] = {n: {} for n in members}
         alone: dict[str, dict[str, Any]] = {n: {} for n in members}
         for key, value in self.passed.items():
@@ -114,7 +114,7 @@ class Suite(System):
             if dot and first in members:
                 slot = rest.partition(".")[0]
                 if rest not in members[first].options and slot not in members[first].slots:
-                    raise ValueProblem(f"{key}: {first} has no option {rest} and no slot {slot}")
+                    raise InvalidValueError(f"{key}: {first} has no option {rest} and no slot {slot}")
                 alone[first][rest] = value
                 continue
             fits = [n for n, s in members.items() if (first in s.slots if dot else key in s.options)]
@@ -122,16 +122,19 @@ class Suite(System):
                 slots = sorted({x for s in members.values() for x in s.slots})
                 options = sorted({x for s in members.values() for x in s.options} | set(self.options))
                 what = f"no slot '{first}'; {nearest(first, [*members, *slots])}" if dot else nearest(key, options)
-                raise ValueProblem(f"{key}: no test of the suite takes it: {what}")
+                raise InvalidValueError(f"{key}: no test of the suite takes it: {what}")
             for n in fits:
                 found[n][key] = value
         return {n: {**found[n], **alone[n]} for n in members}
 
     def swaps(self, members: Mapping[str, System], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-        """test -> parts, mapping files or isolated slots that go to it: to all with the slot.  Raises ValueProblem."""
+        """test -> parts, mapping files or isolated slots that go to it: to all with the slot.
+
+        Raises InvalidValueError for a slot that no test has.
+        """
         for slot in given:
             if not any(slot in s.slots for s in members.values()):
-                raise ValueProblem(f"no test of the suite has a slot '{slot}'")
+                raise InvalidValueError(f"no test of the suite has a slot '{slot}'")
         return {n: {slot: v for slot, v in given.items() if slot in s.slots} for n, s in members.items()}
 
     def seed_of(self, seed: int, name: str) -> int:

@@ -35,16 +35,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import Bench
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
 from gyrobench.system.sockets import Socket
-from gyrobench.system.values import ValueProblem, flatten, parse
+from gyrobench.system.values import InvalidValueError, flatten, parse
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
 
 
-class RefusedError(Exception):
+class InvalidConfigurationError(GyrobenchError):
     """The system refuses to run with these values; ``problems`` lists why."""
 
     def __init__(self, name: str, problems: list[str]) -> None:
@@ -84,15 +85,15 @@ class Option:
         return self.unit if isinstance(self.unit, type) else float
 
     def parse(self, name: str, value: Any) -> Any:
-        """The SI value; raises ValueProblem for a wrong dimension or a broken bound."""
+        """The SI value; raises InvalidValueError for a wrong dimension or a broken bound."""
         unit = "1" if isinstance(self.unit, type) else self.unit
         number = parse(name, value, unit, self.kind)
         if not isinstance(number, str | list):
             given = value.strip() if isinstance(value, str) else f"{number:g}"
             if self.min is not None and not number >= self.min:
-                raise ValueProblem(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
+                raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
             if self.max is not None and not number <= self.max:
-                raise ValueProblem(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
+                raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
         return number
 
 
@@ -144,7 +145,7 @@ class System:
         return self.values[option]
 
     def set(self, name: str, value: Any) -> None:
-        """Sets an option or, as "slot.parameter", a parameter of a part.  Raises ValueProblem."""
+        """Sets an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""
         if name in self.options:
             self.values[name] = self.options[name].parse(name, value)
         elif "." in name and name.split(".", 1)[0] in self.slots:
@@ -153,7 +154,7 @@ class System:
             import difflib
 
             near = difflib.get_close_matches(name, list(self.options), n=3, cutoff=0.4) or list(self.options)
-            raise ValueProblem(
+            raise InvalidValueError(
                 f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "
                 f"is written slot.parameter, slots: {', '.join(self.slots)}"
             )
@@ -199,11 +200,11 @@ class System:
 
     # ------------------------------------------------------------ used by the bench
     def refuse(self) -> None:
-        """Raises RefusedError when the plan or the values are impossible."""
+        """Raises InvalidConfigurationError when the plan or the values are impossible."""
         plan = self.plan()
         problems = (plan.problems() if plan.phases else []) + list(self.check())
         if problems:
-            raise RefusedError(self.name, problems)
+            raise InvalidConfigurationError(self.name, problems)
 
     def flat_parameters(self) -> dict[str, Any]:
         """:meth:`parameters` element by element: {"sequencer.mode[1]": 2, ...}."""
@@ -216,7 +217,8 @@ class System:
 def load_system(name: str, bench: Path | None = None) -> System:
     """The system ``name`` of a bench (see :class:`gyrobench.bench.Bench`) with its default values.
 
-    Raises BenchError when there is no such system, RefusedError when its file does not define exactly one System.
+    Raises BenchError when there is no such system, InvalidConfigurationError when its file does not define exactly one
+    System.
     """
     folder = Bench.find(bench).system_folder(name)
     file = folder / "system.py"
@@ -232,7 +234,7 @@ def load_system(name: str, bench: Path | None = None) -> System:
         if isinstance(v, type) and issubclass(v, System) and v.__module__ == module_name
     ]
     if len(found) != 1:
-        raise RefusedError(name, [f"{file}: defines {len(found)} subclasses of System, must define one"])
+        raise InvalidConfigurationError(name, [f"{file}: defines {len(found)} subclasses of System, must define one"])
     system = found[0]()
     system.name, system.folder = name, folder
     return system

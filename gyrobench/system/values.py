@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 
 
-class ValueProblem(ValueError):
+class InvalidValueError(GyrobenchError, ValueError):
     """A value that cannot be used; the message says which, why and what would be right."""
 
 
@@ -53,8 +54,8 @@ def nest(values: Mapping[str, Any]) -> dict[str, Any]:
 def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
     """A value as SI number(s): a number, a text with an optional unit, a list (or its JSON text) of these.
 
-    A coefficient per power of g may be given per g (``0.9deg/h/g``).  Raises :class:`ValueProblem` for text that is
-    no quantity, a wrong dimension, a value that is not finite, or a fraction where an integer is asked for.
+    A coefficient per power of g may be given per g (``0.9deg/h/g``).  Raises :class:`InvalidValueError` for text that
+    is not a quantity, a wrong dimension, a value that is not finite, or a fraction where an integer is asked for.
     """
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -66,23 +67,23 @@ def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
             try:
                 value = json.loads(text)
             except json.JSONDecodeError as error:
-                raise ValueProblem(f"{name} = {text}: not a list: {error}") from None
+                raise InvalidValueError(f"{name} = {text}: not a list: {error}") from None
         elif kind is bool and text.lower() in ("true", "false"):
             return text.lower() == "true"
         else:
             try:
                 value = units.parse_quantity(text, unit or "1", per_g0=True)
             except units.UnitError as error:
-                raise ValueProblem(f"{name}: {error}") from None
+                raise InvalidValueError(f"{name}: {error}") from None
     if isinstance(value, list | tuple):
         return [parse(f"{name}[{k}]", v, unit, kind) for k, v in enumerate(value, 1)]
     if kind is str:
         return str(value)
     number = float(value)
     if not math.isfinite(number):
-        raise ValueProblem(f"{name} = {number}: must be finite")
+        raise InvalidValueError(f"{name} = {number}: must be finite")
     if kind in (int, bool):
         if number != math.floor(number):
-            raise ValueProblem(f"{name} = {number:g}: must be an integer")
+            raise InvalidValueError(f"{name} = {number:g}: must be an integer")
         return kind(number)
     return number

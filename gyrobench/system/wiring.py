@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
 from gyrobench.system.execution_order import Link, Order, execution_order, feedthrough
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System
 
 
-class WiringError(Exception):
+class WiringError(GyrobenchError):
     """A wire that cannot be laid; ``problems`` lists each."""
 
     def __init__(self, system: str, problems: list[str]) -> None:
@@ -157,7 +158,7 @@ class _Layer:
 def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path] | None = None) -> Assembly:
     """Reads the model descriptions, fits each FMU into its slot, lays the wires and finds the order.
 
-    Raises MisfitError, WiringError, AlgebraicLoopError; nothing is loaded or run.
+    Raises SocketMismatchError, WiringError, AlgebraicLoopError; nothing is loaded or run.
     """
     from fmpy import read_model_description
 

@@ -37,7 +37,7 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA]
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
 
-    Raises DataError, and ValueProblem for an option that does not fit.
+    Raises DataError, and InvalidValueError for an option that does not fit.
     """
     needed = {"gravity": "9.8067m/s2", "scale": "9806.65m/s2/A"}
     return read_record(system, data, values, needed=needed, attitudes=lambda: dict.fromkeys(FACES, "index"))

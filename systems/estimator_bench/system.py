@@ -10,7 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
 from gyrobench.system.connectors import Socket, out
 from gyrobench.system.system import Option, Slot, System
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.values import InvalidValueError
 
 from .benchmarks import BENCHMARKS, Benchmark
 
@@ -78,7 +78,7 @@ class EstimatorBench(System):
     @step.setter
     def step(self, value: float) -> None:
         if not math.isclose(value, self.benchmark.Ts):
-            raise ValueProblem(
+            raise InvalidValueError(
                 f"step = {value:g} s: this system runs at the sampling period of its benchmark, "
                 f"{self.benchmark.Ts:g} s (nothing in it is integrated: there is no step to check)"
             )

@@ -47,7 +47,7 @@ COLUMNS = (
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
 
-    Raises DataError, and ValueProblem for an option that does not fit.
+    Raises DataError, and InvalidValueError for an option that does not fit.
     """
     runs = read_runs(data, system.name)
     if runs is not None:

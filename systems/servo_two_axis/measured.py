@@ -48,6 +48,6 @@ COLUMNS = (
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI.  Raises DataError, and ValueProblem for an option that does not fit."""
+    """The CSV as a record in SI.  Raises DataError, and InvalidValueError for an option that does not fit."""
     mounts = {f"mount {m}": "servo" for m in MOUNTS}
     return read_record(system, data, values, needed={"latitude": "45.75deg"}, attitudes=lambda: mounts, columns=COLUMNS)

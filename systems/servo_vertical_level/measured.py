@@ -34,5 +34,5 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI.  Raises DataError, and ValueProblem for an option that does not fit."""
+    """The CSV as a record in SI.  Raises DataError, and InvalidValueError for an option that does not fit."""
     return servo_stand.read(system, data, values, (*servo_stand.VERTICAL, *servo_stand.LEVEL))

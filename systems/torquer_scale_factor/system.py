@@ -199,7 +199,7 @@ class TorquerScaleFactor(System):
         return TEMPLATE
 
     def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        """The CSV as a record.  Raises DataError, and ValueProblem for an option that does not fit."""
+        """The CSV as a record.  Raises DataError, and InvalidValueError for an option that does not fit."""
         rows, comments = read_measured(data, COLUMNS, time=None)
         for name, value in {**{k: v for k, v in comments.items() if k in self.options}, **values}.items():
             if name not in TEXTS:

@@ -43,7 +43,7 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA]
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
 
-    Raises DataError, and ValueProblem for an option that does not fit.
+    Raises DataError, and InvalidValueError for an option that does not fit.
     """
 
     def attitudes() -> dict[str, str]:

@@ -60,7 +60,7 @@ NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/m
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """The CSV as a record in SI, see gyrobench.system.lab_record.
 
-    Raises DataError, and ValueProblem for an option that does not fit.
+    Raises DataError, and InvalidValueError for an option that does not fit.
     """
 
     def attitudes() -> dict[str, str]:

@@ -10,7 +10,7 @@ from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 AccelerometerPendulous = load_part("accelerometer_pendulous", BENCH)
@@ -235,7 +235,7 @@ def test_random_bias():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)
 
 
@@ -246,5 +246,5 @@ def test_unstable_means_unstable():
     limit = part.C * (part.K + torquer * part.K_p) / (part.J * torquer)
     part = started(K_i=0.99 * limit)
     assert -20.0 < max(np.linalg.eigvals(np.array(part.jacobian())).real) < 0.0
-    with pytest.raises(PartError, match="unstable"):
+    with pytest.raises(ComponentError, match="unstable"):
         started(K_i=1.0001 * limit)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
 
@@ -141,5 +141,5 @@ def test_native_target_repeats_a_preset():
     ],
 )
 def test_refusals(change, says):
-    with pytest.raises(PartError, match=says):
+    with pytest.raises(ComponentError, match=says):
         BaseMotion(**change).initialize()

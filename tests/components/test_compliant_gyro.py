@@ -9,7 +9,7 @@ from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro, RebalanceAnalog, Wired
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
 from gyrobench.packaging import load_part
 
@@ -225,5 +225,5 @@ def test_noise_density_does_not_depend_on_the_step(port, name, h):
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

@@ -3,7 +3,7 @@
 import pytest
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 CurrentSource = load_part("current_source", BENCH)
@@ -58,5 +58,5 @@ def test_ammeter():
 def test_too_much_is_refused():
     part = started()
     part.command, part.mode = 0.2, 3.0
-    with pytest.raises(PartError, match=r"0\.2 A is beyond i_max = 0\.12 A"):
+    with pytest.raises(ComponentError, match=r"0\.2 A is beyond i_max = 0\.12 A"):
         advance(part, 1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 T2 = load_part("decoupler_t2", BENCH)
@@ -159,5 +159,5 @@ def test_none_passes_on():
     ],
 )
 def test_refusals(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         T2(**parameters).initialize()

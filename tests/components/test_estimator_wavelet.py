@@ -9,7 +9,7 @@ import pytest
 from estimating import play
 from scipy.signal import lfilter
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 pywt = pytest.importorskip("pywt")
@@ -96,7 +96,7 @@ def test_nothing_before_the_first_reading():
 
 def test_refusals():
     cls = load_part("estimator_wavelet")
-    with pytest.raises(PartError, match=r"moments = 2: the wavelets are 1 \(Haar\) and 4 \(db4\)"):
+    with pytest.raises(ComponentError, match=r"moments = 2: the wavelets are 1 \(Haar\) and 4 \(db4\)"):
         cls(moments=2).initialize()
-    with pytest.raises(PartError, match="parameter J = 7 1 must be <= 6"):
+    with pytest.raises(ComponentError, match="parameter J = 7 1 must be <= 6"):
         cls(J=7).initialize()

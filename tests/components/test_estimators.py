@@ -9,7 +9,7 @@ import pytest
 from estimating import AR3, SIGMA2, autoregressive, companion, kalman, play, rate_model, riccati, rms
 from scipy import linalg, stats
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
 
@@ -51,7 +51,9 @@ def test_one_reading_in_each_sampling_period(part):
 def test_sampling_period_that_is_no_multiple(part, Ts):
     one = load_part(part)(Ts=Ts)
     one.initialize()
-    with pytest.raises(PartError, match=rf"Ts = {Ts:g} s must be a whole multiple of the communication step, 0.001 s"):
+    with pytest.raises(
+        ComponentError, match=rf"Ts = {Ts:g} s must be a whole multiple of the communication step, 0.001 s"
+    ):
         one.do_step(0.0, 1e-3)
 
 
@@ -133,7 +135,7 @@ def test_alpha_beta_gamma_refuses_exactly_what_is_unstable():
         if stable:
             one.initialize()
         else:
-            with pytest.raises(PartError, match="unstable"):
+            with pytest.raises(ComponentError, match="unstable"):
                 one.initialize()
     assert min(seen) > 50
 
@@ -269,25 +271,27 @@ def test_stationarity(part):
         else:
             trap = radius[1] < 1.0
             seen["trap" if trap else "not"] += 1
-            with pytest.raises(PartError, match="arburg .* returns a = -phi" if trap else "within the unit circle"):
+            with pytest.raises(
+                ComponentError, match="arburg .* returns a = -phi" if trap else "within the unit circle"
+            ):
                 one.initialize()
     assert min(seen.values()) > 30
 
 
 @pytest.mark.parametrize("part", ["estimator_kalman_ar", "estimator_sage_husa"])
 def test_the_table_of_the_thesis_falls_into_the_trap(part):
-    with pytest.raises(PartError, match="give phi = -a"):
+    with pytest.raises(ComponentError, match="give phi = -a"):
         load_part(part)(p=3, phi=[0.7466, 0.5044, 0.2538, 0.0, 0.0]).initialize()
 
 
 def test_a_random_walk_is_sent_elsewhere():
-    with pytest.raises(PartError, match="estimator_kalman_rate"):
+    with pytest.raises(ComponentError, match="estimator_kalman_rate"):
         load_part("estimator_kalman_ar")(p=1, phi=[1.0, 0.0, 0.0, 0.0, 0.0]).initialize()
 
 
 @pytest.mark.parametrize("b", [0.0, 1.0, -0.5, 1.5])
 def test_forgetting_factor(b):
-    with pytest.raises(PartError, match=rf"parameter b = {b:g} 1 must be [<>] "):
+    with pytest.raises(ComponentError, match=rf"parameter b = {b:g} 1 must be [<>] "):
         load_part("estimator_sage_husa")(b=b).initialize()
 
 

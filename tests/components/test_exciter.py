@@ -5,7 +5,7 @@ import math
 import pytest
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 Exciter = load_part("exciter", BENCH)
@@ -104,5 +104,5 @@ def test_base_motion_is_its_own_derivative(phase):
     ],
 )
 def test_refusals(phase, says):
-    with pytest.raises(PartError, match=says):
+    with pytest.raises(ComponentError, match=says):
         exciter(phase)

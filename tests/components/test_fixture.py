@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH, TableRate
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.frames import E, N, U, earth_rate_local, passive_z, polar_base, pole, tumble_faces
 from gyrobench.packaging import load_part
 
@@ -193,7 +193,7 @@ def test_a_change_of_mount_shows_at_once_and_mounts_can_be_replaced():
 def test_refuses_a_mount_that_is_none(mount):
     part = Fixture()
     part.mount = mount
-    with pytest.raises(PartError, match=f"mount = {mount:g} must be a whole number from 1 to 49"):
+    with pytest.raises(ComponentError, match=f"mount = {mount:g} must be a whole number from 1 to 49"):
         part.initialize()
 
 
@@ -212,5 +212,5 @@ def test_refuses_a_mount_that_is_none(mount):
 )
 def test_refuses(parameters, message):
     part = Fixture(**parameters)
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.initialize()

@@ -10,7 +10,7 @@ from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, RebalanceAnalog, Wired
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
 
 H = 1e-3
@@ -307,7 +307,7 @@ def only(*names):
 def test_term_sets(terms, names):
     started(terms=terms, **only(*names))
     for outside in set(NAMES) - set(names):
-        with pytest.raises(PartError, match=f"{outside} must be 0 with terms = {terms}"):
+        with pytest.raises(ComponentError, match=f"{outside} must be 0 with terms = {terms}"):
             started(terms=terms, **only(*names, outside))
 
 
@@ -329,5 +329,5 @@ def test_term_sets(terms, names):
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging.instance import make
 
 H = 1e-3
@@ -223,7 +223,7 @@ def test_reaction_is_off_by_default():
 def test_the_stop_ends_the_run_with_time_and_angle():
     """b = (H/C) w (t - tau): 0.02 rad at 0.02125 s for w = 1 rad/s; without a stop b goes on."""
     part = started(**{**RATE, "C": 0.02, "K": 0.0}, omega=[1.0, 0.0, 0.0], stop=0.02)
-    with pytest.raises(PartError, match=r"the float has reached its stop: b = 0.02\d* rad \(t = 0.0213"):
+    with pytest.raises(ComponentError, match=r"the float has reached its stop: b = 0.02\d* rad \(t = 0.0213"):
         run(part, 0.1, 1e-4)
     assert run(started(**{**RATE, "C": 0.02, "K": 0.0}, omega=[1.0, 0.0, 0.0]), 0.1, 1e-4).b > 0.09
 
@@ -253,5 +253,5 @@ def test_native_is_bit_equal_with_everything_on():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from wired import BENCH, DEG_H, RebalanceAnalog, Wired
 
 from gyrobench import drift as bench_drift
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 Gyro2dof = load_part("gyro_2dof", BENCH)
@@ -337,9 +337,9 @@ def test_term_sets(channel, second):
     started(**{**NO_DRIFT, **inside, terms: 8})
     started(**{**NO_DRIFT, **inside, linear: DEG_H, terms: 9})
     started(**{**NO_DRIFT, **inside, linear: DEG_H, square: DEG_H, terms: 10})
-    with pytest.raises(PartError, match=f"{linear} must be 0 with {terms} = 8"):
+    with pytest.raises(ComponentError, match=f"{linear} must be 0 with {terms} = 8"):
         started(**{**NO_DRIFT, **inside, linear: DEG_H, terms: 8})
-    with pytest.raises(PartError, match=f"{square} must be 0 with {terms} = 9"):
+    with pytest.raises(ComponentError, match=f"{square} must be 0 with {terms} = 9"):
         started(**{**NO_DRIFT, **inside, square: DEG_H, terms: 9})
 
 
@@ -362,5 +362,5 @@ def test_term_sets(channel, second):
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

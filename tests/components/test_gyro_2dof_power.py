@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
 
@@ -153,11 +153,11 @@ def test_native_is_bit_equal_at_full_size():
 def test_the_stop_ends_the_run_with_time_and_angle():
     """beta = M_x t / H: 0.1 rad at 0.2 s."""
     part = started(H=10.0, M_x=5.0, stop=0.1)
-    with pytest.raises(PartError, match=r"inner gimbal has reached its stop: beta = 0.1\d* rad \(t = 0.2"):
+    with pytest.raises(ComponentError, match=r"inner gimbal has reached its stop: beta = 0.1\d* rad \(t = 0.2"):
         run(part, 1.0, 1e-3)
     run(started(H=10.0, M_x=5.0), 1.0, 1e-3)  # none by default
     lock = started(**POWER, full=1.0, M_x=100.0)
-    with pytest.raises(PartError, match=r"reached its stop: beta = 1\.[56]"):
+    with pytest.raises(ComponentError, match=r"reached its stop: beta = 1\.[56]"):
         run(lock, 2.0, 1e-3)
 
 
@@ -170,5 +170,5 @@ def test_the_stop_ends_the_run_with_time_and_angle():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

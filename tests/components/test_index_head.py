@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH, Sampler, Sequencer, TableRate, Wired, plan
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 IndexHead = load_part("index_head", BENCH)
@@ -172,7 +172,7 @@ def test_eight_positions_by_the_sequencer():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)
 
 
@@ -187,5 +187,5 @@ def test_refuses(parameters, message):
 )
 def test_refuses_commands(inputs, message):
     part = started(**inputs)
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)

@@ -5,7 +5,7 @@ import math
 import pytest
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 LoadTorque = load_part("load_torque", BENCH)
@@ -54,7 +54,7 @@ def test_polarity_turns_the_signal_and_nothing_else():
         part.u, part.test = sign * 0.1, 0.02
         part.initialize()
     assert parts[0].get("M") == parts[1].get("M") and parts[1].get("e") == pytest.approx(0.12)
-    with pytest.raises(PartError, match="polarity must be 1 or -1"):
+    with pytest.raises(ComponentError, match="polarity must be 1 or -1"):
         StabilizerPower(polarity=0).initialize()
 
 
@@ -72,7 +72,7 @@ GYRO = {"H_g": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}
 def test_routh_limit():
     """(10/0.5 + 2/0.02) (10 + 10*2/10) = 120 * 12 = 1440 N.m/rad [spec d4, B6]; k_u k_i ratio = 10 * 10 * 100."""
     StabilizerPower(**GYRO, k_m=0.999 * 0.144).initialize()
-    with pytest.raises(PartError, match=r"at or beyond the Routh limit 1440 N\.m/rad"):
+    with pytest.raises(ComponentError, match=r"at or beyond the Routh limit 1440 N\.m/rad"):
         StabilizerPower(**GYRO, k_m=0.144 * 1.0001).initialize()
     StabilizerPower(**GYRO, k_m=0.2, allow_unstable=1).initialize()
     StabilizerPower(k_m=0.2).initialize()  # not told the gyro: not judged
@@ -80,5 +80,5 @@ def test_routh_limit():
 
 @pytest.mark.parametrize("name", ["k_u", "k_i", "k_m", "ratio", "J_x", "J_y"])
 def test_zero_is_refused(name):
-    with pytest.raises(PartError, match=name):
+    with pytest.raises(ComponentError, match=name):
         StabilizerPower(**{name: 0.0}).initialize()

@@ -7,7 +7,7 @@ import pytest
 from gimbals import DEG, Four, base_rate, fly, platform_in_base
 from test_platform_three_gimbal import roll_then_yaw
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 
 PART = "platform_four_gimbal"
 VERTICAL = {"theta_0[1]": math.pi / 2}
@@ -176,5 +176,5 @@ def flight(rate, steps=3000, **parameters):
     ],
 )
 def test_refusals(rate, parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         flight(rate, **parameters)

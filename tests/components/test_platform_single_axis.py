@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
@@ -261,12 +261,12 @@ def test_linearization_has_the_poles_of_motor_and_platform():
     ],
 )
 def test_refusals(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         made(**parameters)
 
 
 def test_an_input_that_is_not_finite_is_refused():
     p = made()
     p.set("v", math.inf)
-    with pytest.raises(PartError, match=r"input v is inf at t = 0 s"):
+    with pytest.raises(ComponentError, match=r"input v is inf at t = 0 s"):
         p.do_step(0.0, 1e-3)

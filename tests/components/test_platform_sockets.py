@@ -5,7 +5,7 @@ import pytest
 from wired import BENCH
 
 from gyrobench.packaging import build
-from gyrobench.system.binding import MisfitError, fit
+from gyrobench.system.binding import SocketMismatchError, fit
 from gyrobench.system.sockets import SOCKETS
 
 
@@ -28,5 +28,5 @@ def test_fits(part, socket, tmp_path):
 
 def test_another_socket_is_refused(tmp_path):
     description = fmpy.read_model_description(str(build("platform_three_axis", out=tmp_path, bench=BENCH)))
-    with pytest.raises(MisfitError, match="theta_4"):
+    with pytest.raises(SocketMismatchError, match="theta_4"):
         fit(SOCKETS["FourGimbalPlatform"], description, slot="platform")

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
@@ -278,7 +278,7 @@ def test_linearization_around_a_tilted_position():
     ],
 )
 def test_refusals(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         Platform(**parameters).initialize()
 
 
@@ -286,7 +286,7 @@ def test_pitch_of_90_degrees_is_refused():
     part = Platform(theta_0=[1.48, 0.0, 0.0], theta_dot_0=[40.0, 0.0, 0.0], stop_stiffness=1.0)
     part.initialize()
     with pytest.raises(
-        PartError, match=r"pitch = 1\.[56]\d* rad, through its stop at 1\.48353 rad: it must stay below"
+        ComponentError, match=r"pitch = 1\.[56]\d* rad, through its stop at 1\.48353 rad: it must stay below"
     ):
         for k in range(10):
             part.do_step(k * 1e-3, 1e-3)

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import welch
 from wired import DEG_H, RebalanceAnalog
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 
 H = 1e-3
 
@@ -108,5 +108,5 @@ def test_meter_noise_density_does_not_depend_on_the_step(h):
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)

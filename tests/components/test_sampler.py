@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from wired import ROW, Sampler
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 
 H = 0.01
 
@@ -135,5 +135,5 @@ def test_refuses(gate, window, message):
     part = Sampler()
     part.gate, part.window = gate, window
     part.initialize()
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)

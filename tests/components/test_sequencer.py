@@ -5,7 +5,7 @@ import itertools
 import pytest
 from wired import Sequencer, plan
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 
 EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURNED = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
@@ -167,7 +167,7 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
 def test_refuses(phase, message):
     skewed = [[1, 0, 0], [2e-9, 1, 0], [0, 0, 1]]
     mirror = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started([OK, phase], [EYE, TURNED, skewed, mirror])
 
 
@@ -178,7 +178,7 @@ def test_faces_and_phases_not_used_are_not_judged():
 @pytest.mark.parametrize("phases", [0, 100])
 def test_refuses_number_of_phases(phases):
     part = Sequencer(phases=phases)
-    with pytest.raises(PartError, match="phases = "):
+    with pytest.raises(ComponentError, match="phases = "):
         part.initialize()
 
 

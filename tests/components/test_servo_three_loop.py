@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
@@ -85,7 +85,7 @@ def test_position_loop_is_sampled():
     changes = np.flatnonzero(np.diff(asked)) + 1
     assert changes.tolist() == [49, 99, 149, 199] and asked[49] == pytest.approx(10 * (1 - 0.97 - 49e-4))
     part = started(K_p=1.0, track_period=2.5e-4)
-    with pytest.raises(PartError, match=r"track_period = 0.00025 s is no multiple of the internal step"):
+    with pytest.raises(ComponentError, match=r"track_period = 0.00025 s is no multiple of the internal step"):
         part.do_step(0.0, H)
 
 
@@ -103,5 +103,5 @@ def test_limits_without_wind_up():
 
 @pytest.mark.parametrize("name", ["K_u", "K_w", "K_c", "i_max", "v_max", "w_max", "track_period"])
 def test_refuses(name):
-    with pytest.raises(PartError, match=f"{name} = 0 .* must be > 0"):
+    with pytest.raises(ComponentError, match=f"{name} = 0 .* must be > 0"):
         started(**{name: 0.0})

@@ -5,7 +5,7 @@ import math
 import pytest
 from wired import Site
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.frames import normal_gravity
 
 
@@ -48,10 +48,10 @@ def test_gravity_falls_with_height():
 
 @pytest.mark.parametrize("gravity", [9.69, 9.91, 1.0])
 def test_refuses_gravity(gravity):
-    with pytest.raises(PartError, match=f"gravity = {gravity:g} m/s2 must lie in 9.7 to 9.9"):
+    with pytest.raises(ComponentError, match=f"gravity = {gravity:g} m/s2 must lie in 9.7 to 9.9"):
         at(gravity=gravity)
 
 
 def test_refuses_latitude():
-    with pytest.raises(PartError, match=r"latitude = 1.6 rad must be <= 1.5708"):
+    with pytest.raises(ComponentError, match=r"latitude = 1.6 rad must be <= 1.5708"):
         at(latitude=1.6)

@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import cont2discrete
 from wired import BENCH
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
@@ -107,5 +107,5 @@ def test_order_is_flagged(given, flag):
     ],
 )
 def test_refuses(given, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**given)

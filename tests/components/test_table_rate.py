@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from wired import TableRate
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 
 RNG = np.random.default_rng(5)
 H = 0.01
@@ -228,7 +228,7 @@ def test_gravity_turns_the_right_way():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)
 
 
@@ -238,7 +238,7 @@ def test_refuses(parameters, message):
 )
 def test_refuses_commands(mode, target, message):
     part = started(mode=mode, target=target)
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from servo_loop import ARCSEC, FAST, GCM, H, Loop, TableServo
 from wired import TableRate
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 
 
@@ -237,7 +237,7 @@ def test_alpha_is_the_derivative_of_omega():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         kinematic(**parameters)
 
 
@@ -251,7 +251,7 @@ def test_refuses(parameters, message):
 )
 def test_refuses_commands(mode, target, message):
     part = kinematic(mode=mode, target=target)
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 from servo_loop import ARCSEC, FAST, FREE, GCM, SLOW, H, Loop
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 
 
@@ -64,12 +64,12 @@ def test_gain_outside_its_limits_is_refused_and_unstable():
         poles = np.sort(closed.poles().real)
         assert poles[-1] == pytest.approx(0.0, abs=1e-9) and poles[-2] < 0.0  # the angle against the base is free
     for factor in (0.0735, 2.96):
-        with pytest.raises(PartError, match="the loop is unstable with network 2"):
+        with pytest.raises(ComponentError, match="the loop is unstable with network 2"):
             Loop(stiffness=factor * nominal)
 
 
 def test_networks_are_per_gyro():
-    with pytest.raises(PartError, match=r"unstable with network 1 and a gyro of J_g = 0\.0003,"):
+    with pytest.raises(ComponentError, match=r"unstable with network 1 and a gyro of J_g = 0\.0003,"):
         Loop({**SLOW, "J": 3e-4}, network=1)  # 10 ms
 
 

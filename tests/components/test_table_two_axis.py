@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH, TableRate
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 TableTwoAxis = load_part("table_two_axis", BENCH)
@@ -184,7 +184,7 @@ def test_outer_axis_alone_is_table_rate():
 
 def test_inner_axis_stops_at_its_limit():
     part = started(mode_y=2.0, target_y=0.1, limits_y=[-0.5, 0.5])
-    with pytest.raises(PartError, match=r"inner axis: 0\.50\d* rad is beyond limits_y"):
+    with pytest.raises(ComponentError, match=r"inner axis: 0\.50\d* rad is beyond limits_y"):
         for k in range(1000):
             part.do_step(k * H, H)
     assert part.t == pytest.approx(5.5, abs=2 * H)  # 0.5 s and 0.05 rad of start, 0.5 rad: 1 s up, then 4.5 s
@@ -204,7 +204,7 @@ def test_inner_axis_stops_at_its_limit():
     ],
 )
 def test_refuses(parameters, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         started(**parameters)
 
 
@@ -219,5 +219,5 @@ def test_refuses(parameters, message):
 )
 def test_refuses_commands(inputs, message):
     part = started(**inputs)
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)

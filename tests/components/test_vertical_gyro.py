@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from wired import BENCH, Wired
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 VerticalGyro = load_part("vertical_gyro", BENCH)
@@ -252,20 +252,20 @@ def test_wobble_begins_with_the_gate():
 # ------------------------------------------------------------------------------------------------ refusals
 def test_lock_without_the_ring_ends_the_run():
     pair = bench({"ring": 0.0}, {"turn_cut": 10.0}, row(pitch=10.0 * DEG))
-    with pytest.raises(PartError, match=r"the gimbals have locked.*ring = 0.*t = 8\.9"):
+    with pytest.raises(ComponentError, match=r"the gimbals have locked.*ring = 0.*t = 8\.9"):
         run(pair, 10.0)
 
 
 def test_no_apparent_vertical():
     pair = bench()
     pair.parts["vehicle"].gravity = 4.0
-    with pytest.raises(PartError, match=r"below 0.5 g: there is no apparent vertical"):
+    with pytest.raises(ComponentError, match=r"below 0.5 g: there is no apparent vertical"):
         run(pair, 0.1)
 
 
 def test_large_tilt_needs_the_fast_start():
     pair = bench({"tilt": [70.0 * DEG, 0.0]})
-    with pytest.raises(PartError, match=r"leans more than 60 deg .*fast_time"):
+    with pytest.raises(ComponentError, match=r"leans more than 60 deg .*fast_time"):
         run(pair, 0.1)
     pair = bench({"tilt": [70.0 * DEG, 0.0]}, {"fast_time": 120.0})
     run(pair, 110.0)
@@ -284,5 +284,5 @@ def test_large_tilt_needs_the_fast_start():
     ],
 )
 def test_refuses(cls, given, message):
-    with pytest.raises(PartError, match=message):
+    with pytest.raises(ComponentError, match=message):
         cls(**given).initialize()

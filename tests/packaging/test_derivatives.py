@@ -15,7 +15,7 @@ from toybench import PARTS, TOYS
 
 import gyrobench.component.math
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.component import Component, PartError
+from gyrobench.component import Component, ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 from gyrobench.packaging.reference import read_reference
@@ -196,7 +196,7 @@ def test_state_space() -> None:
         assert found.tolist() == given
     one = state_space(part, ["u[2]"], ["y[2]"])
     assert one.B.tolist() == [[0.0], [2.0], [0.0], [4.0]] and one.C.tolist() == [c[1]] and one.D.tolist() == [[0.0]]
-    with pytest.raises(PartError, match=r"no input 'y\[1\]'; it has u\[1\], u\[2\]"):
+    with pytest.raises(ComponentError, match=r"no input 'y\[1\]'; it has u\[1\], u\[2\]"):
         state_space(part, ["y[1]"], [])
 
 

@@ -12,7 +12,7 @@ import scipy.integrate
 import scipy.linalg
 from toybench import TOYS
 
-from gyrobench.component import PartError
+from gyrobench.component import ComponentError
 from gyrobench.component.numerics import phi1
 from gyrobench.packaging import load_part
 
@@ -173,5 +173,5 @@ def test_steps_are_cut_equally(instance: Callable) -> None:
 
 def test_a_step_needs_a_beginning() -> None:
     part = load_part("lag", TOYS)("slot")
-    with pytest.raises(PartError, match="slot: a step before initialization has succeeded"):
+    with pytest.raises(ComponentError, match="slot: a step before initialization has succeeded"):
         part.do_step(0.0, 1e-3)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from toybench import HEAD, TOYS
 
-from gyrobench.component import Component, PartError
+from gyrobench.component import Component, ComponentError
 from gyrobench.packaging import SubsetError, compiler, load_part, native_target
 from gyrobench.packaging.instance import make
 from gyrobench.packaging.source import Source, dependencies
@@ -114,7 +114,7 @@ def test_methods_have_plain_arguments(written: Written) -> None:
 
 
 def test_names_of_component_are_taken(written: Written) -> None:
-    with pytest.raises(PartError, match="take another name"):
+    with pytest.raises(ComponentError, match="take another name"):
         written("toy", '    reset = Parameter(1.0, "1")\n')
 
 

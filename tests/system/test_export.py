@@ -16,7 +16,7 @@ from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import ExportError, export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.record.record import Record
-from gyrobench.system.system import RefusedError, System
+from gyrobench.system.system import InvalidConfigurationError, System
 
 Make = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
@@ -89,7 +89,7 @@ def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path
 
 def test_ssp_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "bad.ssp").write_text("no archive")
-    with pytest.raises(RefusedError, match=r"bad\.ssp refuses to run:\n  - not an SSP archive"):
+    with pytest.raises(InvalidConfigurationError, match=r"bad\.ssp refuses to run:\n  - not an SSP archive"):
         read_ssp(tmp_path / "bad.ssp", 1e-3)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fmpy import read_model_description
 
-from gyrobench.system.binding import MisfitError, fit, load_mapping
+from gyrobench.system.binding import SocketMismatchError, fit, load_mapping
 from gyrobench.system.sockets import SOCKETS, element_names, socket
 
 Make = Callable[[str], Path]
@@ -39,7 +39,7 @@ def test_vendor_gyro_fits_through_its_mapping(make: Make) -> None:
 
 def test_misfit_names_everything(make: Make) -> None:
     description = read_model_description(str(make("vendor_gyro")))
-    with pytest.raises(MisfitError) as caught:
+    with pytest.raises(SocketMismatchError) as caught:
         fit(socket("SdfGyro"), description, {"omega": {"names": ["W_IA", "W_OA", "BIAS"]}, "i": {"name": "I_TORQ"},
                                              "pickoff": "V_PICKOFF"}, "gyro")  # fmt: skip
     found = "\n".join(caught.value.problems)
@@ -57,15 +57,15 @@ def test_misfit_names_everything(make: Make) -> None:
 def test_wrong_unit_and_wrong_type(make: Make) -> None:
     vendor = read_model_description(str(make("vendor_gyro")))
     mapping = load_mapping(FOREIGN / "vendor_gyro.toml")
-    with pytest.raises(MisfitError, match=r"i: wrong unit: I_TORQUE is in V, the socket needs A") as caught:
+    with pytest.raises(SocketMismatchError, match=r"i: wrong unit: I_TORQUE is in V, the socket needs A") as caught:
         fit(socket("SdfGyro"), vendor, {**mapping, "i": {"name": "I_TORQUE", "unit": "V"}})
     assert len(caught.value.problems) == 1
-    with pytest.raises(MisfitError, match=r"unit 'furlong' of ACC_IA is not known"):
+    with pytest.raises(SocketMismatchError, match=r"unit 'furlong' of ACC_IA is not known"):
         fit(socket("SdfGyro"), vendor, {**mapping, "f": {**mapping["f"], "unit": "furlong"}})
-    with pytest.raises(MisfitError, match=r"factor 0.0 in the mapping"):
+    with pytest.raises(SocketMismatchError, match=r"factor 0.0 in the mapping"):
         fit(socket("SdfGyro"), vendor, {**mapping, "u": {"name": "V_PICKOFF", "unit": "mV", "factor": 0}})
     lag = read_model_description(str(make("lag")))
-    with pytest.raises(MisfitError, match=r"i: wrong type: count is Integer, must be Real"):
+    with pytest.raises(SocketMismatchError, match=r"i: wrong type: count is Integer, must be Real"):
         fit(socket("Rebalance"), lag, {"i": "count", "i_read": "y"})
 
 
@@ -78,7 +78,7 @@ def test_unit_not_declared_is_taken_as_si_with_a_warning(make: Make) -> None:
 
 def test_mapping_file_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("[u\nname=")
-    with pytest.raises(MisfitError, match=r"bad\.toml"):
+    with pytest.raises(SocketMismatchError, match=r"bad\.toml"):
         load_mapping(tmp_path / "bad.toml")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
-from gyrobench.linear.linear_model import NotLinear, loops, poles, unstable
+from gyrobench.linear.linear_model import LinearizationError, loops, poles, unstable
 from gyrobench.reduction.loops.margins import model_response
 
 NAME = "stabilizer_power_2dof"
@@ -115,5 +115,5 @@ def test_a_break_that_is_no_wired_input() -> None:
     with Session(NAME) as s:
         _, parameters, _ = resolve(s.assembly, s.system.with_values(SHORT), 1, s.base)
         parts = operating_point(s.assembly, parameters, lambda slot: load_part(s.names[slot]))
-        with pytest.raises(NotLinear, match=r"opened at stabilizer\.nothing, which is no wired input"):
+        with pytest.raises(LinearizationError, match=r"opened at stabilizer\.nothing, which is no wired input"):
             Linear(s.assembly, parts, 1e-4).continuous("stabilizer.nothing")

@@ -22,7 +22,7 @@ from gyrobench.engine.run_driver import Status
 from gyrobench.engine.session import RunInterrupted, Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.system import System
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.values import InvalidValueError
 
 Make = Callable[[str], Path]
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0, "gyro.white": 1e-7, "gyro.markov": 1e-7}
@@ -134,7 +134,7 @@ def test_nothing_or_a_damaged_file_is_refused(small: System, tmp_path: Path) -> 
     again: dict[str, Any] = {"values": QUICK, "seed": 5, "out": tmp_path / "r", "resume": True}
     with pytest.raises(ResumeError, match=r"no interrupted run to continue in .*/r \(there is no checkpoint.npz\)"):
         run(small, **again)
-    with pytest.raises(ValueProblem, match="name the folder of the run"):
+    with pytest.raises(InvalidValueError, match="name the folder of the run"):
         run(small, resume=True)
     stop(small, tmp_path / "r", 0.1)
     file = tmp_path / "r" / FILE

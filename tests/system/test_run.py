@@ -16,9 +16,9 @@ import pytest
 from gyrobench.engine.session import RunError, RunInterrupted, Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.parameters import slot_seed
-from gyrobench.system.system import RefusedError, Slot, System
+from gyrobench.system.system import InvalidConfigurationError, Slot, System
 from gyrobench.system.system_description import describe
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import WiringError
 
 Make = Callable[[str], Path]
@@ -157,13 +157,13 @@ def test_values_are_refused_with_a_hint(small: System) -> None:
         ({"gyro.H": math.nan}, "must be finite"),
         ({"step.": 0}, "no such option"),
     ):
-        with pytest.raises(ValueProblem, match=words):
+        with pytest.raises(InvalidValueError, match=words):
             run(small, values=values)
-    with pytest.raises(RefusedError, match="latitude 0: nothing to see"):
+    with pytest.raises(InvalidConfigurationError, match="latitude 0: nothing to see"):
         run(small, values={"latitude": 0})
-    with pytest.raises(RefusedError, match=r"phase 1 'rest': dwell = 0: must be > 0"):
+    with pytest.raises(InvalidConfigurationError, match=r"phase 1 'rest': dwell = 0: must be > 0"):
         run(small, values={"dwell": 0.0})
-    with pytest.raises(ValueProblem, match="step = 0"):
+    with pytest.raises(InvalidValueError, match="step = 0"):
         run(small, step=0.0)
 
 

@@ -18,8 +18,8 @@ from servoing import DAY50, DPH, W50
 from gyrobench.engine.session import Session
 from gyrobench.reduction.suite.method_comparison import Member, compare, together
 from gyrobench.system.suite import Suite
-from gyrobench.system.system import RefusedError, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.system.values import InvalidValueError
 
 NAME = "drift_test_suite"
 SHORT: dict[str, dict[str, Any]] = {
@@ -234,7 +234,7 @@ def test_seeds_differ_from_test_to_test() -> None:
     ],
 )
 def test_sets_that_are_none_are_refused(tests: str, text: str) -> None:
-    with pytest.raises(RefusedError, match=text):
+    with pytest.raises(InvalidConfigurationError, match=text):
         suite(tests).members()
 
 
@@ -247,7 +247,7 @@ def test_sets_that_are_none_are_refused(tests: str, text: str) -> None:
     ],
 )
 def test_values_for_no_test_are_refused(name: str, text: str) -> None:
-    with pytest.raises(ValueProblem, match=text):
+    with pytest.raises(InvalidValueError, match=text):
         suite("tumble_single_axis servo_polar", **{name: 1.0}).members()
 
 

@@ -22,8 +22,8 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.multi_day_record import combine
 from gyrobench.record.record import Record
 from gyrobench.reduction.result import Result
-from gyrobench.system.system import RefusedError, System, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.values import InvalidValueError
 
 NAME = "eight_position"
 DPH = math.pi / 648000.0
@@ -212,16 +212,16 @@ REFUSED = [
 
 @pytest.mark.parametrize(("values", "said"), REFUSED)
 def test_refused_before_running(session: Session, values: dict[str, Any], said: str) -> None:
-    with pytest.raises(RefusedError) as error:
+    with pytest.raises(InvalidConfigurationError) as error:
         session.run({**SHORT, **values})
     assert said in str(error.value)
 
 
 def test_bounds_and_warnings(session: Session) -> None:
     for values in ({"settle": 0.5}, {"cycles": 13}, {"latitude": "95deg"}, {"dwell": "1m"}):
-        with pytest.raises(ValueProblem):
+        with pytest.raises(InvalidValueError):
             load().with_values(values)
-    with pytest.raises(RefusedError, match="exchange once a step"):
+    with pytest.raises(InvalidConfigurationError, match="exchange once a step"):
         session.run(SHORT, step=0.01)
     record = session.run({**SHORT, **QUIET, "latitude": math.radians(81.0), "table.tilt": [math.radians(0.5), 0.0]})
     assert any("beyond 80°" in n for n in record.meta["notes"])

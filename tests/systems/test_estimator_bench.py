@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from gyrobench.engine.session import PartRefusal, Session, run
+from gyrobench.engine.session import ParameterRefusedError, Session, run
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.report.comparison_page import comparison
-from gyrobench.system.system import RefusedError, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.system.values import InvalidValueError
 
 Command = Callable[..., tuple[int, str, str]]
 NAME = "estimator_bench"
@@ -165,11 +165,16 @@ def test_what_is_known_is_set_where_the_part_has_it() -> None:
 # --------------------------------------------------------------------------------------- refusals
 def test_refusals() -> None:
     system = load_system(NAME)
-    with pytest.raises(RefusedError, match="benchmark = sin: one of sine, change, level, ar3"):
+    with pytest.raises(InvalidConfigurationError, match="benchmark = sin: one of sine, change, level, ar3"):
         system.with_values({"benchmark": "sin"}).refuse()
-    with pytest.raises(RefusedError, match="samples = 9000, of which 3000 are skipped: at least 10000 must be left"):
+    with pytest.raises(
+        InvalidConfigurationError, match="samples = 9000, of which 3000 are skipped: at least 10000 must be left"
+    ):
         system.with_values({"samples": 9000}).refuse()
-    with Session(system) as session, pytest.raises(ValueProblem, match="runs at the sampling period of its benchmark"):
+    with (
+        Session(system) as session,
+        pytest.raises(InvalidValueError, match="runs at the sampling period of its benchmark"),
+    ):
         session.run(step=5e-4)
 
 
@@ -184,7 +189,7 @@ def test_refusals() -> None:
 )
 def test_parts_refuse_before_the_first_step(part: str, values: dict[str, float], text: str) -> None:
     more = {f"estimator.{k}": v for k, v in values.items()}
-    with pytest.raises(PartRefusal, match=text):
+    with pytest.raises(ParameterRefusedError, match=text):
         run(load_system(NAME), {"estimator": f"estimator_{part}"}, values=more)
 
 

@@ -21,8 +21,8 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.estimation import noise
 from gyrobench.reduction.result import Result
-from gyrobench.system.system import RefusedError, System, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.values import InvalidValueError
 
 NAME = "fixed_position"
 DPH = math.pi / 648000.0
@@ -76,7 +76,7 @@ def test_attitudes_by_name() -> None:
 def test_impossible_attitudes(session: Session, text: str, said: str) -> None:
     with pytest.raises(ValueError, match=re.escape(said)):
         parse(text, math.radians(30.0))
-    with pytest.raises(RefusedError, match=re.escape(said)):
+    with pytest.raises(InvalidConfigurationError, match=re.escape(said)):
         session.run({**SHORT, "attitude": text, "latitude": math.radians(30.0)})
 
 
@@ -165,12 +165,12 @@ def test_refusals(session: Session) -> None:
         ({"k": -1.0}, "scale factor k = -1"), ({"gravity": 9.0}, "gravity 9 m/s²"),
         ({"gyro.mount": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "gyro.mount: determinant"),
     ):  # fmt: skip
-        with pytest.raises(RefusedError, match=re.escape(said)):
+        with pytest.raises(InvalidConfigurationError, match=re.escape(said)):
             session.run({**SHORT, **values})
     for values in ({"settle": 0.2}, {"readings": 7}, {"latitude": "91deg"}):
-        with pytest.raises(ValueProblem):
+        with pytest.raises(InvalidValueError):
             load().with_values(values)
-    with pytest.raises(RefusedError, match="exchanges once a step"):
+    with pytest.raises(InvalidConfigurationError, match="exchanges once a step"):
         session.run(SHORT, step=0.01)
     record = session.run({**SHORT, **QUIET, "attitude": "U E", "rebalance.i_max": 1e-4})
     with pytest.raises(ValueError, match="flagged windows"):

@@ -15,7 +15,7 @@ from gimballed import DEG, STILL, measures, session, table
 from gyrobench.engine.session import RunError, Session
 from gyrobench.reduction.result import Result
 from gyrobench.system.loop_plan import LoopPhase
-from gyrobench.system.system import RefusedError, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "platform_four_gimbal"
 QUIET = {**STILL, "load": 0.0, "hold": 1.0}
@@ -172,7 +172,7 @@ def test_three_gimbals_in_the_launch() -> None:
     ],
 )
 def test_refusals(bench: Session, values: dict[str, Any], says: str) -> None:
-    with pytest.raises(RefusedError, match=says):
+    with pytest.raises(InvalidConfigurationError, match=says):
         bench.run({**QUIET, **values})
 
 

@@ -18,7 +18,7 @@ from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.result import Result
-from gyrobench.system.system import RefusedError, System, load_system
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
 NAME = "open_loop_drift"
 DPH = math.pi / 648000.0
@@ -133,7 +133,7 @@ def test_budget_by_hand(session: Session) -> None:
     ],
 )  # fmt: skip
 def test_refused_before_running(session: Session, values: dict[str, Any], said: str) -> None:
-    with pytest.raises(RefusedError, match=re.escape(said)):
+    with pytest.raises(InvalidConfigurationError, match=re.escape(said)):
         session.run({**SHORT, **values})
 
 

@@ -15,8 +15,8 @@ from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rat
 from gyrobench import frames
 from gyrobench.engine.session import RunError, Session, run
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.system.system import RefusedError, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.system.values import InvalidValueError
 
 NAME = "servo_polar"
 LIMIT = 1e-6  # deg/h per g^n
@@ -166,7 +166,7 @@ def test_saturated_pickoff_is_refused(day: Any) -> None:
     ],
 )
 def test_refused_before_anything_runs(polar: Session, values: dict[str, Any], text: str) -> None:
-    with pytest.raises((RefusedError, ValueProblem), match=text):
+    with pytest.raises((InvalidConfigurationError, InvalidValueError), match=text):
         polar.run(values)
 
 

@@ -32,8 +32,8 @@ from servoing_two_axes import (
 from gyrobench import drift, frames
 from gyrobench.engine.session import RunError, Session, run
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.system.system import RefusedError, load_system
-from gyrobench.system.values import ValueProblem
+from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.system.values import InvalidValueError
 
 ARCSEC = math.pi / 648000.0
 PHI = math.radians(45.75)
@@ -210,7 +210,7 @@ def test_dynamic_against_quasi_static(table: Session) -> None:
     ],
 )
 def test_refused_before_anything_runs(table: Session, values: dict[str, Any], text: str) -> None:
-    with pytest.raises((RefusedError, ValueProblem), match=text):
+    with pytest.raises((InvalidConfigurationError, InvalidValueError), match=text):
         table.run(values)
 
 

@@ -14,7 +14,7 @@ from servoing import DPH, QUIET, errors, expected_rate, gyro, held, latitude
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.system.system import RefusedError, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "servo_vertical_level"
 SHORT: dict[str, Any] = {"dwell": 60.0, "settle": 2.0, "cycles": 1}
@@ -122,7 +122,7 @@ def test_noise_and_composite(bench: Session) -> None:
     ],
 )
 def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], text: str) -> None:
-    with pytest.raises(RefusedError, match=text):
+    with pytest.raises(InvalidConfigurationError, match=text):
         bench.run(values)
 
 

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from gyrobench.engine.session import Session
 from gyrobench.reduction.loops import margins
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
-from gyrobench.system.system import RefusedError, System, load_system
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
 NAME = "stabilizer_floated_2dof"
 ARCSEC = math.pi / 648000.0
@@ -276,7 +276,7 @@ def test_the_second_channel_is_caged() -> None:
     ],
 )
 def test_refuses(values: dict[str, Any], says: str) -> None:
-    with pytest.raises(RefusedError, match=says):
+    with pytest.raises(InvalidConfigurationError, match=says):
         load().with_values(values).refuse()
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.engine.session import PartRefusal, RunError, Session
+from gyrobench.engine.session import ParameterRefusedError, RunError, Session
 from gyrobench.linear.linear_model import poles, unstable
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
@@ -139,10 +139,10 @@ def test_routh_limit_in_the_co_simulation(share: float, grows: bool, caplog: pyt
 
 
 def test_k_m_beyond_the_limit_is_refused(steps: Session) -> None:
-    with pytest.raises(PartRefusal, match=r"at or beyond the Routh limit 1440 N\.m/rad.*allow_unstable"):
+    with pytest.raises(ParameterRefusedError, match=r"at or beyond the Routh limit 1440 N\.m/rad.*allow_unstable"):
         steps.run({**STILL, "K_m": 1450.0})
     steps.run({**STILL, "K_m": 1430.0})
-    with pytest.raises(PartRefusal, match="Routh limit 720"):  # (10/0.5 + 2/0.05) (10 + 2) = 60 12
+    with pytest.raises(ParameterRefusedError, match="Routh limit 720"):  # (10/0.5 + 2/0.05) (10 + 2) = 60 12
         steps.run({**STILL, "K_m": 725.0, "gyro.J_y": 0.05})
 
 

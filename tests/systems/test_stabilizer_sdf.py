@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from gyrobench.engine.session import Session
-from gyrobench.system.system import RefusedError, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "stabilizer_sdf"
 SYSTEM = load_system(NAME)
@@ -254,7 +254,7 @@ def test_the_stop_ends_the_run(session, tmp_path, command):
     ],
 )
 def test_refuses(values, message):
-    with pytest.raises(RefusedError, match=message):
+    with pytest.raises(InvalidConfigurationError, match=message):
         load_system(NAME).with_values(values).refuse()
 
 

@@ -14,7 +14,7 @@ from gyrobench.engine.session import RunError, Session
 from gyrobench.linear.linear_model import unstable
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase
-from gyrobench.system.system import RefusedError, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "platform_three_gimbal"
 EXACT = {**STILL, "mounting": 0.0, "torquer": 0.0, "load": 0.0, "command": 0.0, "hold": 1.0}
@@ -212,5 +212,5 @@ def test_drift_command_and_monitor_of_the_whole_run(whole: Any) -> None:
     ],
 )
 def test_refusals(quick: Session, values: dict[str, Any], says: str) -> None:
-    with pytest.raises(RefusedError, match=says):
+    with pytest.raises(InvalidConfigurationError, match=says):
         quick.run({**EXACT, **values})

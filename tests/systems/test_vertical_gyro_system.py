@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyrobench.engine.session import PartRefusal, RunError, Session
-from gyrobench.system.system import RefusedError, load_system
+from gyrobench.engine.session import ParameterRefusedError, RunError, Session
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "vertical_gyro"
 SYSTEM = load_system(NAME)
@@ -111,7 +111,7 @@ def test_lock_without_ring_ends_the_run(session):
     """A pitch without the loop phase's guard: the part itself ends the run, with time."""
     table = [36.0 * DEG] + [0.0] * 98
     values = {"ring": 0, "phases": "erection", **{f"motion.pitch[{k + 1}]": x for k, x in enumerate(table[:1])}}
-    with pytest.raises((PartRefusal, RunError), match="the gimbals have locked"):
+    with pytest.raises((ParameterRefusedError, RunError), match="the gimbals have locked"):
         record = session.run(values, seed=1)
         raise RunError("; ".join(map(str, record.meta.get("notes", []))) + str(record.meta.get("stopped", "")))
 
@@ -127,10 +127,10 @@ def test_lock_without_ring_ends_the_run(session):
     ],
 )
 def test_refuses(values, message):
-    with pytest.raises(RefusedError, match=message):
+    with pytest.raises(InvalidConfigurationError, match=message):
         load_system(NAME).with_values(values).refuse()
 
 
 def test_gyro_and_erection_must_agree_on_H(session):
-    with pytest.raises(RefusedError, match=r"gyro.H = 0.7 and erection.H = 0.5 N.m.s"):
+    with pytest.raises(InvalidConfigurationError, match=r"gyro.H = 0.7 and erection.H = 0.5 N.m.s"):
         session.run({"gyro.H": 0.7}, seed=1)

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
+from gyrobench.errors import GyrobenchError
+
 Array = NDArray[np.float64]
 
 
-class RegressionError(ValueError):
+class RegressionError(GyrobenchError, ValueError):
     """The data cannot carry the model; the message names the coefficients concerned."""
 
 

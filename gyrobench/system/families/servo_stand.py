@@ -206,7 +206,7 @@ def problems(parameters: Mapping[str, Any], plan: Plan) -> list[str]:
 
 def read(system: System, data: Path, values: Mapping[str, str], known: Sequence[str]) -> Record:
     """A laboratory's CSV (phase, t_start, t_end, angle_start, angle_end; mean, std, n, flagged) with the attitudes
-    ``known``.  Raises DataError, and ValueProblem for an option that does not fit.
+    ``known``.  Raises DataError, and InvalidValueError for an option that does not fit.
     """
     columns = tuple(
         replace(c, unit="V", meaning="pickoff voltage", required=False) if c.name in ("mean", "std") else c
