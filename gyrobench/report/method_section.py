@@ -16,11 +16,11 @@ from gyrobench.report.page_model import (
     Picture,
     Row,
     Table,
-    Text,
     number_cell,
     pictures,
     text_cell,
 )
+from gyrobench.report.references import source_blocks
 from gyrobench.report.result_json import look
 
 Json = dict[str, Any]
@@ -29,8 +29,7 @@ Json = dict[str, Any]
 def model(doc: Json) -> list[Any]:
     blocks: list[Any] = [Equation(doc["equation"])] if doc["equation"] else []
     blocks += [Items(doc["conventions"])] if doc["conventions"] else []
-    blocks += [Text("Sources: " + "; ".join(doc["sources"]) + ".", quiet=True)] if doc["sources"] else []
-    return blocks
+    return blocks + source_blocks(doc["sources"])
 
 
 def system(doc: Json) -> list[Any]:

@@ -22,6 +22,7 @@ from gyrobench.report.page_model import (
     number_cell,
     text_cell,
 )
+from gyrobench.report.references import source_blocks
 from gyrobench.report.signature_section import signing
 from gyrobench.report.style import BLUE, HALF, INK, MUTED, VERMILION, axis_label, figure, styled, svg
 from gyrobench.report.tables import compact, heading
@@ -300,7 +301,7 @@ def _how(doc: Json) -> list[Any]:
     if rows:
         caption = "Quantities that are combinations of coefficients (factors in powers of g)."
         blocks.append(Table([Column("quantity"), Column("is", wide=True)], rows, caption))
-    return [*blocks, Text("Sources: " + "; ".join(doc["sources"]) + ".", quiet=True)]
+    return [*blocks, *source_blocks(doc["sources"])]
 
 
 def _provenance(doc: Json) -> list[Any]:
