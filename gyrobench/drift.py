@@ -4,7 +4,7 @@ Hu 1981, eq. 2-27..2-49]
     omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
 
 omega_d is the drift in precession sign (rate of the rotor axis about the input axis; rebalance gives k i =
-omega_IA - omega_d), (X, Y, Z) = -f/g0 the specific force along I, O, S in the book's sign, in multiples of g0
+omega_IA - omega_d), (X, Y, Z) = -f/g0 the specific force along I, O, S in the sign of Hu 1981, in multiples of g0
 = 9.80665 m/s2. Coefficients are in rad/s (per g0, per g0 squared); at the surface in deg/h, deg/h/g,
 deg/h/g2.
 
@@ -100,7 +100,7 @@ def terms_2dof(channel: str, which: int) -> tuple[str, ...]:
 
 
 def regressors(xyz: ArrayLike, names: tuple[str, ...] = NAMES) -> NDArray[np.float64]:
-    """Rows of the design: ``xyz`` (..., 3) in multiples of g0, book sign -> (..., len(names)).
+    """Rows of the design: ``xyz`` (..., 3) in multiples of g0, sign of Hu 1981 -> (..., len(names)).
 
     ``names`` of a two-degree-of-freedom gyro stand over its axes x, y, z, in both channels.
     """
@@ -130,7 +130,7 @@ def drift(xyz: ArrayLike, coefficients: Mapping[str, float]) -> NDArray[np.float
 #: convention -> (sign of the rate against omega_d, sign of the force axis against X, Y, Z)
 CONVENTIONS = {
     "precession": (1, 1),  # the bench: omega_d against -f/g0
-    "torque": (-1, 1),  # the book's 2-40, 3-58, 3-95: omega_M = -omega_d against -f/g0
+    "torque": (-1, 1),  # Hu 1981, eq. 2-40, 3-58, 3-95: omega_M = -omega_d against -f/g0
     "precession_f": (1, -1),  # omega_d against +f/g0: linear terms change sign
     # indicated rate omega_IA + omega_M against +f/g0 (own derivation from sign definitions)
     "ieee": (-1, -1),
@@ -140,7 +140,7 @@ CONVENTIONS = {
 def change_sign(coefficients: Mapping[str, float], from_: str, to: str) -> dict[str, float]:
     """Coefficients written in convention ``from_`` rewritten in ``to`` (keys of :data:`CONVENTIONS`).
 
-    Turning the force axis round changes the linear terms only; turning the rate round changes all.  [IEEE]
+    Turning the force axis round changes the linear terms only; turning the rate round changes all.  [CONV-SIGNS]
     """
     for c in (from_, to):
         if c not in CONVENTIONS:
@@ -219,7 +219,7 @@ def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer:
     ``m``: mass of rotor and inner gimbal, kg.  ``physical``: M_x, M_y (constant torques, N.m), l_x, l_y, l_z (m),
     K_ij (m/N; displacement along i per unit force along j) or the differences K_zz-K_xx, K_zz-K_yy.  ``outer``:
     mass of the outer gimbal times its arm along z, kg.m; it acts about the outer axis only, so that
-    Dy_y = -(m l_z + outer) g0/H and Dx_x = -m l_z g0/H (u_zx and u_zy of the book).  Only what ``physical``
+    Dy_y = -(m l_z + outer) g0/H and Dx_x = -m l_z g0/H (u_zx and u_zy of Hu 1981).  Only what ``physical``
     determines is returned.  Raises ValueError as :func:`from_physical` does, naming the channel.
     """
     _positive(H, m)
@@ -282,7 +282,7 @@ def merge(coefficients: Mapping[str, float], H: float, m: float, physical: Mappi
 
 _DPH = DEG / 3600.0
 #: The standard gyro, rad/s per g0^n.  R = 0.3, U_z = 0.9, U_x = -0.7 deg/h(/g), K_zz-K_xx = 0.15, K_zx =
-#: 0.05, K_xz = 0.04, K_zy = 0.03, K_xy = -0.02 deg/h/g2 in torque sign (book ranges, spec d1 section 1)
+#: 0.05, K_xz = 0.04, K_zy = 0.03, K_xy = -0.02 deg/h/g2 in torque sign (ranges of Hu 1981)
 #: turned into precession sign; D_O = 0.1 deg/h/g is empirical (no rigid-body cause); D_OO = 0.
 STANDARD: dict[str, float] = {
     n: v * _DPH

@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.packaging.instance import make
 
 Array = np.ndarray[Any, Any]
-AR3 = (-0.7466, -0.5044, -0.2538)  # table 3.4.2 of the thesis with its sign put right
+AR3 = (-0.7466, -0.5044, -0.2538)  # table 3.4.2 of Xia 2008 with its sign put right
 SIGMA2 = 3.3697e-6  # its innovation variance
 
 
@@ -76,7 +76,7 @@ def rate_model(q: float, T: float, walk: float = 0.0) -> tuple[Array, Array]:
 
 
 def kalman(z: Array, F: Array, G: Array, R: float, P0: Array, valid: Array | None = None) -> Array:
-    """(n, 4): estimate, variance, innovation, nis of the textbook filter in matrices, H = [1 0 ... 0]."""
+    """(n, 4): estimate, variance, innovation, nis of the filter written in matrices, H = [1 0 ... 0]."""
     n = len(F)
     H = np.eye(1, n)
     x, P = np.zeros((n, 1)), np.array(P0, dtype=float)

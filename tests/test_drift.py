@@ -105,7 +105,7 @@ def test_two_channels_are_the_cross_product() -> None:
     y = {n: v for n, v in D.items() if n.startswith("Dy")}
     assert float(drift.drift(SF / G0, x)) == pytest.approx(-torque[1] / H, rel=1e-12)
     assert float(drift.drift(SF / G0, y)) == pytest.approx(about_x / H, rel=1e-12)
-    # the table of the spec, entry by entry
+    # the table of GYRO-STATIC-8, entry by entry
     q = m * m * G0 * G0 / H
     assert D["Dy_xy"] == pytest.approx(-q * K[2, 0]) and D["Dy_xz"] == pytest.approx(q * K[1, 0])
     assert D["Dy_yz"] == pytest.approx(q * (K[1, 1] - K[2, 2])) and D["Dy_yy"] == pytest.approx(-q * K[2, 1])
@@ -133,7 +133,7 @@ def test_two_channels_names_and_refusals() -> None:
 
 
 def test_signs() -> None:
-    """[IEEE] SF -> -f changes the linear terms; torque sign changes all."""
+    """[CONV-SIGNS] SF -> -f changes the linear terms; torque sign changes all."""
     D = dict(zip(drift.NAMES, rng.normal(size=10), strict=True))
     v = rng.normal(size=3)
     here = float(drift.drift(v, D))

@@ -46,12 +46,12 @@ def test_factor(name: str, factor: float) -> None:
 
 def test_one_arcsec_per_second_is_one_degree_per_hour() -> None:
     assert convert(1.0, "arcsec/s", "deg/h") == pytest.approx(1.0, rel=1e-15)
-    assert convert(1.0, "deg/h", "rad/s") == pytest.approx(4.8481368e-6, rel=1e-8)  # spec d1, 0.1
+    assert convert(1.0, "deg/h", "rad/s") == pytest.approx(4.8481368e-6, rel=1e-8)  # CONV-FRAMES
 
 
 def test_earth_rate() -> None:
     assert convert(1.0, "ERU", "deg/h") == pytest.approx(15.041, abs=1e-3)
-    assert convert(1.0, "mERU", "deg/h") == pytest.approx(0.015041, abs=1e-6)  # [EX-MERU], E1: not 0.01541
+    assert convert(1.0, "mERU", "deg/h") == pytest.approx(0.015041, abs=1e-6)  # E1: not 0.01541
 
 
 @pytest.mark.parametrize(

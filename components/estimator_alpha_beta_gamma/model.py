@@ -23,7 +23,7 @@ class EstimatorAlphaBetaGamma(Component):
     The first reading starts it (x = z, v = a = 0).  A reading with valid = 0 is left out: it predicts only.
 
     Not modelled: gains that change with time (see estimator_kalman_rate), limits of the states.
-    Source: Benedict and Bordner 1962; stability: Tenne and Singh 2002.  Comparison filter of BENCH-DYN-SINE.
+    Source: Benedict 1962; stability: Tenne 2002.  Comparison filter of BENCH-DYN-SINE.
     """
 
     version = "1.0.0"

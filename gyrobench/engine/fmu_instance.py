@@ -69,7 +69,7 @@ def _log(environment: int | None, instance: bytes, status: int, category: bytes,
 
 
 def _callbacks(identity: int) -> Any:
-    """FMI 2 callbacks that log into the book ``identity``.
+    """FMI 2 callbacks that log into the messages of ``identity``.
 
     FMPy's proxy formats the variadic message and forwards it to one logger for the whole process, so that one
     dispatches by the component environment.

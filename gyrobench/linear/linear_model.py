@@ -4,7 +4,7 @@ A system names its loops by the input where each is opened, ``loops = {"pitch": 
 exciter is linearized at the operating point, which is the start of the run with the outputs propagated along the
 wires; excitations come in from outside.  Two models are made:
 
-``continuous``  the wires carry every value at once: what a textbook analyses.
+``continuous``  the wires carry every value at once: what control theory analyses.
 ``discrete``    the co-simulation itself: one macro step runs the parts in their order, each exactly discretized with
                 its inputs held; a cut wire carries the value of the step before.  The communication step and every
                 inserted delay are in it, to rounding for parts that are integrated exactly.

@@ -25,7 +25,7 @@ class Coefficient:
     p: float | None = None  # two-sided p of t
     u_a: float | None = None  # type A part of u
     dof: float | None = None
-    closed: float | None = None  # the book's closed formula (corrected), same unit
+    closed: float | None = None  # the source's closed formula (corrected), same unit
     truth: float | None = None  # simulated runs only
     z: float | None = None  # (estimate - truth) / u
     limit: tuple[float | None, float | None] | None = None

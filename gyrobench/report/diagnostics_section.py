@@ -142,7 +142,7 @@ def estimates(doc: Json) -> list[Any]:
                     ]
                 )
             )
-    caption = "Uncertainty of each estimate, and the book's closed formula against the reported estimate."
+    caption = "Uncertainty of each estimate, and the source's closed formula against the reported estimate."
     blocks.append(Table(columns, rows, caption, small=True))
     z = [c["z"] for c in doc["coefficients"]]
     blocks += pictures(

@@ -6,7 +6,7 @@ motor axes comes in the A order: (1) x_f pitch, (2) y_r roll, (3) z_a azimuth.  
 the platform, the innermost element, are along its own axes x, y, z.  A system with one axis uses element 1.
 
 Sign round a loop: a gyro's u is positive for a positive inertial rate about its input axis; the stabilizer carries
-the minus (v = -K F(s) e); a positive voltage makes a positive motor torque.  [spec d3, section 0]
+the minus (v = -K F(s) e); a positive voltage makes a positive motor torque.  [CONV-GIMBALS]
 """
 
 from __future__ import annotations

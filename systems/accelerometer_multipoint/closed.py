@@ -1,4 +1,4 @@
-"""The book's closed formulas from the harmonics of one mount, in their exact form.  [ACC, ACC-EXACT; eq. 3-44..3-46]
+"""Closed formulas of Hu 1981 from the harmonics of one mount, in exact form.  [ACC, ACC-EXACT; eq. 3-44..3-46]
 
     y = A0 + sum A_n cos n theta + B_n sin n theta, n = 1 ... 3,      theta_0 = atan2(-A1, -B1)
     a_n = A_n cos n theta_0 - B_n sin n theta_0,                      b_n = A_n sin n theta_0 + B_n cos n theta_0

@@ -6,7 +6,7 @@ angle theta, the input axis x of both mounts rises:
     a   output axis y against the table axis, pendulum axis z(0) up:     (X, Y, Z) = gamma (-sin t, 0, -cos t)
     b   pendulum axis z against the table axis, output axis y(0) down:   (X, Y, Z) = gamma (-sin t, cos t, 0)
 
-with t = theta + theta_0, gamma = g/g0 and the book's sign, (X, Y, Z) = -f/g0: an axis that points up reads -gamma.
+with t = theta + theta_0, gamma = g/g0 and the sign of Hu 1981, (X, Y, Z) = -f/g0: an axis that points up reads -gamma.
 theta_0 is the zero of the head and the error of the input axis together; one mount cannot tell them apart.
 [ACC; Hu 1981, eq. 3-38..3-43]
 """

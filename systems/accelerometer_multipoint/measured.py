@@ -28,7 +28,7 @@ TEMPLATE = """\
 #   a   output axis along the axis of the head, pendulum axis up at angle 0 (gives k5)
 #   b   pendulum axis along the axis of the head, output axis down at angle 0 (gives k4)
 # angle: of the head; start and end are equal, a reading belongs to one position.  4, or at least 7, positions.
-# mean: rebalance current, negative with the input axis up (book sign).  std, n, flagged: optional.
+# mean: rebalance current, negative with the input axis up (sign of Hu 1981).  std, n, flagged: optional.
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """

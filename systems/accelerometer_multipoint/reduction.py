@@ -60,7 +60,7 @@ for _shown in SEEN.values():
     _shown["k1"] = "k1 + k3γ²"
 SOURCES = [
     "TEST-ACC-MULTI, ACC-EXACT; Hu 1981, eq. 3-38..3-46",
-    "RED-OLS, RED-GLS; Hu 1981, eq. 4-64..4-88, divisor n − p",
+    "RED-OLS, RED-GLS; Hu 1981, eq. 4-64..4-88, corrected by ER23",
 ]
 
 
@@ -85,7 +85,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
     zeros, k = model.solve(v, gamma)
     if all(abs(z) > 0.5 * math.pi for z in zeros.values()):
         raise ReductionError(
-            "the current is positive with the input axis up, the book's sign is the opposite: turn its sign round "
+            "the current is positive with the input axis up, the sign of Hu 1981 is the opposite: turn its sign round "
             "(or the sense of the angle)"
         )
     if problems := zero_problems(zeros):
@@ -269,8 +269,8 @@ def _equation(model: Model) -> str:
 
 def _conventions(s: Setup, model: Model) -> list[str]:
     return [
-        "X, Y, Z = −f/g0 along input, output and pendulum axis (book sign: an axis that points up reads −γ); "
-        "g0 = 9.80665 m/s². Against +f/g0 (IEEE) k1 and k3 change sign; k0, k2, k4, k5 do not.",
+        "X, Y, Z = −f/g0 along input, output and pendulum axis (sign of Hu 1981: an axis that points up reads −γ); "
+        "g0 = 9.80665 m/s². Against +f/g0 k1 and k3 change sign; k0, k2, k4, k5 do not.",
         f"k are multiples of g0 with λ = {s.scale / G0 * 1e-3:.9g} g0/mA; γ = g/g0 = {s.gamma:.7f}.",
         "θ counts from where the input axis is level, in the sense in which it rises; θ₀ is the zero of the head and "
         "the error of the input axis together, which no multi-position test separates.",

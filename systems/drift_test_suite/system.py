@@ -13,7 +13,7 @@ class DriftTestSuite(Suite):
     """A chosen set of drift tests on one gyro; the same coefficient by every method that sees it, with normalized
     errors and a test whether the methods agree.
 
-    [CROSS-MAP; Hu 1981, ch. 3; spec d1, 2 and 7]
+    [CROSS-MAP, TEST-CHOICE; Hu 1981, ch. 3]
     """
 
     title = "Drift tests of one gyro by several methods"
@@ -29,12 +29,12 @@ class DriftTestSuite(Suite):
         "and compared where two methods or more see the same quantity"
     )
     sources = (
-        "CROSS-MAP; the book's choice guide, Hu 1981, ch. 3",
+        "CROSS-MAP, TEST-CHOICE; Hu 1981, ch. 3",
         "E_n: ISO 13528; consistency: B. L. Welch, Biometrika 38 (1951) 330; R. T. Birge, Phys. Rev. 40 (1932) 207; "
         "S. Holm, Scand. J. Stat. 6 (1979) 65",
     )
     conventions = (
-        "Book and model: D_F = −R, D_I = −U_z, D_S = U_x, D_IS = −(K_zz − K_xx), D_II = −K_zx, D_SS = K_xz, "
+        "Hu 1981 and model: D_F = −R, D_I = −U_z, D_S = U_x, D_IS = −(K_zz − K_xx), D_II = −K_zx, D_SS = K_xz, "
         "D_IO = −K_zy, D_OS = K_xy (torque sign to precession sign).",
         "Where |f| is 1 g in all attitudes D_OO cannot be told apart: D_F stands for D_F + γ² D_OO, D_II for D_II − "
         "D_OO, D_SS for D_SS − D_OO; of a gyro with two axes Dx_yy and Dy_xx alike.",

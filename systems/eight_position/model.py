@@ -12,7 +12,7 @@ in k - k0 and in all other unknowns.  In these positions no two of g_x, g_y, g_z
     u_y = gamma Dy_z - gamma^2 (Dy_zz - Dy_xx)   u_x = gamma Dx_z - gamma^2 (Dx_zz - Dx_yy)
     q_y = gamma^2 (Dy_yy - Dy_xx), s_y = gamma Dy_x      q_x = gamma^2 (Dx_xx - Dx_yy), s_x = gamma Dx_y
 
-Dy_xx and Dx_yy have no physical cause; without them the book's u_y is u_y - K_yz g^2 and u_x is u_x - K_xz g^2.
+Dy_xx and Dx_yy have no physical cause; without them the u_y of Hu 1981 is u_y - K_yz g^2 and u_x is u_x - K_xz g^2.
 With four unknowns q and s are taken as zero.
 """
 

@@ -1,4 +1,4 @@
-"""The eight positions of the book and its closed formulas, corrected.  [POS8-FRAMES, POS8-MODEL+REDUCE; eq. 3-2..3-11]
+"""The eight positions of Hu 1981 and its closed formulas, corrected.  [POS8-FRAMES, POS8-MODEL+REDUCE; eq. 3-2..3-11]
 
     position    1    2    3    4    5    6    7    8         x, y: gimbal axes, z: spin axis, right-handed
     x           E    N   -E   -N    U   -E   -U    E
@@ -70,7 +70,7 @@ def spreads(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, lat
 
 
 def earth_and_gravity(attitude: Array, latitude: float) -> tuple[Array, Array]:
-    """Direction of the Earth's rate and of the book's specific force (down) in gyro axes, unit vectors."""
+    """Direction of the Earth's rate and of the specific force of Hu 1981 (down) in gyro axes, unit vectors."""
     pole = np.array([0.0, math.cos(latitude), math.sin(latitude)])
     return attitude @ pole, attitude @ -U
 

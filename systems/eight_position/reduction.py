@@ -1,8 +1,8 @@
 """Reduction of the eight-position test: scale factors, constant drifts and unbalances of both channels.
 
-As in the book the readings of a position are averaged to one datum of the cycle (with fewer than four cycles each
+As in Hu 1981 the readings of a position are averaged to one datum of the cycle (with fewer than four cycles each
 reading is a datum).  The data are rows of two fits, current about x and current about y, under a noise model estimated
-from the same record; with six unknowns a channel the estimates are the book's closed formulas whenever all positions
+from the same record; with six unknowns a channel the estimates are its closed formulas whenever all positions
 weigh alike.  Repeats on several days are reduced day by day and then together.
 [TEST-8POS, POS8-MODEL+REDUCE, POS8-LS; Hu 1981, eq. 3-1..3-11, Table 3-1, corrected by E17-E19]
 
@@ -36,8 +36,8 @@ DPH = units.factor("deg/h")
 AVERAGED = 4  # cycles from which on the readings of a position are averaged first
 SOURCES = [
     "TEST-8POS, POS8-MODEL+REDUCE; Hu 1981, eq. 3-1..3-11, corrected by E17, E18",
-    "POS8-LS, POS8-QUAD; GYRO-STATIC-2DOF, Hu 1981, eq. 2-29..2-46",
-    "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
+    "POS8-LS, POS8-QUAD; GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46, corrected by E7-E9",
+    "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
 ]
 
 

@@ -1,4 +1,4 @@
-"""What makes an eight-position test impossible: latitude, options, attitudes, record.  [POS8-POLE; spec d1, 4.2, 8]"""
+"""What makes an eight-position test impossible: latitude, options, attitudes, record.  [POS8-POLE; INPUT-LIMITS]"""
 
 from __future__ import annotations
 

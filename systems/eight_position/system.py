@@ -76,7 +76,7 @@ class EightPosition(System):
         "dwell": Option(60.0, "s", "time of the readings in each position"),
         "settle": Option(10.0, "s", "wait before the readings, after each change of position", 1.0),
         "sigma": Option(True, bool, "scatter over the cycles is asked for (at least two cycles)"),
-        "terms": Option(6, int, "unknowns of a channel: 4 (the book's) or 6 (with two compliance differences)", 4, 6),
+        "terms": Option(6, int, "unknowns of a channel: 4 (Hu 1981) or 6 (with two compliance differences)", 4, 6),
         "u_attitude": Option(0.0, "rad", "standard uncertainty of each position, about each axis, independent", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the gyro in its fixture, about each axis", 0.0),
         "u_latitude": Option(0.0, "rad", "standard uncertainty of the latitude", 0.0),

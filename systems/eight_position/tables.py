@@ -138,7 +138,7 @@ def _cycles(
 
 
 def _book_fit(position: NDArray[np.int_], mean: Mapping[str, Array], s: model.Setup) -> Table:
-    """The spec's least squares with four unknowns a channel beside the closed formulas.  [POS8-LS]"""
+    """Least squares with four unknowns a channel beside the closed formulas.  [POS8-LS]"""
     by = {c: _by_position(position, mean[c]) for c in "xy"}
     closed = positions.closed(by["x"], by["y"], s.earth_rate, s.latitude)
     d = model.directions(np.array(list(positions.ATTITUDES)), s.latitude)

@@ -1,4 +1,4 @@
-"""The benchmarks of spec d3: what the source sends, and what a designer knows of it when he sets an estimator.
+"""Benchmarks of estimators: what the source sends, and what a designer knows of it when he sets an estimator.
 
 ``source``, ``estimator``: parameters of the parts in these slots; an estimator without one of them stays as it is.
 """
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-SIGMA = 1.643e-3  # noise of a reading, from the drift table of the thesis [DRIFT-ARIMA310]
+SIGMA = 1.643e-3  # noise of a reading, from the drift table of Xia 2008 [DRIFT-ARIMA310]
 SIGMA2_AR3 = 3.3697e-6  # innovation variance of its AR(3)
 R_LEVEL = 2.70e-6
 AR3 = [-0.7466, -0.5044, -0.2538, 0.0, 0.0]
@@ -52,7 +52,7 @@ BENCHMARKS = {
          "walk": 1e-3 * R_LEVEL / 5.0},
     ),
     "ar3": Benchmark(
-        "AR(3) of the thesis with its sign put right, readings of R = Q = 3.3697e-6 [BENCH-DRIFT-AR3]",
+        "AR(3) of Xia 2008 with its sign put right, readings of R = Q = 3.3697e-6 [BENCH-DRIFT-AR3]",
         5.0, 17158, 500, 2000,
         {**QUIET, "p": 3, "phi": AR3, "w": math.sqrt(SIGMA2_AR3), "white": math.sqrt(SIGMA2_AR3)},
         {"p": 3, "Q": SIGMA2_AR3, "R": SIGMA2_AR3, "R0": SIGMA2_AR3, "sigma": math.sqrt(SIGMA2_AR3)},

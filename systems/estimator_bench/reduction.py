@@ -86,7 +86,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> R
         method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
         sources=[
             "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; Xia 2008, sections 3.4.5, 4.4.2",
-            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; Xia 2008, sections 4.2, 4.3",
+            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; Xia 2008, sections 4.2, 4.3, corrected by EX14, EX19-EX23",
         ],
         equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
         conventions=[

@@ -116,7 +116,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
         title="Fixed-position test of a floated gyro",
         method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
         sources=["TEST-FIXED; Hu 1981, ch. 3 par. 2.2",
-                 "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p"],
+                 "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
         equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
         conventions=_conventions(setup),
         effects=_effects(setup, found, i),

@@ -1,4 +1,4 @@
-"""What makes a fixed-position test impossible.  [spec d1, 4.0 and 8]"""
+"""What makes a fixed-position test impossible.  [TEST-FIXED, INPUT-LIMITS]"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What makes an open-loop test impossible.  [spec d1, 4.0 and 8]"""
+"""What makes an open-loop test impossible.  [TEST-OPEN, INPUT-LIMITS]"""
 
 from __future__ import annotations
 

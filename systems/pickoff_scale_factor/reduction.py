@@ -2,10 +2,10 @@
 
     u = u_0 + S c(alpha) + q (t - t_m) + noise        S = K_sg H/C        q = -S omega_d
 
-u_0 and S are the book's line; q, the drift of the free float during the test, is estimated where the angles are gone
+u_0 and S are that line; q, the drift of the free float during the test, is estimated where the angles are gone
 over twice in opposite order, and otherwise bounded.  The float sees the table rate by the cosine of its angle, b' =
 (H/C) cos(b) alpha', so that its angle is gd(H/C alpha), the Gudermannian function: c = gd(g alpha)/g, g = H/C, which
-falls short of alpha by a sixth of the cube (6e-6 of 20 arcmin).  The book's line, beside it, takes c = alpha.
+falls short of alpha by a sixth of the cube (6e-6 of 20 arcmin).  The line of Hu 1981, beside it, takes c = alpha.
 [TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
 
 Not modelled: drift that changes during the test is noise; an angle of the float at table angle 0.
@@ -129,7 +129,7 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> Result:
         + ', quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
         conventions=_conventions(s, both), effects=_effects(found, s, both), specification=s.specification,
         site=s.site, instrument=s.instrument, simulated=s.truth is not None,
-        closed_caption="The closed formula is the book's line through the readings, without drift",
+        closed_caption="The closed formula is the line of Hu 1981 through the readings, without drift",
         tables=[levels.table()], warnings=_warnings(both, bound, span), random="pickoff noise and random drift",
     )  # fmt: skip
     dense = np.linspace(angle.min(), angle.max(), 61)

@@ -1,7 +1,7 @@
 """The flights of the four-gimbal platform: where the base begins, its legs, and how the fourth gimbal starts.
 
 Base axes: pitch about x (nose up), roll about y (right side down), yaw about z (to the left).  Turned by 180 deg about
-z, the flights of the spec (axes forward, left, up) are these.
+z, the flights of PLATFORM-4GIMBAL (axes forward, left, up) are these.
 """
 
 from __future__ import annotations

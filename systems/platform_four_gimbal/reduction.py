@@ -36,7 +36,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     return found.result(
         title="Four-gimbal platform",
         method="Load steps and sine sweeps of the loops, drift hold, and a flight of the base",
-        sources=["PLATFORM-4GIMBAL; GSP ch. 5, section 5.2.2 (no equations there; spec d4, 9)"],
+        sources=["PLATFORM-4GIMBAL; GSP ch. 5, section 5.2.2 (no equations there)"],
         equation='dot(g)_4 = k G(g_3) g_2, quad G = sec g_3 \\, "sign" cos g_3 \\, 1, '
         "quad dot(g)_2 = -dot(g)_4 cos g_3",
         conventions=[

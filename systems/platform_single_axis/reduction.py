@@ -49,7 +49,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     return found.result(
         title="Stabilized platform on one axis",
         method="Disturbance step, command step, sine sweeps, ride and drift of a loop with a floated gyro in rebalance",
-        sources=["PLATFORM-1AXIS, GYRO-REBALANCE; Xia 2008, section 4.1, fig. 4.1.1 (rebuilt)"],
+        sources=["PLATFORM-1AXIS, GYRO-REBALANCE; Xia 2008, section 4.1, fig. 4.1.1 (rebuilt), corrected by EX3"],
         equation="J dot(omega) = k_t i_m + M_d - H (omega_O + dot(beta)), quad "
         r'v = -G(s) (hat(i) + i_"test" - omega_c\/k)',
         conventions=[

@@ -36,7 +36,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
         "three gimbals",
         sources=[
             "PLATFORM-3AXIS-DYN, PLATFORM-3AXIS-KIN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; Xia 2008, "
-            "ch. 5, eq. 5.1.1-5.2.8 (corrected)"
+            "ch. 5, eq. 5.1.1-5.2.8, corrected by EX24-EX28"
         ],
         equation="M(q) dot.double(q) + b = M_m, quad u_A = T_2 u, quad T_2 = T_1^(-1)",
         conventions=[
@@ -56,7 +56,7 @@ def _norm(points: list[Point]) -> tuple[float, float]:
 
 
 def _coupling(found: LoopFindings) -> str:
-    """Cross over main angle of a commanded sine: [F15] of the bench with 83 mil."""
+    """Cross over main angle of a commanded sine.  [DECOUPLE-BENCH-83MIL]"""
     points, worst = {}, 0.0
     gates = found.of("command", shape="sine")
     for gate in gates:

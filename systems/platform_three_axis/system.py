@@ -15,7 +15,7 @@ from gyrobench.system.system import Option, Slot, System
 
 Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
-MIL = 2.0 * math.pi / 6000.0  # rad; the mil of the source divides the circle by 6000
+MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
 TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
 AXES = ("pitch", "roll", "azimuth")  # motor axes in A order
 NEUTRAL = {"pitch": 1.0, "roll": 2.0, "azimuth": 0.7}  # kg.m2 about them at joint angles 0: each drive is normalized

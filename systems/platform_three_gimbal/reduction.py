@@ -33,7 +33,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
     return found.result(
         title="Three-gimbal platform with two gyros",
         method="A flight of the base; load steps, sine sweeps of the loops, commanded rate, drift hold",
-        sources=["PLATFORM-3GIMBAL-2DOF; GSP ch. 5, section 5.2.1 (no equations there; spec d4, 8)"],
+        sources=["PLATFORM-3GIMBAL-2DOF; GSP ch. 5, section 5.2.1 (no equations there)"],
         equation="[bold(a)_o space bold(a)_m space bold(a)_i] (dot(o), dot(m), dot(i))^T = "
         "T_1 bold(s) - bold(omega)_b, quad det = cos m, quad bold(u)_A = R(i) bold(u)",
         conventions=[

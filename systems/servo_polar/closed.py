@@ -1,4 +1,4 @@
-"""The book's formulas of the polar servo test, corrected.  [SERVO-C3-REDUCE; eq. 3-85..3-88, Table 3-3, E36-E44, E52]
+"""Formulas of Hu 1981 for the polar servo test, corrected.  [SERVO-C3-REDUCE; eq. 3-85..3-88, Table 3-3, E36-E44, E52]
 
 theta' in mount m = S, N is A0m + A1m sin(theta) + B1m cos(theta) + A2m sin(2 theta) + B2m cos(2 theta): here the A are
 the sines and the B the cosines, and what is fitted is theta', not omega_d.  gamma = g/g0, s, c of the latitude:
@@ -40,7 +40,7 @@ def amplitudes(
 
 def separate(S: Amplitudes, N: Amplitudes, latitude: float, g: float, earth_rate: float) -> dict[str, float]:
     """U_x, U_z, U_y, dK, K_xz, K_zy, K_xy and "R+" = R + K_zx gamma2 s2 from the amplitudes of both mounts, in the
-    book's names and sign, rad/s per g0^n.
+    names and sign of Hu 1981, rad/s per g0^n.
     """
     s, c, s2 = math.sin(latitude), math.cos(latitude), math.sin(2.0 * latitude)
     B2 = (S["B2"] + N["B2"]) / 2.0
@@ -68,7 +68,7 @@ def resolve(found: Mapping[str, float], latitude: float, g: float, R: float | No
 
 
 def ours(book: Mapping[str, float]) -> dict[str, float]:
-    """The book's names and torque sign into ours.  [CROSS-MAP]"""
+    """The names and torque sign of Hu 1981 into ours.  [CROSS-MAP]"""
     return {name: sign * book[symbol] for name, (symbol, sign) in BOOK.items() if symbol in book}
 
 

@@ -1,4 +1,4 @@
-"""What is fitted, and which combination each fitted coefficient stands for.  [SERVO-C3-RANK; spec d1, 5.4; E53]
+"""What is fitted, and which combination each fitted coefficient stands for.  [SERVO-C3-RANK, E53]
 
 route dwells        all terms: two dwells with x east separate R from K_zx
 route equal         D_II = -D_SS put in (K_zx = K_xz), and reported so
@@ -27,7 +27,7 @@ Mixed = tuple[tuple[str, int, int], ...]  # other coefficient, sign and power of
 
 
 def terms(which: int) -> tuple[str, ...]:
-    """Coefficients of the model: 4 (R, U_z, U_x, ΔK), 8 (the book's), 9 (with D_O)."""
+    """Coefficients of the model: 4 (R, U_z, U_x, ΔK), 8 (Hu 1981), 9 (with D_O)."""
     return {4: FOUR, 8: drift.terms(8), 9: drift.terms(9)}[which]
 
 

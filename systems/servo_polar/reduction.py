@@ -3,7 +3,7 @@
     theta' + omega_E,x = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
 
 Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
-estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-POLAR, TEST-COMPOSITE]
+estimated from the same record.  The formulas of Hu 1981 stand beside.  [TEST-SERVO-POLAR, TEST-COMPOSITE]
 
 Not modelled: change of the coefficients with time (turns compared show it); see
 gyrobench.reduction.drift.servo_regression.
@@ -102,13 +102,13 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         sources=[
             "TEST-SERVO-POLAR, SERVO-C3-REDUCE; Hu 1981, eq. 3-84..3-90, Tables 3-2, 3-3, corrected by "
             "E39, E40, E42-E44, E52, E53",
-            "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
-            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+            "TEST-COMPOSITE; Hu 1981, eq. 3-91..3-93, corrected by E45, E46",
+            "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
         ],
         equation=servo_regression.equation(model.names),
         conventions=(
             *servo_regression.CONVENTIONS,
-            "Harmonics: a cosine, b sine of θ; the book has them the other way.",
+            "Harmonics: a cosine, b sine of θ; Hu 1981 has them the other way.",
         ),
         effects=effects,
         specification=specification,

@@ -1,4 +1,4 @@
-"""What makes a polar servo test impossible, and what it cannot see.  [SERVO-C3-SING, SERVO-C3-RANK; spec d1, 5.4, 8]"""
+"""What makes a polar servo test impossible, and what it cannot see.  [SERVO-C3-SING, SERVO-C3-RANK, INPUT-LIMITS]"""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def model_problems(parameters: Mapping[str, Any], which: int) -> list[str]:
     square = parameters.get("gyro.D_OO", 0.0) / DPH
     if square:
         return [
-            f"gyro.D_OO = {square:g} °/h/g²: at constant |g| it cannot be told from D_F, D_II and D_SS, and the book's "
-            "model has no such term; set it to 0"
+            f"gyro.D_OO = {square:g} °/h/g²: at constant |g| it cannot be told from D_F, D_II and D_SS, and the "
+            "model of Hu 1981 has no such term; set it to 0"
         ]
     return []
 

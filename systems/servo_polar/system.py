@@ -49,7 +49,7 @@ class ServoPolar(System):
         "dwell": Option(3600.0, "s", "length of each of the two dwells with the input axis east"),
         "settle": Option(10.0, "s", "wait after the loop has closed", 0.5),
         "route": Option("dwells", str, "how R and K_zx are told apart: dwells, equal (K_zx = K_xz) or combination"),
-        "terms": Option(9, int, "terms of the model: 4 (low grades), 8 (the book's), 9 (with D_O)", 4, 9),
+        "terms": Option(9, int, "terms of the model: 4 (low grades), 8 (Hu 1981), 9 (with D_O)", 4, 9),
         "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
         "u_axis": Option(0.0, "rad", "standard uncertainty of the table axis, about each axis, each phase", 0.0),
         "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the table axis", 0.0),

@@ -1,4 +1,4 @@
-"""The book's formulas of the two-axis servo test, corrected.  [eq. 3-95..3-102, appendix 2, with E47, E50, E51]
+"""Formulas of Hu 1981 for the two-axis servo test, corrected.  [eq. 3-95..3-102, appendix 2, with E47, E50, E51]
 
     alpha' = x' cos y + e_X cos y + e_Y sin x sin y - e_Z cos x sin y                                       [3-97]
     beta'  = y' + e_Y cos x + e_Z sin x
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-#: the book's coefficients of a line -> ours, and the sign of the book's against ours  [CROSS-MAP]
+#: the coefficients of Hu 1981 of a line -> ours, and its sign against ours  [CROSS-MAP]
 BOOK = {
     "x": {
         "R_x": ("Dx_0", -1), "U_z": ("Dx_x", -1), "U_x": ("Dx_z", 1), "K_zz − K_xx": ("Dx_xz", -1),
@@ -29,7 +29,7 @@ BOOK = {
         "K_zy": ("Dy_yy", -1), "K_yz": ("Dy_zz", 1), "K_zx": ("Dy_xy", -1), "K_yx": ("Dy_xz", 1),
     },
 }  # fmt: skip
-#: the ninth, empirical term of each line, which the book leaves out: ours
+#: the ninth, empirical term of each line, which Hu 1981 leaves out: ours
 EMPIRICAL = {"x": "Dx_y", "y": "Dy_x"}
 
 
@@ -70,7 +70,7 @@ def force(x: Array, y: Array, base: Array) -> Array:
 
 
 def rows(channel: str, g: Array) -> Array:
-    """What the book's coefficients of a line (in the order of BOOK) multiply in alpha' or beta', (n, 8).  [3-95]"""
+    """What the coefficients of Hu 1981 of a line (in the order of BOOK) multiply in alpha' or beta', (n, 8).  [3-95]"""
     X, Y, Z = g.T
     one = np.ones_like(X)
     if channel == "x":
@@ -104,5 +104,5 @@ def reduce(
 
 
 def in_book(ours: Mapping[str, float], channel: str) -> dict[str, float]:
-    """The book's coefficients of a line from ours."""
+    """The coefficients of Hu 1981 of a line from ours."""
     return {b: sign * ours[name] for b, (name, sign) in BOOK[channel].items()}

@@ -19,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 from gyrobench import frames
 
 Array = NDArray[np.float64]
-E, N, U, P, Q = 1, 2, 3, 4, 5  # directions of the part fixture: east, north, up, pole p, E x p (the book's I)
-#: number of the book's appendix 2 -> directions of X (outer axis) and Y (inner axis); Z = X cross Y
+E, N, U, P, Q = 1, 2, 3, 4, 5  # directions of the part fixture: east, north, up, pole p, E x p (the I of Hu 1981)
+#: number in appendix 2 of Hu 1981, ch. 3, -> directions of X (outer axis) and Y (inner axis); Z = X cross Y
 MOUNTS = {
     1: (E, N), 2: (E, U), 3: (N, E), 4: (N, U), 5: (E, P), 6: (E, Q), 7: (U, N), 8: (U, E), 9: (P, E), 10: (P, Q),
     11: (Q, E), 12: (Q, P),
 }  # fmt: skip
-LEAST = 0.2  # of cos y  [spec d1, 5.6]
+LEAST = 0.2  # of cos y  [SERVO2-LOCK]
 DAY = 2.0 * math.pi / frames.EARTH_RATE
 
 
@@ -96,6 +96,6 @@ def path(
 
 
 def force(mount: int, latitude: float, x: Array, y: Array) -> Array:
-    """SF / g along the gyro axes (n, 3): the book's gamma."""
+    """SF / g along the gyro axes (n, 3): gamma of Hu 1981."""
     out: Array = attitude(x, y) @ (base(mount, latitude) @ -frames.U)
     return out

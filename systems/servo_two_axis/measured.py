@@ -27,7 +27,7 @@ TEMPLATE = """\
 # phase 2 = mount 4
 #
 # latitude: needed, here or by --set.  gravity, height: optional (WGS84 normal gravity).
-# terms: 8 (the book's) or 9 terms a channel.
+# terms: 8 (Hu 1981) or 9 terms a channel.
 # phase N: mount of the rows with this number.  Outer axis X and inner axis Y at angles 0 point (E east, N north, U up,
 #   p pole of the sky, I = E x p = (0, -sin latitude, cos latitude)):
 #   mount 1  E, N    mount 4  N, U    mount 7  U, N    mount 10  p, I

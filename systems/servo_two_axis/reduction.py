@@ -3,7 +3,7 @@
     x channel   x' cos y + e . (A row 1) = omega_dx        y channel   y' + e . (A row 2) = omega_dy      [eq. 3-97]
 
 Each channel is a least squares problem of its own over all windows; rates and regressors are averaged over the window
-(windows.py), the noise (white, Gauss-Markov, errors of shared readings) is estimated from the same record.  The book's
+(windows.py), the noise (white, Gauss-Markov, errors of shared readings) is estimated from the same record.  The Hu 1981
 route, its formulas at the middles of the windows, stands beside.  [TEST-SERVO2-2DOF]
 
 Not modelled: change of the coefficients with time (mount against mount shows it), noise common to both channels.
@@ -149,8 +149,8 @@ def _channel(
         sources=[
             "TEST-SERVO2-2DOF, SERVO2-A, SERVO2-KIN, APP2; Hu 1981, eq. 3-94..3-102 and appendix 2, "
             "corrected by E47, E50, E51",
-            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46",
-            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46, corrected by E7-E9",
+            "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
         ],
         equation=_equation(c, names),
         conventions=CONVENTIONS,
@@ -159,15 +159,15 @@ def _channel(
         site=site.shown(),
         instrument=str(meta.get("instrument", "")),
         simulated=truth is not None,
-        closed_caption="The book's formulas at the middles of the same windows, ordinary least squares",
+        closed_caption="The formulas of Hu 1981 at the middles of the same windows, ordinary least squares",
         warnings=warnings,
     )  # fmt: skip
 
 
 CONVENTIONS = (
-    "Drift ω_d in precession sign: inertial rate of the plate along the gyro's x and y axes; the book's ω_M = −ω_dx.",
-    "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (book sign: a body axis that points up "
-    "reads −1); g0 = 9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+    "Drift ω_d in precession sign: inertial rate of the plate along the gyro's x and y axes; ω_M of Hu 1981 is −ω_dx.",
+    "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (sign of Hu 1981: a body axis that "
+    "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
     "Outer angle x right-handed about X, inner angle y about Y of the mount; gyro x along X, y along Y at 0, 0; ω_X, "
     "ω_Y, ω_Z: Earth rate along X, Y, Z = X × Y; local frame east, north, up. Torquers idle while the gyro holds the "
     "table; the turn about z is not controlled.",
@@ -222,7 +222,7 @@ def _mounts_table(
 
 
 def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
-    """The estimates in the book's names: torque sign in the first line of 3-95, precession sign in the second."""
+    """The estimates in the names of Hu 1981: torque sign in the first line of 3-95, precession sign in the second."""
     rows: list[list[Any]] = []
     for c in "xy":
         at = {q.name: k for k, q in enumerate(found[c].quantities)}
@@ -231,9 +231,9 @@ def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
             value, u = float(found[c].value[k]) / q.scale, float(found[c].u[k]) / q.scale
             rows.append([f"{symbol}, {c}", sign * value, u, q.unit, ours, "+" if sign > 0 else "−"])
     return {
-        "title": "In the book's names",
-        "caption": "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign of the book's against ours",
-        "columns": ["book", "estimate", "u of type A", "unit", "ours", "sign"],
+        "title": "Notation of Hu 1981",
+        "caption": "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign against this report",
+        "columns": ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
         "rows": rows,
     }
 
@@ -255,7 +255,7 @@ def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
     return {
         "title": "Compliances seen by both channels",
         "caption": "E_n: difference over its expanded uncertainty (type A); below 1 in size they agree",
-        "columns": ["book", "x channel / (°/h/g²)", "y channel / (°/h/g²)", "difference", "E_n"],
+        "columns": ["Hu 1981", "x channel / (°/h/g²)", "y channel / (°/h/g²)", "difference", "E_n"],
         "rows": rows,
     }
 

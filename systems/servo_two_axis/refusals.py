@@ -1,6 +1,6 @@
 """What makes a two-axis servo test impossible, and what its mounts cannot tell.  [SERVO2-LOCK, SERVO2-RANK; d1, 5.6, 8]
 
-Conditions are of the design in coefficients per g, the worse of both channels, as in the spec.
+Conditions are of the design in coefficients per g, the worse of both channels [SERVO2-RANK].
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from . import geometry
 Array = NDArray[np.float64]
 Rates = Callable[[Array], tuple[float, float]]
 DPH = units.factor("deg/h")
-WARN, MOST, MOST_SINGLE = 100.0, 1e3, 1e4  # of the condition; a single mount is warned of, not refused (spec d1, 5.6)
+WARN, MOST, MOST_SINGLE = 100.0, 1e3, 1e4  # of the condition; a single mount is warned of, not refused [SERVO2-RANK]
 TILTED = math.cos(math.radians(30.0))  # least cosine of the gyro's x and y axes to those of the plate
 STEP_MAX = 1e-3  # s, the largest internal step of table_servo
 
@@ -145,9 +145,9 @@ def option_problems(options: Mapping[str, Any], step: float, earth_rate: float) 
     if step > STEP_MAX:
         found.append(f"step = {step:g} s: the servo loops exchange once a step and need at most {STEP_MAX:g} s")
     if options["terms"] not in (8, 9):
-        found.append(f"terms = {options['terms']}: there are 8 (the book's) and 9 terms a channel")
+        found.append(f"terms = {options['terms']}: there are 8 (Hu 1981) and 9 terms a channel")
     if mounts is None:
-        found.append(f"mounts = '{options['mounts']}': numbers 1 to 12 of the book's mounts in their order, as '2 4'")
+        found.append(f"mounts = '{options['mounts']}': numbers 1 to 12 of Hu 1981 in their order, as '2 4'")
     elif len(mounts) > 24:
         found.append(f"mounts: {len(mounts)} are given, the plan has room for 24")
     if 12.0 * options["window"] > options["time"]:
@@ -166,7 +166,7 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
         if value:
             found.append(
                 f"gyro.{square} = {value:g} °/h/g² ({c} channel): at constant |g| it cannot be told from the constant "
-                "and the other squares, and the book's model has no such term; set it to 0"
+                "and the other squares, and the model of Hu 1981 has no such term; set it to 0"
             )
     for name in ("gyro.mount", "outer.base", "inner.base", "stand.base"):
         if name in parameters:

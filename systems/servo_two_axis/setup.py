@@ -1,7 +1,7 @@
 """Wiring, plan and parameters of the two-axis servo test: two single-axis servo tables, one on the other.
 
 The outer table turns about X; on its plate stands the inner one with its axis along Y.  Table axes are (Y, Z, X) of the
-outer and (Z, X, Y) of the inner table, so that v_gyro = A v_mount with A of spec d1, 5.6 [SERVO2-A].  The slot stand is
+outer and (Z, X, Y) of the inner table, so that v_gyro = A v_mount with A of SERVO2-A.  The slot stand is
 between site and outer table: it turns what the site says into the axes of the mount, phase by phase.
 """
 

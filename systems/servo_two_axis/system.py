@@ -24,7 +24,7 @@ DEG = math.pi / 180.0
 class ServoTwoAxis(System):
     """The x pickoff drives the outer and the y pickoff the inner axis of a table, so that the plate keeps the gyro's
     x and y axes free of rotation but for the drift, while the base turns with the Earth below.  The angles of both axes
-    over a day in two of the book's twelve mounts give nine coefficients a channel; the torquers are idle.
+    over a day in two of the twelve mounts of Hu 1981 give nine coefficients a channel; the torquers are idle.
 
     [TEST-SERVO2-2DOF; Hu 1981, eq. 3-94..3-102, appendix 2]
     """
@@ -52,11 +52,11 @@ class ServoTwoAxis(System):
         "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
         "height": Option(0.0, "m", "height above the ellipsoid"),
         "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity"),
-        "mounts": Option("2 4", str, "mounts in their order, by their numbers in the book (1 to 12)"),
+        "mounts": Option("2 4", str, "mounts in their order, by their numbers in Hu 1981 (1 to 12)"),
         "time": Option(86400.0, "s", "time in each mount", 1.0),
         "window": Option(600.0, "s", "length of a window", 1e-3),
         "settle": Option(10.0, "s", "wait after both loops have closed", 0.5),
-        "terms": Option(9, int, "terms of the model of a channel: 8 (the book's), 9 (with Dx_y, Dy_x)", 8, 9),
+        "terms": Option(9, int, "terms of the model of a channel: 8 (Hu 1981), 9 (with Dx_y, Dy_x)", 8, 9),
         "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
         "u_axis": Option(0.0, "rad", "standard uncertainty of each mount, about each of its axes", 0.0),
         "u_square": Option(0.0, "rad", "standard uncertainty of the right angle between the table axes", 0.0),

@@ -1,4 +1,4 @@
-"""The book's formulas of the vertical and level servo tests, corrected.  [SERVO-C1, SERVO-C2; E37, E38, E41]
+"""Formulas of Hu 1981 for the vertical and level servo tests, corrected.  [SERVO-C1, SERVO-C2; E37, E38, E41]
 
     x down   theta' = +W s - R - U_z g - K_zx g2        x up   theta' = -W s - R + U_z g - K_zx g2
     y up or down, x level   theta' = -omega_E,x - R  (and -+ U_y g, the empirical drift along the output axis)
@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 
 def three_term(rate_down: float, rate_up: float, rate_z_down: float, earth_up: float, g: float) -> dict[str, float]:
-    """R, U_z, U_x of 5.3 in the book's sign from table rates (x east for the third), compliance ignored: R takes
+    """R, U_z, U_x of 5.3 in the sign of Hu 1981 from table rates (x east for the third), compliance ignored: R takes
     + K_zx g2, U_x g takes + (K_xz + K_zx) g2.  earth_up: W sin(latitude).
     """
     R = -(rate_down + rate_up) / 2.0
@@ -24,7 +24,7 @@ def three_term(rate_down: float, rate_up: float, rate_z_down: float, earth_up: f
 
 def formulas(d: Mapping[str, float], g: float) -> dict[str, float]:
     """Our coefficients from the mean drift d of the classes x down, x up, y down, y up, z down, z up (rad/s), as many
-    as there are; empty where no formula of the book applies.
+    as there are; empty where no formula of Hu 1981 applies.
     """
     vertical = {"x down", "x up"} <= d.keys()
     out = {}

@@ -3,7 +3,7 @@
     theta' + omega_E,x = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + noise,   as many as the attitudes tell apart
 
 Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
-estimated from the same record.  The book's formulas stand beside.  [TEST-SERVO-VERT, TEST-SERVO-LEVEL]
+estimated from the same record.  The formulas of Hu 1981 stand beside.  [TEST-SERVO-VERT, TEST-SERVO-LEVEL]
 
 Not modelled: D_IO, D_OS, D_IS, which a level attitude sees by the sine of its angle (at most 1 degree); see
 gyrobench.reduction.drift.servo_regression.
@@ -95,8 +95,8 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         sources=[
             "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; Hu 1981, eq. 3-60..3-83, corrected "
             "by E36-E38, E41",
-            "TEST-COMPOSITE; eq. 3-91..3-93, corrected by E45, E46",
-            "RED-RATE (shared readings); RED-GLS; eq. 4-79..4-88",
+            "TEST-COMPOSITE; Hu 1981, eq. 3-91..3-93, corrected by E45, E46",
+            "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
         ],
         equation=servo_regression.equation(seen.names),
         conventions=servo_regression.CONVENTIONS,
@@ -105,7 +105,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         site=site.shown(),
         instrument=str(meta.get("instrument", "")),
         simulated=truth is not None,
-        no_closed="" if book else "the book has formulas for class 1, for the three-term route and for complete pairs",
+        no_closed="" if book else "Hu 1981 has formulas for class 1, for the three-term route and for complete pairs",
         closed_caption="From the same windows; the formulas take every attitude as at angle 0",
         tables=[
             _attitudes_table(means, found.est.residual, y, phase, labels),
@@ -149,7 +149,7 @@ def _quantity(
 
 
 def _book_words(seen: refusals.Seen) -> dict[str, str]:
-    """Combinations in the book's names: R + γ² K_zx."""
+    """Combinations in the notation of Hu 1981: R + γ² K_zx."""
     out = {}
     for name in seen.names:
         symbol, sign = servo_regression.BOOK[name]

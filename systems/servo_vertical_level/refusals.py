@@ -1,4 +1,4 @@
-"""What attitudes can and cannot tell, and how long a level one lasts.  [SERVO-C1, SERVO-C2; spec d1, 5.1, 5.2]"""
+"""What attitudes can and cannot tell, and how long a level one lasts.  [SERVO-C1, SERVO-C2]"""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
     J_x th'' = M - K_m K_x G(s) th,     G = K_G (1 + tau1 s)(1 + tau2 s) / ((1 + T1 s)(1 + T2 s))
 
-[STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected]  What the text prints as theta/M in 5-25,
+[STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected by EG7, EG8]  What 5-25 prints as theta/M,
 K_m K_x / (J_x s2), is the loop gain without network; theta/M is 1/(J_x s2 + K_m K_x G).
 """
 

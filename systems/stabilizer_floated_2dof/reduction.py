@@ -1,6 +1,6 @@
 """Record of an axis with a floated two-degree-of-freedom gyro -> its measures, beside the closed forms.
 
-[STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected as in the spec]
+[STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected by EG7, EG8]
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .system import loop_of
 Specification = Mapping[str, tuple[float | None, float | None]]
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 MRAD = 1e-3
-ENOUGH = 45.0  # degrees of phase margin that the source asks for
+ENOUGH = 45.0  # degrees of phase margin that GSP ch. 5 asks for
 CONVENTIONS = [
     "θ: inertial angle of the platform about x, positive like the torque M; K_x θ: the gyro's x pickoff.",
     "Loop gain L = −(signal that comes back) / (signal put in), opened at the input of the network.",
@@ -61,7 +61,7 @@ def from_record(record: Any, specification: Specification | None = None) -> Resu
     result = found.result(
         title="Stabilizer with a floated two-degree-of-freedom gyro",
         method="Load step, command by the gyro's torquer, sine sweeps of loop and base, and drift hold",
-        sources=["STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, errata of spec d4 item 4"],
+        sources=["STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected by EG7, EG8"],
         equation="J_x dot.double(theta) = M - K_m K_x G(s) theta, quad "
         "G(s) = K_G ((1 + tau_1 s)(1 + tau_2 s)) / ((1 + T_1 s)(1 + T_2 s))",
         conventions=CONVENTIONS,
@@ -141,7 +141,7 @@ def _margins(found: LoopFindings, points: list[Point], loop: Loop | None) -> Non
     values = margins.measured_values(points)
     pm = values.get("phase")
     if pm is not None and pm[0] < ENOUGH:
-        found.warnings.append(f"The phase margin is {pm[0]:.3g}°; the source asks for more than {ENOUGH:g}°.")
+        found.warnings.append(f"The phase margin is {pm[0]:.3g}°; more than {ENOUGH:g}° is wanted [GSP ch. 5].")
     if "crossover" in values and max(p.f for p in points) > 1.25 * values["crossover"][0]:
         f = values["crossover"][0]
         pair = [margins.between(points, np.array([f / 1.25, f * 1.25]), spline) for spline in (False, True)]

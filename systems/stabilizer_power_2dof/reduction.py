@@ -1,6 +1,6 @@
 """From the record of a power gyro stabilizer to its measures, beside the closed forms.
 
-[STAB-POWER-2DOF; GSP ch. 5, eq. 5-5..5-23, corrected as in the spec]
+[STAB-POWER-2DOF; GSP ch. 5, eq. 5-5..5-23, corrected by EG1-EG6]
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CONVENTIONS = [
     "Loop gain L = −(signal that comes back) / (signal put in), opened at the potentiometer.",
     "Drift: rate of α with the base at rest; a torque M_y on the precession axis turns the platform by −M_y/H.",
 ]
-SOURCES = ["STAB-POWER-2DOF; GSP ch. 5, eq. 5-1..5-23, errata of spec d4 item 3"]
+SOURCES = ["STAB-POWER-2DOF; GSP ch. 5, eq. 5-1..5-23, corrected by EG1-EG6"]
 
 
 def k_m(parameters: Mapping[str, Any]) -> float:
@@ -41,7 +41,7 @@ def k_m(parameters: Mapping[str, Any]) -> float:
 def routh_limit(H: float, J_x: float, J_y: float, C_x: float, C_y: float) -> float:
     """Largest stable K_m, N.m/rad: (C_x/J_x + C_y/J_y)(H + C_x C_y/H).
 
-    The source's (5-23) drops C_x C_y/H; exact by the Routh table of (5-20).
+    5-23 as printed drops C_x C_y/H; exact by the Routh table of (5-20).
     """
     return (C_x / J_x + C_y / J_y) * (H + C_x * C_y / H)
 
@@ -64,7 +64,7 @@ def transient(H: float, K_m: float) -> float:
 def steady(M: float, H: float, K_m: float, C_y: float) -> float:
     """Platform angle that a constant load leaves, rad: C_y M / (H K_m), 0 only without damping of the precession.
 
-    The source says it is always 0.
+    GSP ch. 5 says that it is always 0 (EG4).
     """
     return C_y * M / (H * K_m)
 

@@ -14,7 +14,7 @@ from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
 Specification = Mapping[str, tuple[float | None, float | None]]
-#: of the gyro where the user gives nothing else (spec d4, item 3), and what the stabilizer is told of it
+#: of the gyro where the user gives nothing else [STAB-POWER-2DOF], and what the stabilizer is told of it
 GYRO = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0, "K_sg_y": 10.0, "u_max": 5.0}
 TOLD = {"H": "H_g", "J_x": "J_x", "J_y": "J_y", "C_x": "C_x", "C_y": "C_y", "K_sg_y": "k_u"}
 K_I, RATIO = 10.0, 100.0  # amplifier and reducer; the motor's gain makes the K_m that is asked for

@@ -80,7 +80,7 @@ def rate_integrating(p: Axis, t: Array) -> tuple[Array, Array]:
 
 
 def light(p: Axis, t: Array) -> tuple[Array, Array]:
-    """a, b by 5-34 for light damping (zeta < 0.3), with J0 where the text prints J in the third term of b."""
+    """a, b by 5-34 for light damping (zeta < 0.3), with J0 for the printed J in the third term of b (EG9)."""
     q = p.C / (2.0 * p.J)
     n1 = math.sqrt(p.n**2 - q**2)
     fall = np.exp(-q * t)

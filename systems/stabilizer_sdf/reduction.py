@@ -71,8 +71,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against the "
         "closed form",
         sources=[
-            "STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, section 5.1.4, eq. 5-27..5-43",
-            "Corrected: J0 for J in 5-34 (third term of b) and 5-36; 5-38 two orders of derivatives higher",
+            "STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, eq. 5-27..5-43, corrected by EG9-EG13",
         ],
         equation=EQUATIONS[kind],
         conventions=[

@@ -2,7 +2,7 @@
 
     theta' = sign K_n i_n + o_n + sum_j p_j P_j(theta) + noise
 
-Both senses of a current share its drift o_n (an even torquer term goes there too, as into the book's half difference);
+Both senses of a current share its drift o_n (an even torquer term goes there too, as into the printed half difference);
 what the drift changes with the angle, the same for all currents, is a polynomial of degree 4 in the table angle,
 averaged over each window as the rate is.  The noise - random drift and errors of the angle readings, which neighbours
 share - is estimated from the same windows.  K_n from the times between marks (marks.py) stand beside.

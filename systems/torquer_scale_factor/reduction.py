@@ -143,7 +143,7 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: 
         sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
         equation='K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n',
         conventions=[
-            "Positive current makes positive precession: K = ω/i (the book's A3-5 prints a minus that its own table "
+            "Positive current makes positive precession: K = ω/i (A3-5 of Hu 1981 prints a minus that its own table "
             "does not have).",
             "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
             "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
@@ -259,7 +259,7 @@ def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: f
     ]  # fmt: skip
     return {
         "title": "Scale factor and linearity",
-        "caption": f"Linearity against K = {mean / KU:.6g} and, as in the book, against {printed:.3f} °/h/mA",
+        "caption": f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA",
         "columns": ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
                     "linearity, K rounded / %", "drift / (°/h)"],
         "rows": rows,

@@ -1,4 +1,4 @@
-"""The book's closed formulas of the single-axis tumble, corrected.  [TUM1-REDUCE; eq. 3-14..3-21 with E20-E23]
+"""Closed formulas of Hu 1981 for the single-axis tumble, corrected.  [TUM1-REDUCE; eq. 3-14..3-21 with E20-E23]
 
 Harmonics of mount 1 and 2 over theta = -(table angle), first index the order, second the mount, gamma = g/g0, phi the
 latitude, y3 and y4 the drift in the dwells with the output axis up and down:
@@ -66,7 +66,7 @@ def reduce(
     roles = {p: role(faces[p], latitude) for p in faces}
     if None in roles.values():
         odd = ", ".join(str(p) for p, r in roles.items() if r is None)
-        return {}, {}, f"phase {odd} is not one of the book's four attitudes: least squares only"
+        return {}, {}, f"phase {odd} is not one of the four attitudes of Hu 1981: least squares only"
     fits: dict[str, Fit] = {}
     dwells: dict[str, float] = {}
     for name in ("mount 1", "mount 2", "static 3", "static 4"):

@@ -3,7 +3,7 @@
     y = omega_IA - k i = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
 
 Every window is a row; regressors are averaged over the window as the current is, so no [AVG-SINC] damping is left.
-The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The book's closed
+The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The closed
 formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
 
 Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), independent mount errors.
@@ -96,7 +96,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
         sources=[
             "TEST-TUMBLE1-SDF, TUM1-REDUCE; Hu 1981, eq. 3-12..3-21, corrected by E20-E23",
             "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
-            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
         ],
         equation=_equation(names),
         conventions=_conventions(setup),
@@ -198,14 +198,14 @@ def _equation(names: tuple[str, ...]) -> str:
 
 
 def _conventions(s: TumbleSetup) -> list[str]:
-    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     return [
         "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-        "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
-        "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 "
+        "= 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
         f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
         "Gyro axes I, O, S right-handed; local frame east, north, up; table angle right-handed about the pole, so that "
-        "turning against the Earth is negative; the book's θ is minus the table angle.",
+        "turning against the Earth is negative; the θ of Hu 1981 is minus the table angle.",
         *([] if s.terms in (9, 10) else [f"{s.terms}-term model: the terms left out are taken as zero."]),
         *([] if s.fold else ["D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."]),
     ]

@@ -1,4 +1,4 @@
-"""What makes a tumble impossible: latitude, setup, plan and record.  [TUM1-SING; spec d1, 4.3 and 8]"""
+"""What makes a tumble impossible: latitude, setup, plan and record.  [TUM1-SING; INPUT-LIMITS]"""
 
 from __future__ import annotations
 

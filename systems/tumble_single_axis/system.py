@@ -133,7 +133,7 @@ class TumbleSingleAxis(System):
             )
         if not self["rate"] > 0.0:
             found.append(
-                "rate = 0: the table does not turn, so no coefficient can be separated; the book turns at 10 ERU"
+                "rate = 0: the table does not turn, so no coefficient can be separated; Hu 1981 turns at 10 ERU"
             )
         return found
 

@@ -2,7 +2,7 @@
 
     y = omega_IA - k i = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
 
-Least squares on X, Y, Z themselves, from the angles that were read: any positions will do that have rank 9.  The book's
+Least squares on X, Y, Z themselves, from the angles that were read: any positions will do that have rank 9.  The
 harmonic route stands beside it where ratio and positions allow it.  The noise (white, Gauss-Markov or both) is
 estimated from the same record.  [TEST-TUMBLE2-SDF, TUM2AX-LS; Hu 1981, eq. 3-47..3-53]
 
@@ -129,7 +129,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> Result:
         sources=[
             "TEST-TUMBLE2-SDF, TUM2AX-REDUCE, TUM2AX-LS; Hu 1981, eq. 3-47..3-53, corrected by E30-E34",
             "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
-            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
         ],
         equation='omega_"IA" - k i = omega_d = D_F + D_I X + D_O Y + D_S Z + D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + '
         'D_"OS" Y Z + D_"IS" X Z',
@@ -229,7 +229,7 @@ def _group(s: TwoAxisSetup, theta: Array) -> Group:
 def _harmonic_route(
     s: TwoAxisSetup, phase: Array, length: Array, outer: Array, inner: Array, y: Array
 ) -> tuple[Array, dict[str, float], list[dict[str, Any]], list[dict[str, Any]], list[str]]:
-    """theta of each window, coefficients by the book's formulas, amplitudes, table of checks, and why not."""
+    """theta of each window, coefficients by the formulas of Hu 1981, amplitudes, table of checks, and why not."""
     theta = outer / s.m
     turn = 2.0 * math.pi
     numbers = np.unique(phase)
@@ -332,11 +332,11 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
 
 
 def _conventions(s: TwoAxisSetup) -> list[str]:
-    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     return [
         "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-        "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
-        "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 "
+        "= 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
         f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
         "Gyro axes I, O, S right-handed; local frame east, north, up; table angles right-handed, outer axis along the "
         f"pole: outer angle {s.m} θ, inner angle {s.n} θ.",

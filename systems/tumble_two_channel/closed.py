@@ -1,4 +1,4 @@
-"""The book's closed formulas of the two-channel tumble, corrected.
+"""Closed formulas of Hu 1981 for the two-channel tumble, corrected.
 
 Harmonics over theta = -(table angle) of mount 1 and 2, gamma = g/g0, phi the latitude.  Simple model (3-22..3-25 with
 E24, TUM2A), amplitudes of the torquer rates k_x i_x and k_y i_y = omega_IA - omega_d (a: constant, b: sine of x, e:
@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation.regression import Fit
 
 Array = NDArray[np.float64]
 Amplitudes = Mapping[str, float]
-#: book symbol -> coefficient of the bench and its sign
+#: symbol of Hu 1981 -> coefficient of the bench and its sign
 BOOK = {
     "R_x": ("Dy_0", 1), "u_y": ("Dy_z", 1), "u_zx": ("Dy_y", -1), "Q_x": ("Dy_yz", 1),
     "R_y": ("Dx_0", -1), "u_x": ("Dx_z", 1), "u_zy": ("Dx_x", -1), "Q_y": ("Dx_xz", -1),
@@ -37,7 +37,7 @@ BOOK = {
 def simple(
     x1: Amplitudes, x2: Amplitudes, y1: Amplitudes, y2: Amplitudes, latitude: float, gravity: float
 ) -> dict[str, float]:
-    """R, u, Q of the book, per g0, from amplitudes of k_x i_x (x1, x2) and k_y i_y (y1, y2) in mounts 1 and 2."""
+    """R, u, Q of Hu 1981, per g0, from amplitudes of k_x i_x (x1, x2) and k_y i_y (y1, y2) in mounts 1 and 2."""
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
     return {
         "R_x": -(x1["A0"] + x2["A0"]) / 2.0,

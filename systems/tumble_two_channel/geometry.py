@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 MODELS = ("simple", "nine")
 TILT = {"x": "ε_xz", "y": "ε_yz"}  # tilt of a measuring axis towards the spin axis, as an unknown
 AXIS = {"x": 0, "y": 1}
-#: of the simple model, in the order of the book's R, u, u_z, Q
+#: of the simple model, in the order of the R, u, u_z, Q of Hu 1981
 SIMPLE = {"x": ("Dx_0", "Dx_x", "Dx_z", "Dx_xz"), "y": ("Dy_0", "Dy_y", "Dy_z", "Dy_yz")}
 #: the square that cannot be told from the others at constant |g|: channel -> it and the three that take it up
 FOLD = {"x": ("Dx_yy", ("Dx_0", "Dx_xx", "Dx_zz")), "y": ("Dy_xx", ("Dy_0", "Dy_yy", "Dy_zz"))}

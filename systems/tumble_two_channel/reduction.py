@@ -1,9 +1,9 @@
 """Reduction of the two-channel tumble: drift coefficients of both channels from averaged torquer currents.
 
-    x channel   omega_x - k_y i_y = omega_dx        y channel   omega_y - k_x i_x = omega_dy        [spec d1, 4.1]
+    x channel   omega_x - k_y i_y = omega_dx        y channel   omega_y - k_x i_x = omega_dy        [MEAS-REBALANCE]
 
 Each channel is a least squares problem of its own: every window is a row, regressors are averaged over the window as
-the current is, and the noise of each channel is estimated from the same record.  The book's closed formulas stand
+the current is, and the noise of each channel is estimated from the same record.  The closed formulas of Hu 1981 stand
 beside the estimates.  [TEST-TUMBLE1-2DOF-A, -B; Hu 1981, eq. 3-22..3-37]
 
 Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), noise common to both channels,
@@ -108,8 +108,8 @@ def _channel(
             "TEST-TUMBLE1-2DOF-A, TUM2A; Hu 1981, eq. 3-22..3-25, signs corrected by E24"
             if simple
             else "TEST-TUMBLE1-2DOF-B, TUM2B-REDUCE; Hu 1981, eq. 3-26..3-37, corrected by E25-E29",
-            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46",
-            "RED-GLS; Hu 1981, eq. 4-79..4-88, divisor n − p",
+            "GYRO-STATIC-2DOF; Hu 1981, eq. 2-29..2-46, corrected by E7-E9",
+            "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
         ],
         equation=_equation(c, names),
         conventions=_conventions(s),
@@ -149,13 +149,13 @@ def _quantity(s: TwoChannelSetup, c: str, name: str, book: Mapping[str, float]) 
 def _closed(
     s: TwoChannelSetup, phase: Array, turning: window_regressors.Turning, y: Mapping[str, Array]
 ) -> tuple[dict[str, float], dict[str, dict[str, Fit]], str]:
-    """Coefficients by the book's formulas (SI), the harmonic fits of each channel, and why not."""
+    """Coefficients by the formulas of Hu 1981 (SI), the harmonic fits of each channel, and why not."""
     ideal = geometry.faces(s.model, s.latitude)
     roles: dict[int, str] = {}
     for p, face in s.faces.items():
         found = [n for n, f in ideal.items() if np.allclose(face, f, atol=1e-6)]
         if not found:
-            return {}, {}, f"phase {p} is not one of the book's attitudes; least squares only"
+            return {}, {}, f"phase {p} is not one of the attitudes of Hu 1981; least squares only"
         roles[p] = found[0]
     fits: dict[str, dict[str, Fit]] = {}
     for c in "xy":
@@ -180,7 +180,7 @@ def _closed(
 
 
 def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, float]) -> list[dict[str, Any]]:
-    """The simple model in the book's symbols."""
+    """The simple model in the symbols of Hu 1981."""
     if s.model != "simple":
         return []
     by_name, rows = {c.name: c for c in coefficients}, []
@@ -193,7 +193,7 @@ def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, 
         "and u_zy without the outer gimbal"
     )
     head = ["symbol", "is", "least squares", "u", "closed formula", "unit"]
-    return [{"title": "The book's quantities", "caption": caption, "columns": head, "rows": rows}]
+    return [{"title": "Quantities of Hu 1981", "caption": caption, "columns": head, "rows": rows}]
 
 
 def _equation(c: str, names: tuple[str, ...]) -> str:
@@ -214,16 +214,16 @@ def _equation(c: str, names: tuple[str, ...]) -> str:
 
 
 def _conventions(s: TwoChannelSetup) -> list[str]:
-    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in the book, turned round at entry"
+    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     k = {a: f"{v * 1e-3 / DPH:.6g} °/h/mA" for a, v in s.k.items()}
     return [
         "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-        "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (book sign: a body axis that "
-        "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+        "X, Y, Z = −f/g0 along x (outer gimbal), y (inner gimbal) and z (spin) axis (sign of Hu 1981: a body axis that "
+        "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
         f"Torquer currents: {sign}; the current i_y measures the x channel and i_x the y channel. k_x = {k['x']}, "
         f"k_y = {k['y']}.",
         "Gyro axes right-handed; local frame east, north, up; table angle right-handed about the pole, so that turning "
-        "against the Earth is negative; the book's θ is minus the table angle.",
+        "against the Earth is negative; the θ of Hu 1981 is minus the table angle.",
         *(["Terms outside the simple model are taken as zero."] if s.model == "simple" else []),
         *(
             []

@@ -1,4 +1,4 @@
-"""What makes a setup or a record of the two-channel tumble impossible.  [spec d1, 4.3, 4.5 and 8]"""
+"""What makes a setup or a record of the two-channel tumble impossible.  [TUM2B-SING, INPUT-LIMITS]"""
 
 from __future__ import annotations
 

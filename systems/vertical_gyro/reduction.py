@@ -79,7 +79,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     result = found.result(
         title="Vertical gyro",
         method="Pitch and roll of the gyro against those of the vehicle, in erection, rest and manoeuvre",
-        sources=["VERTICAL-GYRO; GSP ch. 5, section 5.3.1 (text; the equations are the spec's)"],
+        sources=["VERTICAL-GYRO; GSP ch. 5, section 5.3.1 (text only)"],
         equation="dot(bold(n)) = bold(T)\\/H + bold(d) - bold(omega) times bold(n), quad "
         "T_x = -f(e_y), quad T_y = f(e_x)",
         conventions=[

@@ -2,7 +2,7 @@
 
     python tests/benchmarks/recovery_tumble.py --gyros 5
 
-Random gyros (nine coefficients in the book's ranges, both signs) at random latitudes, 12 to 78 degrees north or south.
+Random gyros (nine coefficients, ranges of Hu 1981, both signs) at random latitudes, 12 to 78 degrees north or south.
 Prints the largest error of each coefficient, the lag of the loop by hand (tests/systems/tumbling.py), and the change
 when the step is halved against u of a run with noise.  Limits: 1e-6 deg/h per g^n, and a tenth of u.
 """

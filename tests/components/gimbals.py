@@ -1,6 +1,6 @@
 """Flights of the gimballed platforms: a vehicle's rates, the true attitude by rotations, feedback of the true error.
 
-Spec d4 writes its vehicle axes x forward, z up; base axes here are x right, y forward, z up.
+Flights are written in axes forward, left, up; base axes here are x right, y forward, z up.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ DEG = math.pi / 180.0
 
 
 def base_rate(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> np.ndarray:
-    """deg/s about forward, left (nose down) and up, as the spec's x, y, z, in base axes rad/s."""
+    """deg/s about forward, left (nose down) and up, in base axes rad/s."""
     return np.array([-pitch, roll, yaw]) * DEG
 
 

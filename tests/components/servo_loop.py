@@ -15,7 +15,7 @@ ARCSEC = math.pi / 648000.0
 GCM = 9.80665e-5  # g.cm, N.m
 H = 1e-4
 ALONG = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # input axis along the table axis
-FAST = {"H": 0.04, "J": 1.2e-5, "C": 0.03, "K_sg": 10.0}  # 0.4 ms, the spec's sensor: H/c 4/3
+FAST = {"H": 0.04, "J": 1.2e-5, "C": 0.03, "K_sg": 10.0}  # 0.4 ms, sensor of TABLE-SERVO: H/c 4/3
 SLOW = {"H": 0.04, "J": 3e-5, "C": 0.03, "K_sg": 10.0}  # 1 ms
 FREE = {"H": 0.04, "J": 3e-5, "C": 1e-9, "K_sg": 10.0}  # undamped
 

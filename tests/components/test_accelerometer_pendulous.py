@@ -36,7 +36,7 @@ def settled(f, seconds=0.5, **parameters):
 
 # ---------------------------------------------------------------------------------------- static model
 def test_sign_at_rest():
-    """x up: f_x = +g, the book's X = -1: lambda i = k0 - k1 + k2 - k3; x down: k0 + k1 + k2 + k3; 1 g0 is 1 mA."""
+    """x up: f_x = +g, X = -1: lambda i = k0 - k1 + k2 - k3; x down: k0 + k1 + k2 + k3; 1 g0 is 1 mA."""
     up, down = settled([G0, 0.0, 0.0], **ROUGH), settled([-G0, 0.0, 0.0], **ROUGH)
     assert up.i == pytest.approx(1e-3 * (1e-3 - 1.01 + 2e-3 + 3e-3), rel=1e-12)
     assert down.i == pytest.approx(1e-3 * (1e-3 + 1.01 + 2e-3 - 3e-3), rel=1e-12)
@@ -64,7 +64,7 @@ def test_steady_state_is_the_model(seed):
 
 
 def test_harmonics_of_the_multi_point_test():
-    """Spec d1, 4.8, theta0 = 0, 24 points: a = -g (sin, 0, cos) in mount a, g (-sin, cos, 0) in b."""
+    """TEST-ACC-MULTI, theta0 = 0, 24 points: a = -g (sin, 0, cos) in mount a, g (-sin, cos, 0) in b."""
     theta = 2.0 * math.pi * np.arange(24) / 24
     k = {"k0": 5e-4, "k1": 1.001, "k2": 2e-4, "k3": -3e-4, "k4": 4e-4, "k5": -6e-4}
     for mount in "ab":
@@ -110,7 +110,7 @@ def test_exact_for_held_forces(h):
 
 
 def overload(t):
-    """2 g0 for 0.2 s, beyond the range of 1.5 g0, then 1 g0, then -0.5 g0 (book's X)."""
+    """2 g0 for 0.2 s, beyond the range of 1.5 g0, then 1 g0, then -0.5 g0 (X of Hu 1981)."""
     return 2.0 if 0.1 <= t < 0.3 else 1.0 if t < 0.4 else -0.5
 
 

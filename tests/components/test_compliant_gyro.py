@@ -1,4 +1,4 @@
-"""Third-order dynamics against the book's transfer functions, the loop, and what it shares with floated_gyro."""
+"""Third-order dynamics against the transfer functions of Hu 1981, the loop, and what it shares with floated_gyro."""
 
 import math
 
@@ -58,7 +58,7 @@ def response(part, s):
 
 
 def book(p, s):
-    """DYN-IA, DYN-OA, DYN-TORQUE-TF as the spec writes them."""
+    """DYN-IA, DYN-OA, DYN-TORQUE-TF as written there."""
     tau = p.J / p.C + p.H**2 / (p.K_I * p.C)
     cubic, square = p.H**2 * p.J / (p.K_I * p.K_O * p.C) * s**3, p.H**2 / (p.K_I * p.K_O) * s**2
     delta = cubic + square + tau * s + 1.0

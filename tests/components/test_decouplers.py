@@ -120,7 +120,7 @@ def test_secant_is_held_beyond_its_limit(mount):
 
 
 def test_without_t2_a_degree_of_azimuth_costs_a_degree_of_margin():
-    """The loop of spec d3, 4 (10 Hz, PM 53.6 deg) on x and y: det(I + L(s) T1 T2) over the eigenvalues of T1 T2."""
+    """The loop of PLATFORM-1AXIS (10 Hz, PM 53.6 deg) on x and y: det(I + L(s) T1 T2) over the eigenvalues of T1 T2."""
     wc = 2 * math.pi * 10
     num = np.polymul(np.polymul([1.0, wc / 15], [4 / wc, 1.0]), [1.0])
     den = np.polymul(np.polymul([1 / (4 * wc), 1.0], [1.25e-3, 1.0]), [2.0, 0.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""The mounts against what the book's tests say they see: Earth rate and gravity in instrument axes."""
+"""The mounts against what the tests of Hu 1981 say they see: Earth rate and gravity in instrument axes."""
 
 import math
 
@@ -37,7 +37,7 @@ def matrix(name, **parameters):
 
 
 def seen(name, base, angle):
-    """(specific force in the book's sign over g, Earth rate over W) in instrument axes, the table at ``angle``."""
+    """(specific force in the sign of Hu 1981 over g, Earth rate over W) in instrument axes, the table at ``angle``."""
     m = matrix(name, base=base.tolist()) @ passive_z(angle) @ base
     return m @ -U, m @ pole(LATITUDE)
 
@@ -93,7 +93,7 @@ def test_tumble_attitudes_are_those_of_the_bench():
         assert matrix(f"tumble {name}", base=base.tolist()) == pytest.approx(face, abs=1e-15)
 
 
-# specific force (book sign, over g) at the book's angle theta = -table angle, table axis on the pole [spec d1]
+# specific force (sign of Hu 1981, over g) at its angle theta = -table angle, table axis on the pole [TUM1-GEOM]
 TUMBLES = {
     "tumble mount 1": lambda c, s: (-C * s, -S, -C * c),  # 4.3
     "tumble mount 2": lambda c, s: (-C * s, S, C * c),

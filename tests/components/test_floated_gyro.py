@@ -173,7 +173,7 @@ def test_standard_gyro():
 
 
 def test_ageing_and_temperature_in_torque_sign():
-    """The book's 2-39..2-42 written out in torque sign, omega_d = -omega_M."""
+    """Hu 1981, eq. 2-39..2-42 written out in torque sign, omega_d = -omega_M."""
     d_k, u_x, u_y, u_z = 2e-6, 3e-6, -1e-6, 4e-6
     t_zx, t_yy, t_xz = 5e-8, 6e-8, 7e-8
     part = started(

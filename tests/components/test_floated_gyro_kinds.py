@@ -13,7 +13,7 @@ from gyrobench.component import ComponentError
 from gyrobench.packaging.instance import make
 
 H = 1e-3
-# the gyro of the thesis [GYRO-SDF-EOM]; as a rate gyro of 100 Hz, damping 0.7
+# the gyro of Xia 2008 [GYRO-SDF-EOM]; as a rate gyro of 100 Hz, damping 0.7
 SPIN, J_O, D_J, WN = 0.02, 2.5e-5, 3e-6, 2 * math.pi * 100
 RATE = {"H": SPIN, "J": J_O, "K": J_O * WN**2, "C": 2 * 0.7 * J_O * WN, "u_max": 10.0, "k": 1.0}
 INPUTS = ("omega", "alpha", "f", "i", "dT")
@@ -136,14 +136,14 @@ def test_cross_coupling_has_the_corrected_sign():
 @pytest.mark.parametrize(
     "given, wanted",
     [
-        ({"alpha": [0.0, 1.0, 0.0]}, -258.0),  # -J_O / H per rad/s2  [A6]
+        ({"alpha": [0.0, 1.0, 0.0]}, -258.0),  # -J_O / H per rad/s2
         ({"omega": [0.1, 0.0, 0.1], "K": 1e5, "C": 3.0}, 0.309),  # (J_S - J_I) / H = 30.9 per (rad/s)2
         ({"alpha": [1.0, 0.0, 0.0], "J_IO": 1.5e-7}, 1.55),  # J_IO / H
         ({"omega": [0.0, 0.0, 0.5], "J_SI": 3e-8, "dJ": 0.0}, 0.0773),  # J_SI / H = 0.309 times w_S2
     ],
 )
 def test_magnitudes_of_the_spec(given, wanted):
-    """deg/h, spec d3: 258, 30.9, 1.5, 0.31; the case's rate is held while its acceleration acts (as inputs)."""
+    """[GYRO-DYNAMIC-ERR] 258, 30.9, 1.5, 0.31 deg/h; the case's rate is held while its acceleration acts."""
     assert indicated_error(**given) / DEG_H == pytest.approx(wanted, rel=0.01)
 
 

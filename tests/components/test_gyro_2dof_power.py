@@ -16,7 +16,7 @@ from gyrobench.packaging.instance import make
 Gyro2dof = load_part("gyro_2dof", BENCH)
 QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
 STILL = {**QUIET, **{f"D{c}_{n}": 0.0 for c in "xy" for n in ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")}}
-POWER = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}  # spec d4, section 3
+POWER = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}  # STAB-POWER-2DOF
 STATES = ("psi_x", "psi_y", "p", "q")
 
 

@@ -70,7 +70,7 @@ GYRO = {"H_g": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}
 
 
 def test_routh_limit():
-    """(10/0.5 + 2/0.02) (10 + 10*2/10) = 120 * 12 = 1440 N.m/rad [spec d4, B6]; k_u k_i ratio = 10 * 10 * 100."""
+    """(10/0.5 + 2/0.02) (10 + 10*2/10) = 120 * 12 = 1440 N.m/rad [STAB-POWER-2DOF]; k_u k_i ratio = 10 * 10 * 100."""
     StabilizerPower(**GYRO, k_m=0.999 * 0.144).initialize()
     with pytest.raises(ComponentError, match=r"at or beyond the Routh limit 1440 N\.m/rad"):
         StabilizerPower(**GYRO, k_m=0.144 * 1.0001).initialize()

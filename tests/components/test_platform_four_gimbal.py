@@ -1,4 +1,4 @@
-"""The four-gimbal platform: where its servo keeps it, where not, launch, refusals (numbers of spec d4, 9)."""
+"""The four-gimbal platform: where its servo keeps it, where not, launch, refusals [PLATFORM-4GIMBAL]."""
 
 import math
 
@@ -110,7 +110,7 @@ def test_beyond_90_degrees_of_pitch():
     [(SEC, 182.0, 0.32, None), (ONE, 182.0, 1.31, 12.3), (SIGN, 41.0, 0.003, None)],
 )
 def test_crossing_pitch_90(gain, moved, error, swing):
-    """At 36 deg/s with 1 deg/s of roll and yaw.  The error with the sign is below that of the spec's coarser steps."""
+    """At 36 deg/s with 1 deg/s of roll and yaw.  With the sign the error is below PLATFORM-4GIMBAL's."""
     out = fly(PART, loop, 10.0, gain=gain, allow_vertical=1)
     assert travel(out) == pytest.approx(moved, rel=0.02)
     assert worst(out) < 2 * error and (gain == SIGN or worst(out) > error / 2)

@@ -105,7 +105,7 @@ def test_limits_of_voltage_and_current():
 def test_gyro_wired_by_its_momentum_keeps_the_nutation():
     """J w + h = const and J_g b'' = H w exchanged at 0.1 ms: 17.4 Hz, neither growth nor decay over 32 turns (2 s)."""
     p = made(J=0.5, **BARE)
-    h, big_h, small = 1e-4, 10.0, 0.02  # spec d4, 3: nutation H / sqrt(J_x J_y) = 100 rad/s with 0.5 and 0.02
+    h, big_h, small = 1e-4, 10.0, 0.02  # STAB-POWER-2DOF: nutation H / sqrt(J_x J_y) = 100 rad/s with 0.5 and 0.02
     b, rate, kick = 0.0, 0.01, []
     for k in range(20000):
         p.set("h_gyro", big_h * b)

@@ -76,7 +76,7 @@ def test_dynamics_are_those_of_lagrange():
 
 
 def test_neutral_inertias():
-    """Spec d3: 2.0, 1.0, 0.7 kg.m2 about roll, pitch, azimuth, no coupling."""
+    """[PLATFORM-3AXIS-DYN] 2.0, 1.0, 0.7 kg.m2 about roll, pitch, azimuth, no coupling."""
     for axis, inertia in enumerate((1.0, 2.0, 0.7)):
         part = Platform(**BARE)
         part.initialize()

@@ -121,7 +121,7 @@ def roll_then_yaw(t):
 
 
 def test_rolled_into_lock_it_is_dragged_along_by_the_whole_yaw():
-    """Spec d4, 8: roll to exactly 90 deg, then 50 deg of yaw: the platform's error is the 50 deg."""
+    """[PLATFORM-3GIMBAL-2DOF] roll to exactly 90 deg, then 50 deg of yaw: the platform's error is the 50 deg."""
     out = fly("platform_three_gimbal_2dof", roll_then_yaw, 8.0, mount=1, allow_lock=1)
     assert out["error"][-1] == pytest.approx(50.0 * DEG, rel=1e-6)
     assert np.linalg.norm(out["attitude"][-1]) == pytest.approx(50.0 * DEG, rel=1e-6)

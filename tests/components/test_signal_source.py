@@ -80,7 +80,7 @@ def test_white_noise_is_not_that_of_the_walk():
 
 
 def test_burg_finds_the_model_again():
-    """BENCH-DRIFT-AR3: ARIMA(3,1,0) differenced; Burg's a is -phi.  Standard errors: spec d3 [C8], 0.007 to 0.0085."""
+    """BENCH-DRIFT-AR3: ARIMA(3,1,0) differenced; Burg's a is -phi.  Standard errors 0.007 to 0.0085."""
     linear = pytest.importorskip("statsmodels.regression.linear_model")
     s = run(17158, T=5.0, p=3, phi=AR3, w=math.sqrt(SIGMA2), white=0.0, integrated=1)
     phi, variance = linear.burg(np.diff(s["z"]), order=3)

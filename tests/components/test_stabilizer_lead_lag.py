@@ -53,7 +53,7 @@ def loop(gain=1.0):
 
 
 def test_margins_of_the_spec():
-    """[B11] crossover 100 rad/s, phase margin 52.3 deg, -24 dB/decade; stable at 5 % of the gain, not at 4 % [B11c]."""
+    """Crossover 100 rad/s, phase margin 52.3 deg, -24 dB/decade; stable at 5 % of the gain, not at 4 %."""
     lower, phase, _, crossover = control.margin(loop())
     assert crossover == pytest.approx(100.0, abs=0.5)
     assert phase == pytest.approx(52.3, abs=0.1)
@@ -65,7 +65,7 @@ def test_margins_of_the_spec():
 
 
 def test_at_rest_the_gain_is_K():
-    """A finite T1 does not remove the error at rest [B12]; with the integral v grows without end."""
+    """A finite T1 does not remove the error at rest; with the integral v grows without end."""
     part = started(T1=0.5, tau1=0.2)
     part.u = 0.01
     for k in range(1000):

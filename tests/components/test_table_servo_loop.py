@@ -1,4 +1,4 @@
-"""The loop of the table servo with floated_gyro: margins of the spec, exactness, statics, drift, exchange step."""
+"""The loop of the table servo with floated_gyro: margins of TABLE-SERVO, exactness, statics, drift, exchange step."""
 
 import math
 
@@ -157,7 +157,7 @@ def test_undamped_gyro_holds_the_torque_with_the_float():
 
 
 def test_drift_and_earth_rate():
-    """rate = omega_d - omega_E,x (spec d1, 5.0 with omega_M = -omega_d), the drift of 1e-7 rad/s with its sign."""
+    """rate = omega_d - omega_E,x (MEAS-SERVO with omega_M = -omega_d), the drift of 1e-7 rad/s with its sign."""
     track = Loop(gyro_parameters={"D_F": 1e-7}).run(0.6)
     assert track[-1, 2] == pytest.approx(1e-7, rel=1e-6)
     earth = [0.0, 0.0, 5.22e-5]

@@ -1,4 +1,4 @@
-"""Kinematics of the two-axis table: attitude against the spec and scipy, rates as derivatives of the attitude."""
+"""Kinematics of the two-axis table: attitude against SERVO2-A and scipy, rates as derivatives of the attitude."""
 
 import math
 

@@ -1,6 +1,6 @@
-"""Platform and decoupler in their loop (spec d3, 4): stability over azimuth, cross axes, isolation, the 83-mil bench.
+"""Platform and decoupler in their loop: stability over azimuth, cross axes, isolation, the 83-mil bench.
 
-Gyros (Y2 with the spec's mounting) and controllers are written here, exact for held inputs; 0.5 ms exchange.
+Gyros (mounting of GYRO-OA-COUPLING-Y2) and controllers are written here, exact for held inputs; 0.5 ms exchange.
 """
 
 import math
@@ -108,7 +108,7 @@ def cross(path, hertz):
     ],
 )
 def test_cross_axes_of_a_commanded_sine(theta, hertz, spec):
-    """F15: x command of a third of 83 mil; cross over main with and without T2, ratio <= 0.1; the spec's numbers."""
+    """[DECOUPLE-BENCH-83MIL] x command of a third of 83 mil; cross over main with and without T2, ratio <= 0.1."""
     amplitude = 83 * MIL / 3 * 2 * math.pi * hertz
 
     def command(t):
@@ -133,7 +133,7 @@ def test_base_motion_is_isolated():
     path = fly([20 * DEG, 0.0, 30 * DEG], 5.0, True, base=base)
     left = [np.std(detrend(path[round(2 / STEP) :, k])) for k in range(3)]
     assert max(left) < size / math.sqrt(2) / 100
-    assert 20 * math.log10(max(left) / (size / math.sqrt(2))) == pytest.approx(-44.8, abs=1.0)  # the spec's own run
+    assert 20 * math.log10(max(left) / (size / math.sqrt(2))) == pytest.approx(-44.8, abs=1.0)  # DECOUPLE-BENCH-83MIL
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def run(pair, seconds, watch=None):
 
 # ------------------------------------------------------------------------------------------------ erection
 def test_time_from_two_degrees_to_the_dead_zone():
-    """[D2] (2 deg - 10') / (4 deg/min) = 27.5 s, and then it stays at the edge."""
+    """(2 deg - 10') / (4 deg/min) = 27.5 s, and then it stays at the edge."""
     pair = bench({"tilt": [2.0 * DEG, 0.0]})
     tilts = run(pair, 40.0, tilt)
     assert tilts[0] == pytest.approx(2.0 * DEG, rel=1e-3)
@@ -82,14 +82,14 @@ def test_time_from_two_degrees_to_the_dead_zone():
 
 
 def test_linear_law_decays_with_k():
-    """[D1] e = e0 exp(-k t) on both axes, k = gain; small tilts."""
+    """e = e0 exp(-k t) on both axes, k = gain; small tilts."""
     pair = bench({"tilt": [1e-3, -2e-3]}, {"law": 1.0, "gain": 0.05})
     run(pair, 40.0)
     assert tilt(pair) == pytest.approx(math.hypot(1e-3, 2e-3) * math.exp(-2.0), rel=1e-3)
 
 
 def test_hang_off_of_the_linear_law_under_earth_rate():
-    """[D4] Earth rate at 40 deg, k = 0.05 1/s: 3.84 arcmin."""
+    """Earth rate at 40 deg, k = 0.05 1/s: 3.84 arcmin."""
     pair = bench(None, {"law": 1.0}, {"earth_rate": 7.2921159e-5})
     run(pair, 200.0)
     assert tilt(pair) / ARCMIN == pytest.approx(3.84, abs=0.01)
@@ -99,7 +99,7 @@ def test_hang_off_of_the_linear_law_under_earth_rate():
 
 
 def test_torque_about_the_same_axis_only_cones():
-    """[D1b] T = -law along the tilt's own axis: the tilt turns round with k and keeps its size."""
+    """T = -law along the tilt's own axis: the tilt turns round with k and keeps its size."""
     pair = bench({"tilt": [2e-3, 0.0]}, {"law": 1.0, "cross": 0.0})
     start = np.array([pair.parts["gyro"].e_x, pair.parts["gyro"].e_y])
     run(pair, 2 * math.pi / 0.05 / 4)  # a quarter of a turn
@@ -119,7 +119,7 @@ def test_fast_start():
 
 # ----------------------------------------------------------------------------------- manoeuvre and cut-off
 def test_acceleration_with_and_without_cut_off():
-    """[D3] 0.2 g for 60 s: 4.0 deg towards the apparent vertical without cut-off (the apparent one 11.3 deg away)."""
+    """0.2 g for 60 s: 4.0 deg towards the apparent vertical without cut-off (the apparent one 11.3 deg away)."""
     vehicle = row(right=0.2 * G0)
     pair = bench(None, {"cut_off": 0.0}, vehicle)
     run(pair, 60.0)

@@ -42,14 +42,14 @@ def test_gain_margin_of_three_lags() -> None:
 
 
 def leadlag() -> control.TransferFunction:
-    """Spec d4 item 4: K_G (1 + t1 s)(1 + t2 s)/((1 + T1 s)(1 + T2 s)) K / (J s^2), conditionally stable."""
+    """[STAB-FLOATED-2DOF] K_G (1 + t1 s)(1 + t2 s)/((1 + T1 s)(1 + T2 s)) K / (J s^2), conditionally stable."""
     s = control.tf("s")
     g = 2.0 * (1 + 0.2 * s) * (1 + 0.03 * s) / ((1 + 2.0 * s) * (1 + 0.003 * s))
     return 8250.0 * g / (0.5 * s * s)
 
 
 def test_conditional_stability_shows_its_lower_limit() -> None:
-    """[B11, B11c]: crossover 100 rad/s, phase margin 52.3 deg, lower limit 0.044; python-control on the same L."""
+    """: crossover 100 rad/s, phase margin 52.3 deg, lower limit 0.044; python-control on the same L."""
     loop = leadlag()
     f = grid(0.02, 300.0)
     found = margins(f, np.array([complex(loop(2j * np.pi * x)) for x in f]))

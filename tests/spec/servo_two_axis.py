@@ -1,4 +1,4 @@
-"""Ideal records of the two-axis servo test, from the book's equations alone: 3-95 to 3-97 written out, integrated."""
+"""Ideal records of the two-axis servo test, from Hu 1981, eq. 3-95..3-97 alone, written out and integrated."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ DPH = math.pi / 180.0 / 3600.0
 W = frames.EARTH_RATE
 Array = np.ndarray[Any, Any]
 Line = Callable[[Array, Sequence[float]], Any]
-#: the book's coefficients of both lines, and the ninth of each channel (ours)
+#: the coefficients of Hu 1981 of both lines, and the ninth of each channel (ours)
 X_NAMES = ("R_x", "U_z", "U_x", "K_zz − K_xx", "K_zx", "K_xz", "K_zy", "K_xy")
 Y_NAMES = ("R_y", "U_z", "U_y", "K_yy − K_zz", "K_zy", "K_yz", "K_zx", "K_yx")
 
 
 def mounts(phi: float) -> dict[int, tuple[Array, Array]]:
-    """X and Y of the twelve rows of appendix 2, as spec d1 lists them."""
+    """X and Y of the twelve rows of appendix 2, as APP2 lists them."""
     e, n, u, p = frames.E, frames.N, frames.U, frames.pole(phi)
     i = np.cross(e, p)
     return {
@@ -75,7 +75,7 @@ def beta(g: Array, p: Sequence[float]) -> Any:
 def integrate(
     number: int, phi: float, g: float, px: Sequence[float], py: Sequence[float], times: Array
 ) -> tuple[Array, Array]:
-    """Angles of both axes of a gyro with the book's coefficients, from 0, 0: omega_x = alpha', omega_y = beta'."""
+    """Angles of both axes of a gyro with the coefficients of Hu 1981, from 0, 0: omega_x = alpha', omega_y = beta'."""
     base = frame(number, phi)
     earth, down = base @ (W * frames.pole(phi)), base @ np.array([0.0, 0.0, -g])
 
@@ -113,7 +113,7 @@ def record(
 
 
 def ours(px: Sequence[float], py: Sequence[float]) -> dict[str, float]:
-    """The book's coefficients as ours, deg/h per g^n, by CROSS-MAP."""
+    """The coefficients of Hu 1981 as ours, deg/h per g^n, by CROSS-MAP."""
     x = ("Dx_0", "Dx_x", "Dx_z", "Dx_xz", "Dx_xx", "Dx_zz", "Dx_xy", "Dx_yz")
     y = ("Dy_0", "Dy_y", "Dy_z", "Dy_yz", "Dy_yy", "Dy_zz", "Dy_xy", "Dy_xz")
     sx, sy = (-1, -1, 1, -1, -1, 1, -1, 1), (1, -1, 1, 1, -1, 1, -1, 1)

@@ -78,7 +78,7 @@ def test_specific_force_and_rates_of_the_mounts(latitude: float) -> None:
 @pytest.mark.parametrize(("turn", "rate"), [(72, -10.0), (12, 7.0)])
 def test_least_squares_and_closed_formulas_recover(model: str, latitude: float, turn: int, rate: float) -> None:
     """[TUM2A, TUM2B-REDUCE, TUM2B-LS] both ways, 1e-9 of the largest coefficient; the nine-term formulas divide by
-    sin^2 phi and sin^2 2 phi and lose a digit (1e-8, as in the spec).
+    sin^2 phi and sin^2 2 phi and lose a digit (1e-8).
     """
     names = NAMES[model]
     truth = random_truth(int(latitude) + turn + 90, names)
@@ -113,8 +113,8 @@ def test_polarity_of_the_book(model: str) -> None:
 
 
 def test_the_book_symbols_of_the_simple_model() -> None:
-    """[spec d1, 4.1] k_x i_x = w_y - R_x + u_zx g_y - u_y g_z - Q_x g_y g_z, k_y i_y = w_x + R_y - u_x g_z + u_zy g_x +
-    Q_y g_x g_z: currents made from these lines (gamma = 1) give the eight numbers of the table back.
+    """[MEAS-REBALANCE] k_x i_x = w_y - R_x + u_zx g_y - u_y g_z - Q_x g_y g_z, k_y i_y = w_x + R_y - u_x g_z
+    + u_zy g_x + Q_y g_x g_z: currents made from these lines (gamma = 1) give the eight numbers of the table back.
     """
     rng = np.random.default_rng(7)
     symbols = dict(zip(T.closed.BOOK, rng.normal(size=8).tolist(), strict=True))
@@ -128,7 +128,7 @@ def test_the_book_symbols_of_the_simple_model() -> None:
         w["mean_x"][j] = (-b["R_x"] + b["u_zx"] * gy - b["u_y"] * gz - b["Q_x"] * gy * gz) * DPH / T.K["x"]
         w["mean_y"][j] = (b["R_y"] - b["u_x"] * gz + b["u_zy"] * gx + b["Q_y"] * gx * gz) * DPH / T.K["y"]
     r = T.reduction.reduce(w, s)
-    (table,) = [t for t in r.tables if t["title"] == "The book's quantities"]
+    (table,) = [t for t in r.tables if t["title"] == "Quantities of Hu 1981"]
     for row in table["rows"]:
         assert row[2] == pytest.approx(symbols[row[0]], abs=1e-6)  # windows of finite width: 1 - sinc(0.1 deg)
 
@@ -191,7 +191,7 @@ def test_condition_numbers(latitude: float, x: float, y: float) -> None:
     """[TUM2B-SING] N = 36 a mount and the two dwells."""
     for channel, expected in (("x", x), ("y", y)):
         found = np.linalg.cond(T.geometry.design("nine", channel, math.radians(latitude)))
-        assert abs(found - expected) <= (0.5 if expected > 50 else 0.05)  # the digits of the spec
+        assert abs(found - expected) <= (0.5 if expected > 50 else 0.05)  # the digits of TUM2B-SING
 
 
 def test_rank_at_the_equator_and_the_poles() -> None:
@@ -258,7 +258,7 @@ def test_corrected_and_printed_simple_model() -> None:
 
 
 def test_corrected_and_printed_nine_term_model() -> None:
-    """[TUM2B-REDUCE, TUM2B-ERR, E25-E29] amplitudes of spec d1 4.5 by hand, and printed forms that fail."""
+    """[TUM2B-REDUCE, TUM2B-ERR, E25-E29] amplitudes by hand, and printed forms that fail."""
     truth = random_truth(10)
     s = T.setup(41.0, gravity=frames.G0, truth=truth)
     w = T.record(s, truth)

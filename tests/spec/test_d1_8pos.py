@@ -24,7 +24,7 @@ M: Any = importlib.import_module(".model", PACKAGE)
 DPH, KU = math.pi / 648000.0, math.pi / 648000.0 / 1e-3
 W = frames.EARTH_RATE
 E, N, U = np.eye(3)
-#: spec d1, 4.2, by hand: x, y, z of every position
+#: POS8-FRAMES by hand: x, y, z of every position
 BOOK = {1: (E, N, U), 2: (N, -E, U), 3: (-E, -N, U), 4: (-N, E, U), 5: (U, E, N), 6: (-E, U, N), 7: (-U, -E, N), 8: (E, -U, N)}  # fmt: skip  # noqa: E501
 NAMES = ("k_x", "k_y", "R_x", "R_y", "u_x", "u_y", "u_zx", "u_zy")
 
@@ -40,7 +40,7 @@ def torque_balance(
 
     The torquers and the disturbances keep H = H z turning with the case: torque = omega x H, so that torque about x is
     +H omega_y and about y -H omega_x.  Disturbances over H: M_x/H = R_x - u_zx g_y + u_y g_z, M_y/H = R_y - u_x g_z +
-    u_zy g_x with g the direction of gravity, K_ij (m^2 g^2 K'_ij/H) of the spec's 1, GYRO-STATIC-TORQUE.
+    u_zy g_x with g the direction of gravity, K_ij (m^2 g^2 K'_ij/H) of GYRO-STATIC-TORQUE.
     """
     K = compliance if compliance is not None else np.zeros((3, 3))
     k = lambda i, j: float(K["xyz".index(i), "xyz".index(j)])  # noqa: E731
@@ -87,7 +87,7 @@ def si(c: Any) -> float:
 
 # ------------------------------------------------------------------------------------------ geometry and formulas
 def test_frames() -> None:
-    """[POS8-FRAMES] The positions are the book's and right-handed."""
+    """[POS8-FRAMES] The positions are those of Hu 1981 and right-handed."""
     for n, axes in BOOK.items():
         assert np.array_equal(P.ATTITUDES[n], np.array(axes))
         frames.check_rotation(P.ATTITUDES[n], str(n))
@@ -253,7 +253,7 @@ def test_e19() -> None:
 
 
 def test_days_together() -> None:
-    """Mean, sigma and t interval over the days; the book's unbalance is stable, its scale factor is not the truth."""
+    """Mean, sigma and t interval over the days; the printed unbalance is stable, the scale factor is not the truth."""
     rng, phi = np.random.default_rng(10), math.radians(45.75)
     p, each = gyro(rng), {}
     R_x = [p["R_x"] + v * DPH for v in (0.1, -0.2, 0.3, 0.0)]

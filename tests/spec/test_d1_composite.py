@@ -1,4 +1,4 @@
-"""spec d1, 5.5: composite drift, its scatter and correlation.  STAT-ERR, E45, E46."""
+"""TEST-COMPOSITE: composite drift, its scatter and correlation.  STAT-ERR, E45, E46."""
 
 from __future__ import annotations
 

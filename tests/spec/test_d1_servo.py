@@ -1,4 +1,4 @@
-"""spec d1, section 5: servo-table tests.  SERVO-TF, -NOISE, -C1, -C2, -C3-*, STAT-ERR, CROSS-MAP, E35-E46, E52, E53.
+"""Servo-table tests.  SERVO-TF, -NOISE, SERVO-C1, -C2, SERVO-C3-REDUCE, STAT-ERR, CROSS-MAP, E35-E46, E52, E53.
 
 Truth comes from the torque-sign polynomial of section 1 put into 3-59, attitude by attitude, written out here.
 """
@@ -64,7 +64,7 @@ def rate(p: dict[str, float], mount: str, theta: Any, phi: float, g: float = 1.0
 
 
 def amplitudes(p: dict[str, float], mount: str, phi: float, g: float = 1.0) -> dict[str, float]:
-    """Book naming: A sine, B cosine; by exact discrete Fourier sums over a turn."""
+    """Naming of Hu 1981: A sine, B cosine; by exact discrete Fourier sums over a turn."""
     theta = np.arange(360) * math.pi / 180.0
     r = rate(p, mount, theta, phi, g)
     return {
@@ -336,7 +336,7 @@ def test_ranks() -> None:
 
 
 def test_uncertainties_per_unit_noise() -> None:
-    """36 points a mount and two dwells at 45.75 degrees: the spec's eight numbers."""
+    """36 points a mount and two dwells at 45.75 degrees: the eight numbers of SERVO-C3-SING."""
     phi = math.radians(45.75)
     windows, _ = REFUSALS.held(phi, ("x east, y up", "x east, y down", "polar S", "polar N"))
     X = servo_regression.design(windows, run_metadata.Site(phi, frames.G0), drift.terms(8))

@@ -1,6 +1,6 @@
-"""spec d1, 5.6: two-axis servo test.  SERVO2-A, -KIN, -102, -LOCK, -RANK, -E2E, APP2, E47, E50, E51.
+"""Two-axis servo test.  SERVO2-A, -KIN, -102, -LOCK, -RANK, -E2E, APP2, E47, E50, E51.
 
-The oracle (servo_two_axis.py) integrates the book's equations as corrected in the spec; it shares no code with the
+The oracle (servo_two_axis.py) integrates the equations of Hu 1981 as corrected; it shares no code with the
 system.
 """
 
@@ -39,7 +39,7 @@ DAY = 86400.0
 
 
 def coefficients(rng: np.random.Generator, terms: int) -> tuple[list[float], list[float]]:
-    """Random coefficients of the book's size: R, U up to 1, K up to 0.2 deg/h per g^n; and the ninth."""
+    """Random coefficients of the size of Hu 1981: R, U up to 1, K up to 0.2 deg/h per g^n; and the ninth."""
     size = np.array([0.5, 0.6, 0.6, 0.2, 0.06, 0.06, 0.06, 0.06, 0.2])[:terms] * DPH
     return list(size * rng.uniform(-1.0, 1.0, terms)), list(size * rng.uniform(-1.0, 1.0, terms))
 
@@ -164,7 +164,7 @@ def test_mount_2_written_out() -> None:
 
 # ------------------------------------------------------------------------------------------ what mounts tell
 def test_gimbal_lock() -> None:
-    """SERVO2-LOCK: the spec's table at 45.75 degrees; the path itself; 5 and 12 everywhere, 3 and 8 at 45 degrees."""
+    """SERVO2-LOCK: the table at 45.75 degrees; the path itself; 5 and 12 everywhere, 3 and 8 at 45 degrees."""
     table = [44.25, 45.75, 88.5, 45.75, 90.0, 0.0, 44.25, 88.5, 0.0, 0.0, 0.0, 90.0]
     assert [math.degrees(geometry.swing(m, PHI)) for m in range(1, 13)] == pytest.approx(table, abs=1e-6)
     for phi in (PHI, math.radians(-30.0), math.radians(70.0)):
@@ -177,7 +177,7 @@ def test_gimbal_lock() -> None:
 
 
 def test_path_against_integration() -> None:
-    """Both ways of the path, without and with drift, against the book's equations integrated."""
+    """Both ways of the path, without and with drift, against the equations of Hu 1981 integrated."""
     t = np.linspace(0.0, DAY, 241)
     for m in (2, 4, 9):
         none = [0.0] * 8
@@ -190,7 +190,7 @@ def test_path_against_integration() -> None:
 
 
 def test_rank_and_best_pairs() -> None:
-    """SERVO2-RANK at 45.75 degrees, 24 h, the book's eight terms a channel."""
+    """SERVO2-RANK at 45.75 degrees, 24 h, the eight terms a channel of Hu 1981."""
     ranks = {1: (8, 8), 2: (8, 8), 4: (8, 8), 9: (5, 5), 10: (5, 5), 7: (5, 4), 6: (1, 1), 11: (1, 1)}
     each = {m: refusals.designs([m], PHI, DAY, 8, W) for m in ranks}
     for m, expected in ranks.items():
@@ -217,7 +217,7 @@ def test_recovery_to_1e_8(seed: int, terms: int) -> None:
     for c in result.coefficients:
         assert c.estimate == pytest.approx(truth[c.name], abs=1e-8), (c.name, math.degrees(phi), pair)
         assert c.closed == pytest.approx(truth[c.name], abs=1e-8), c.name
-    book = next(t for t in result.tables if t["title"] == "In the book's names")["rows"]
+    book = next(t for t in result.tables if t["title"] == "Notation of Hu 1981")["rows"]
     expected = [v / DPH for v in (*px[:8], *py[:8])]
     assert [row[1] for row in book] == pytest.approx(expected, abs=1e-8)
 

@@ -1,4 +1,4 @@
-"""Models of spec d1, sections 1 to 3: each erratum of the static and dynamic equations that changes a number.
+"""Static and dynamic models of gyros: each erratum of the static and dynamic equations that changes a number.
 
 The right value of a static model is the cross product itself: M = M_0 + l x (m SF) + (K m SF) x (m SF), drift rates
 omega_dx = -M_y/H, omega_dy = +M_x/H [STATIC-TORQUE, STATIC-DRIFT].  The bench's coefficients give it; the same

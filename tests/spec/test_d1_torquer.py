@@ -1,4 +1,4 @@
-"""TEST-TORQUER: the book's table, its errata, refusals, recovery of a made torquer."""
+"""TEST-TORQUER: the table of Hu 1981, its errata, refusals, recovery of a made torquer."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def test_averaging_windows_are_allowed_for() -> None:
 
 
 def test_polarity_of_the_book() -> None:
-    """Book current k i = omega_d - omega_IA: the same coefficients from the negated current."""
+    """Current of Hu 1981, k i = omega_d - omega_IA: the same coefficients from the negated current."""
     truth = random_truth(4)
     s = T.setup(truth=truth)
     w = T.record(s, truth)
@@ -117,7 +117,7 @@ def amplitudes() -> tuple[dict[str, float], dict[str, float], float, float, dict
 
 
 def test_corrected_formulas(amplitudes: Any) -> None:
-    """[TUM1-REDUCE] amplitudes as in spec d1 4.3 and their separation."""
+    """[TUM1-REDUCE] amplitudes and their separation."""
     one, two, y3, y4, D = amplitudes
     phi = math.radians(41.0)
     c, s, s2 = math.cos(phi), math.sin(phi), math.sin(2 * phi)
@@ -313,7 +313,7 @@ def test_other_attitudes_have_no_closed_formulas() -> None:
     s = T.setup(truth=truth, faces={p: tilt @ f for p, f in s0.faces.items()})
     r = T.reduction.reduce(T.record(s, truth), s)
     assert all(abs(c.estimate - c.truth) < 1e-8 for c in r.coefficients)
-    assert r.coefficients[0].closed is None and any("attitudes: least squares only" in x for x in r.warnings)
+    assert r.coefficients[0].closed is None and any("attitudes of Hu 1981: least squares only" in x for x in r.warnings)
 
 
 # ------------------------------------------------------------------------------------------ the rest of a result

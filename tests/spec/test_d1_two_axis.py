@@ -133,7 +133,7 @@ def test_polarity_of_the_book_and_cycles() -> None:
     (5, 1, (6.9, 6.6, 7.2, 27)), (2, 1, (16, 15, 28, 282)), (3, 2, (9.1, 7.5, 8.3, 27)),
 ])  # fmt: skip
 def test_condition_numbers(m: int, n: int, expected: tuple[float, ...]) -> None:
-    """[spec d1, 4.6] N = 36 at 0, 20, 45.75 and 70 degrees."""
+    """[TUM2AX-LS] N = 36 at 0, 20, 45.75 and 70 degrees."""
     for latitude, value in zip((0.0, 20.0, 45.75, 70.0), expected, strict=True):
         found = np.linalg.cond(T.geometry.design(math.radians(latitude), m, n, 36))
         assert abs(found - value) <= (0.05 if value < 10 else 0.5), (latitude, found)
@@ -179,7 +179,7 @@ def test_corrected_and_printed_formulas(latitude: float, m: int, n: int) -> None
     np.testing.assert_allclose(T.closed.amplitudes(theta, y, m, n), [A, B], atol=1e-11)
     phi = s.latitude
     c, sn, s2 = math.cos(phi), math.sin(phi), math.sin(2 * phi)
-    # the model's own lines, written down again (spec d1, 4.6)
+    # the model's own lines, written down again
     assert A[0] == pytest.approx(D["D_F"] + D["D_II"] * c * c / 2 + D["D_SS"] * (c * c / 4 + sn * sn / 2))
     assert A[2] == pytest.approx(-D["D_O"] * c / 2 + D["D_IO"] * s2 / 4) and A[5] == pytest.approx(-D["D_I"] * c)
     assert B[6] == pytest.approx(D["D_OS"] * (c * c / 4 - sn * sn / 2)) and B[3] == pytest.approx(D["D_S"] * sn)

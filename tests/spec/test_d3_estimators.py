@@ -1,4 +1,4 @@
-"""EST-KF-*, EST-WAVELET-ONLINE and the drift benchmarks of spec d3: the parts against its figures."""
+"""EST-KF-AR, EST-WAVELET-ONLINE and the drift benchmarks: the parts against their figures."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_sine_through_sage_husa(sine):
     assert error(found[:, 0], truth) == pytest.approx(-7.8, abs=0.4)
     assert gain_and_phase(t, found[:, 0])[0] == pytest.approx(1.002, abs=0.005)
     ratio = found[3000:, 1] / SIGMA**2
-    # the spec: 0.94 +- 0.11 (scatter in time) with the posterior of its own short form
+    # BENCH-DYN-SINE: 0.94 +- 0.11 (scatter in time) with the posterior of its own short form
     assert ratio.mean() == pytest.approx(0.94, abs=0.08) and ratio.std() == pytest.approx(0.11, abs=0.04)
 
 
@@ -75,7 +75,7 @@ def test_sine_through_the_wavelet(sine, moments, J, delay, late, now):
 
 
 def test_drift_filter_of_the_thesis_over_a_sine(sine):
-    """[E5d] sign put right, as a model of the signal: the sine is scaled by 0.389, the error 8.6 dB above the raw."""
+    """Sign put right, as a model of the signal: the sine is scaled by 0.389, the error 8.6 dB above the raw."""
     t, truth, z = sine
     y = play("estimator_kalman_ar", z)
     assert gain_and_phase(t, y)[0] == pytest.approx(0.389, rel=0.01)
@@ -83,7 +83,7 @@ def test_drift_filter_of_the_thesis_over_a_sine(sine):
 
 
 def test_drift_filter_of_the_thesis_at_rest():
-    """[D1] -8.2 dB at zero frequency, -3.0 dB at the highest, -4.6 dB for white noise: nowhere the 10 dB claimed."""
+    """-8.2 dB at zero frequency, -3.0 dB at the highest, -4.6 dB for white noise: nowhere the 10 dB claimed."""
     n = 60
     step, alternating = np.ones(n), np.resize([1.0, -1.0], n)
     warm = np.zeros(400)  # the gain is steady after the first of it
@@ -96,7 +96,7 @@ def test_drift_filter_of_the_thesis_at_rest():
 
 
 def test_ar3_error_is_that_of_the_riccati_equation():
-    """[D2] the stationary AR(3) with readings of R = Q: 1.912e-6 in theory, within 4 % here."""
+    """The stationary AR(3) with readings of R = Q: 1.912e-6 in theory, within 4 % here."""
     rng = np.random.default_rng(4)
     x = autoregressive(rng, 20000, SIGMA2)
     y = play("estimator_kalman_ar", x + rng.normal(size=x.size) * math.sqrt(SIGMA2), T=5.0, Ts=5.0)
@@ -106,7 +106,7 @@ def test_ar3_error_is_that_of_the_riccati_equation():
 
 
 def test_wrong_sign_on_the_true_process():
-    """[D3] the printed sign is refused by the part; the plain matrix filter shows why: 25 % more error, by Lyapunov."""
+    """The printed sign is refused by the part; the plain matrix filter shows why: 25 % more error, by Lyapunov."""
     F, G = companion(AR3, SIGMA2)
     W, _ = companion([-c for c in AR3], SIGMA2)
     H = np.eye(1, 3)
@@ -127,7 +127,7 @@ def test_wrong_sign_on_the_true_process():
 
 @pytest.mark.parametrize("seed", [4, 104, 204])
 def test_drift_ll(seed):
-    """BENCH-DRIFT-LL [D4]: local level 12 dB and more below the readings; AR(3) on the difference, summed, is worse."""
+    """BENCH-DRIFT-LL : local level 12 dB and more below the readings; AR(3) on the difference, summed, is worse."""
     r, n = 2.70e-6, 17158
     rng = np.random.default_rng(seed)
     level = np.cumsum(rng.normal(size=n) * math.sqrt(1e-3 * r))

@@ -1,4 +1,4 @@
-"""EST-SAGE-HUSA of spec d3: the part against its table, the printed forms against their predictions."""
+"""EST-SAGE-HUSA: the part against its table, the printed forms against their predictions."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_table(form, ratio, b, mean, sd, seed):
     _, z = series(ratio, seed)
     found = part(z, ratio, b, form)[SKIPPED:, 1] / (ratio * SIGMA2)
     # mean over 10 000 of y2 - P-: sd sqrt(2/10000) S/R with S = P- + R: 1.4 % times 1.4 (R = 4 Q) or 2.6 (R = Q);
-    # the spec's own figures scatter as much, so 3 sqrt(2) times that
+    # the figures of EST-SAGE-HUSA scatter as much, so 3 sqrt(2) times that
     F, G = companion(AR3, SIGMA2)
     gain, _ = riccati(F, G, ratio * SIGMA2)
     scatter = math.sqrt(2.0 / (N - SKIPPED)) / (1.0 - gain)
@@ -123,7 +123,7 @@ def test_printed_weight_keeps_R0(ratio):
 
 
 def test_printed_innovation_destroys_a_signal():
-    """[D7] 1 Hz sine: rms error more than three times the corrected one, R/R_true near 5 instead of near 1."""
+    """1 Hz sine: rms error more than three times the corrected one, R/R_true near 5 instead of near 1."""
     t = np.arange(1, 20001) * T
     truth = 0.01 * np.sin(2.0 * math.pi * t)
     z = truth + np.random.default_rng(4).normal(size=t.size) * SIGMA
@@ -138,7 +138,7 @@ def test_printed_innovation_destroys_a_signal():
 
 @pytest.mark.parametrize("form", [1, 2])
 def test_noise_that_changes(form):
-    """[E6] three times the noise after 30 s: R follows within 10 %, the error is below that of the fixed filter."""
+    """Three times the noise after 30 s: R follows within 10 %, the error is below that of the fixed filter."""
     t = np.arange(1, 60001) * T
     truth = 0.01 * np.sin(2.0 * math.pi * t)
     noise = np.random.default_rng(5).normal(size=t.size) * SIGMA

@@ -21,7 +21,7 @@ PHASES = {1: "static 3", 2: "mount 1", 3: "static 4", 4: "mount 2"}
 
 
 def setup(latitude: float = 45.75, **changes: Any) -> Any:
-    """TumbleSetup at ``latitude`` (deg) with the book's four attitudes."""
+    """TumbleSetup at ``latitude`` (deg) with the four attitudes of Hu 1981."""
     phi = math.radians(latitude)
     faces = frames.tumble_faces(phi)
     values: dict[str, Any] = {

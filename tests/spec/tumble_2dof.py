@@ -26,7 +26,7 @@ PHASES = {
 
 
 def setup(latitude: float = 45.75, model: str = "nine", **changes: Any) -> Any:
-    """TwoChannelSetup at ``latitude`` (deg) with the book's attitudes."""
+    """TwoChannelSetup at ``latitude`` (deg) with the attitudes of Hu 1981."""
     phi = math.radians(latitude)
     faces, phases = geometry.faces(model, phi), PHASES[model]
     values: dict[str, Any] = {

@@ -22,7 +22,7 @@ K = 17.2 * DPH / 1e-3
 
 
 def attitude(phi: float, outer: float, inner: float) -> np.ndarray:
-    """C = R_x(inner) R_y(outer) C0 of spec d1, 4.6, rows I, O, S in ENU: y(0) = p, z(0) = west."""
+    """C = R_x(inner) R_y(outer) C0 [TUM2AX-GEOM], rows I, O, S in ENU: y(0) = p, z(0) = west."""
     p = frames.pole(phi)
     y, z = p, -frames.E
     c0 = np.array([np.cross(y, z), y, z])

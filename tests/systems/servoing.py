@@ -26,12 +26,12 @@ DAY500: dict[str, Any] = {
     **DAY50, "site.earth_rate": 10.0 * W50, "time": 172.4, "window": 4.8, "dwell": 48.0,
 }  # fmt: skip
 QUIET: dict[str, Any] = dict.fromkeys(NOISES, 0.0)
-#: Ranges of the coefficients in the book (ch. 2), deg/h per g^n; signs are drawn.
+#: Ranges of the coefficients in Hu 1981 (ch. 2), deg/h per g^n; signs are drawn.
 RANGES = {"D_F": (0.05, 0.55), "D_I": (0.5, 1.3), "D_O": (0.1, 0.5), "D_S": (0.5, 1.3), "D_IS": (0.1, 0.2)}
 
 
 def gyro(rng: np.random.Generator) -> dict[str, Any]:
-    """Nine true coefficients in book range, both signs: values for a system, SI."""
+    """Nine true coefficients in the range of Hu 1981, both signs: values for a system, SI."""
     sizes = {n: rng.uniform(*RANGES.get(n, (0.01, 0.06))) for n in NAMES}
     return {f"gyro.{n}": float(size * rng.choice([-1.0, 1.0]) * DPH) for n, size in sizes.items()}
 

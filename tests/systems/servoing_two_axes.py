@@ -38,7 +38,7 @@ def day(times: float, windows_a_day: int = 144, **more: Any) -> dict[str, Any]:
 
 
 def gyro(rng: np.random.Generator) -> dict[str, float]:
-    """Eighteen coefficients of the book's size, both signs: values for a system, SI."""
+    """Eighteen coefficients of the size of Hu 1981, both signs: values for a system, SI."""
     size = {0: 0.5, 1: 1.0, 2: 0.15}
     return {
         f"gyro.{n}": float(size[drift.order(n)] * rng.uniform(0.1, 1.0) * rng.choice([-1.0, 1.0]) * DPH)

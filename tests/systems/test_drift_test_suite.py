@@ -124,7 +124,7 @@ def test_composite_drift_and_three_more_methods(sessions: dict[str, Session]) ->
 
 
 def test_both_channels_by_tumble_and_eight_positions(sessions: dict[str, Session]) -> None:
-    """The book's u_zx, u_x, R_y ... come as combinations; noise off they are what the tumble says, but for its lag."""
+    """u_zx, u_x, R_y ... of Hu 1981 are combinations; noise off they are what the tumble says, but for its lag."""
     rng = np.random.default_rng(2)
     chosen = suite("tumble_two_channel eight_position", **two_channels.gyro(rng))
     found = results(sessions, chosen, noise=False)

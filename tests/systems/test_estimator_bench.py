@@ -48,7 +48,7 @@ def named(r: Any) -> dict[str, Any]:
     ],
 )
 def test_sine(part: str, values: dict[str, float], dB: float, gain: float, seed: int) -> None:
-    """BENCH-DYN-SINE: error within 0.4 dB of the spec, gain within 0.5 %, phase within 0.4 degrees."""
+    """BENCH-DYN-SINE: error within 0.4 dB, gain within 0.5 %, phase within 0.4 degrees."""
     c = named(result(part, seed=seed, **values))
     assert c["error re raw"].estimate == pytest.approx(dB, abs=0.4)
     assert c["gain"].estimate == pytest.approx(gain, abs=max(0.005, 4.0 * c["gain"].u))
@@ -106,7 +106,7 @@ def test_consistency_counted(part: str) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_noise_that_changes(seed: int) -> None:
-    """[E6] the adaptive filter follows within 10 % and beats the fixed one of the same q."""
+    """The adaptive filter follows within 10 % and beats the fixed one of the same q."""
     own, fixed = named(result("sage_husa", "change", seed)), named(result("kalman_rate", "change", seed))
     assert own["R̂/R"].estimate == pytest.approx(1.0, abs=0.1)
     assert own["error"].estimate == pytest.approx(1.54e-3, rel=0.06)

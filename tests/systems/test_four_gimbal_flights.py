@@ -1,4 +1,4 @@
-"""The four-gimbal platform in its loop: the flights and numbers of spec d4, 9, servo laws, launch, report, refusals.
+"""The four-gimbal platform in its loop: flights and numbers of PLATFORM-4GIMBAL, servo laws, launch, report, refusals.
 
 The part's own tests fly the same with ideal feedback; here two gyros, resolver and three channels hold the platform.
 """
@@ -67,7 +67,7 @@ def test_full_roll_and_full_loop(bench: Session, flight: str, law: str) -> None:
 )
 def test_crossing_pitch_90(bench: Session, law: str, travel: float, error: float, swing: float | None) -> None:
     """At 36 deg/s with 1 deg/s of roll and yaw: travel of ring 4, worst error (factor 2), g2.  With the sign the error
-    is far below the spec's, whose steps are coarser."""
+    is far below the one in PLATFORM-4GIMBAL, computed in coarser steps."""
     result = fly(bench, "crossing", law)
     c = measures(result)
     assert c["ring 4 travel"] == pytest.approx(travel, rel=0.02)

@@ -72,7 +72,7 @@ def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
     ("theta", "hertz", "printed"), [((20, 0, 30), 1.0, 1.72), ((40, 10, 30), 1.0, 1.90), ((40, 10, 30), 3.0, 16.4)]
 )
 def test_coupling_on_the_83_mil_bench(sessions, theta, hertz, printed):
-    """F15, a third of 83 mil: other axes over x without T2 as the spec computed it; with T2 less than a tenth."""
+    """[DECOUPLE-BENCH-83MIL] A third of 83 mil: cross axes without T2 as there, with T2 a tenth of it."""
     values = {"pitch": f"{theta[0]}deg", "roll": f"{theta[1]}deg", "azimuth": f"{theta[2]}deg", "frequency": hertz,
               "swing": 83 * 2 * math.pi / 6000 / 3}  # fmt: skip
     cross = {d: reduced(s, **values)[2]["cross x"].estimate for d, s in sessions.items()}

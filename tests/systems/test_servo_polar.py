@@ -48,12 +48,12 @@ def test_random_gyros_at_random_latitudes(polar: Session, seed: int) -> None:
     for c in result.coefficients:
         assert abs(found[c.name]) < LIMIT, c.name
         assert c.truth == pytest.approx(values[f"gyro.{c.name}"] / DPH, rel=1e-12)
-        if c.name not in ("D_F", "D_II"):  # those rest on the dwells, which the book takes as at angle 0
+        if c.name not in ("D_F", "D_II"):  # those rest on the dwells, which Hu 1981 takes as at angle 0
             assert c.closed == pytest.approx(c.estimate, abs=LIMIT), c.name
     # the dwells turned by theta' T; the closed R carries the mean of D_S Z and D_O Y at half that
     turned = float(np.max(np.abs(windows.angle_end[:2])))
     assert abs(next(c for c in result.coefficients if c.name == "D_F").closed - values["gyro.D_F"] / DPH) < 2 * turned
-    book = next(t for t in result.tables if t["title"] == "In the book's names")
+    book = next(t for t in result.tables if t["title"] == "Notation of Hu 1981")
     R = next(row for row in book["rows"] if row[0] == "R")
     assert R[1] == pytest.approx(-values["gyro.D_F"] / DPH, abs=LIMIT)  # R = -D_F
 

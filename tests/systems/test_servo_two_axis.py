@@ -49,7 +49,7 @@ def table() -> Iterator[Session]:
 # ------------------------------------------------------------------------------------------ recovery
 @pytest.mark.parametrize("seed", range(2))
 def test_random_gyros_at_random_latitudes(table: Session, seed: int) -> None:
-    """A day in fifty: every window reads the book's equation and the effect of the loop's stiffness, to 2e-8 deg/h.
+    """A day in fifty: every window reads the equation of Hu 1981 and the effect of the loop's stiffness, to 2e-8 deg/h.
     Every coefficient comes back to 1e-6 deg/h of the truth and what that effect makes of it, by both ways; the effect
     goes with the cube of the Earth rate, so that nothing is left of it in a whole day.
     """
@@ -215,7 +215,7 @@ def test_refused_before_anything_runs(table: Session, values: dict[str, Any], te
 
 
 def test_single_mount_is_warned_of() -> None:
-    """Spec d1, 5.6: a single mount with all terms is warned of, with its condition (1.65e3) and better pairs."""
+    """[SERVO2-RANK] A single mount with all terms is warned of, with its condition (1.65e3) and better pairs."""
     system = load_system(NAME)
     system.set("mounts", "2")
     assert system.check() == []
@@ -233,7 +233,7 @@ def test_run_ends_before_gimbal_lock(table: Session) -> None:
 
 def test_brushes_are_overcome(table: Session) -> None:
     """Friction of 1400 g.cm on both axes, the base turning: capture comes near enough to null, M / (J w2) = 4.4 arcsec,
-    and the fine loop then holds it to M / K_T, 0.09 arcsec, far within the 2 arcsec of the book.
+    and the fine loop then holds it to M / K_T, 0.09 arcsec, far within the 2 arcsec of Hu 1981.
     """
     brushes = {f"{slot}.friction": 0.137 for slot in BOTH}
     w = table.run({**day(500.0), **QUIET, **brushes}).windows

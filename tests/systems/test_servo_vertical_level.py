@@ -67,7 +67,7 @@ def test_vertical_alone_to_a_millionth(bench: Session) -> None:
 
 
 def test_three_term_route_says_what_it_holds(bench: Session) -> None:
-    """D_F + g2 D_II, D_I, D_S - g D_II + g D_SS: in the book's names R + g2 K_zx, U_z, U_x + g (K_zx + K_xz)."""
+    """D_F + g2 D_II, D_I, D_S - g D_II + g D_SS: in the names of Hu 1981 R + g2 K_zx, U_z, U_x + g (K_zx + K_xz)."""
     result = load_system(NAME).reduce(bench.run({**SHORT, **QUIET, "attitudes": "three", "gyro.D_O": 0.0}))
     g = frames.normal_gravity(math.radians(45.75)) / frames.G0
     truth = {"D_F + γ² D_II": -0.3 - 0.05 * g * g, "D_I": -0.9, "D_S − γ D_II + γ D_SS": -0.7 + (0.05 + 0.04) * g}
@@ -75,7 +75,7 @@ def test_three_term_route_says_what_it_holds(bench: Session) -> None:
     for c in result.coefficients:
         assert c.truth == pytest.approx(truth[c.name], rel=1e-9)
         assert c.estimate == pytest.approx(c.truth, abs=1e-5) and c.closed == pytest.approx(c.truth, abs=1e-5)
-    book = next(t for t in result.tables if t["title"] == "In the book's names")["rows"]
+    book = next(t for t in result.tables if t["title"] == "Notation of Hu 1981")["rows"]
     assert [row[0] for row in book] == ["R + γ² K_zx", "U_z", "U_x + γ K_zx + γ K_xz"]
     assert book[0][1] == pytest.approx(0.3 + 0.05 * g * g, abs=1e-5)
     assert any("tell only combinations" in w for w in result.warnings)

@@ -73,7 +73,7 @@ def angle(record: Any) -> tuple[Any, Any]:
 
 # ------------------------------------------------------------------------------------ closed forms
 def test_numbers_of_the_spec() -> None:
-    """[B11] crossover 100 rad/s, margin 52.3 degrees, slope -24 dB/dec, lower limit 0.044; python-control agrees."""
+    """Crossover 100 rad/s, margin 52.3 degrees, slope -24 dB/dec, lower limit 0.044; python-control agrees."""
     p = closed.Loop(**DEFAULT)
     s = control.tf("s")
     loop = p.K * (1 + p.tau1 * s) * (1 + p.tau2 * s) / (1 + p.T1 * s) / (1 + p.T2 * s) / (p.J * s**2)
@@ -103,7 +103,7 @@ def test_limit_and_routh_are_those_of_the_roots() -> None:
 
 
 def test_static_error_is_not_removed_by_the_lag(steps: Session) -> None:
-    """[B12] theta/M at rest = 1/(K_m K_x K_G), 2.5 arcsec for 0.2 N.m; it goes with K_G, as T1 goes to infinity."""
+    """theta/M at rest = 1/(K_m K_x K_G), 2.5 arcsec for 0.2 N.m; it goes with K_G, as T1 goes to infinity."""
     _, a = angle(steps.run(IDEAL))
     assert a[-1] == pytest.approx(0.2 / 16500.0, rel=1e-6)
     _, a = angle(steps.run({**IDEAL, "T1": 20.0, "K_G": 20.0}))  # the same loop at the crossover
@@ -111,7 +111,7 @@ def test_static_error_is_not_removed_by_the_lag(steps: Session) -> None:
 
 
 def test_5_25_prints_the_loop_gain(steps: Session) -> None:
-    """[B12b] theta/M of the parts is the closed form; the printed K_m K_x/(J s2) is another quantity altogether."""
+    """theta/M of the parts is the closed form; the printed K_m K_x/(J s2) is another quantity altogether."""
     model = steps.run(IDEAL).meta["linear"]["closed"]["continuous"]
     f = np.array([0.01, 0.5, 2.0, 16.0, 60.0])
     s = 2j * np.pi * f
@@ -127,7 +127,7 @@ def test_5_25_prints_the_loop_gain(steps: Session) -> None:
 # ------------------------------------------------------------------------------------ conditional stability
 @pytest.mark.parametrize(("share", "grows"), [(0.05, False), (0.04, True), (10.0, False)])
 def test_stability_by_the_gain(steps: Session, share: float, grows: bool, caplog: pytest.LogCaptureFixture) -> None:
-    """[B11c] Stable at 5 % and at ten times the gain, unstable at 4 %, with the rate of the roots: measured on the
+    """Stable at 5 % and at ten times the gain, unstable at 4 %, with the rate of the roots: measured on the
     maxima of |theta| about its rest.  The step shifts the damping: by 0.03 1/s at 4 %, of 0.2."""
     with caplog.at_level(logging.WARNING, "gyrobench"):
         record = steps.run({**IDEAL, "stiffness": share * 8250.0, "load": 0.2})
@@ -295,4 +295,4 @@ def test_a_poor_network_is_told_and_fails_acceptance(steps: Session, caplog: pyt
     pm = next(c for c in result.coefficients if c.name == "PM")
     assert pm.estimate == pytest.approx(weak.margin()[1], abs=1.0)
     assert pm.verdict == "fail" and result.verdict == "fail"
-    assert any("the source asks for more than 45°" in w for w in result.warnings)
+    assert any("more than 45° is wanted" in w for w in result.warnings)

@@ -65,7 +65,7 @@ def steps() -> Iterator[Session]:
 # ------------------------------------------------------------------------------------ closed forms
 def test_transient_time_and_residual_of_a_fast_nutation_set(steps: Session) -> None:
     """t* = pi H/K_m = 0.314 s for H = 10, K_m = 100; the lean then lacks exp(-pi) = 4.32 % of its end.  With nutation
-    at 100 Hz and C_y = 0 the full equations are within 1.6 % of b* of this [B7]; J_x J_y = (H / 2 pi 100)^2.  The
+    at 100 Hz and C_y = 0 the full equations are within 1.6 % of b* of this; J_x J_y = (H / 2 pi 100)^2.  The
     printed K = 0.1 would take 314 s."""
     j = 10.0 / (2 * math.pi * 100.0)
     fast = {"gyro.J_x": 5 * j, "gyro.J_y": j / 5, "gyro.C_x": 10.0, "gyro.C_y": 0.0}
@@ -113,7 +113,7 @@ def test_nutation_rings_at_its_frequency() -> None:
     measured = (crossing.size - 1) / (crossing[-1] - crossing[0])
     assert measured == pytest.approx(R.nutation(10.0, 0.5, 0.02, 0.0, 0.0), rel=2e-4)
     assert R.nutation(10.0, 0.5, 0.02, 0.0, 0.0) == pytest.approx(100.0 / (2 * math.pi), rel=1e-12)
-    assert R.nutation(**DEFAULT) == pytest.approx(17.4, abs=0.05)  # the load brings it down [B6]
+    assert R.nutation(**DEFAULT) == pytest.approx(17.4, abs=0.05)  # the load brings it down
 
 
 # ------------------------------------------------------------------------------------ Routh limit
@@ -159,7 +159,7 @@ def test_stop_of_the_precession_ends_the_run() -> None:
 
 # ------------------------------------------------------------------------------------ linear model and sweep
 def test_poles_of_the_default_set(steps: Session) -> None:
-    """-9.1, -55 +- 89j 1/s [B6], beside the free angle of the platform at 0."""
+    """-9.1, -55 +- 89j 1/s, beside the free angle of the platform at 0."""
     linear = steps.run(STILL).meta["linear"]["closed"]["continuous"]
     found = sorted((p for p in poles(linear) if abs(p) > 1e-3), key=lambda p: (p.real, p.imag))
     roots = sorted(np.roots([0.01, 1.2, 120.0, 1000.0]), key=lambda p: (p.real, p.imag))
@@ -186,7 +186,7 @@ def test_measures_of_the_whole_run(whole: Any) -> None:
     assert c["K_m"].estimate == pytest.approx(100.0, rel=1e-4)
     assert c["α*"].estimate == pytest.approx(2e-3 * 648000 / math.pi, rel=5e-4)
     assert c["S"].estimate == pytest.approx(500.0, rel=5e-4)
-    assert abs(c["β(t*)"].estimate - 4.32) < 12.0  # the default set is within 12 % of b* [B7b]
+    assert abs(c["β(t*)"].estimate - 4.32) < 12.0  # the default set is within 12 % of b*
     assert c["f_c"].estimate == pytest.approx(c["f_c"].closed, rel=1e-3)
     assert c["PM"].estimate == pytest.approx(c["PM"].closed, abs=0.05)
     assert c["K_m limit"].estimate == pytest.approx(LIMIT, rel=0.01)

@@ -1,4 +1,4 @@
-"""Closed forms of the three kinds of gyro, the spec's numbers and errata, and the co-simulation against them."""
+"""Closed forms of the three kinds of gyro, their numbers and errata, and the co-simulation against them."""
 
 import importlib
 import math
@@ -48,14 +48,14 @@ def by_matrix(p, t):
     + [("rate", c, k) for c, k in ((62.5, 100.0), (200.0, 500.0), (0.0, 500.0))],
 )
 def test_closed_forms_solve_the_equations(kind, c, k):
-    """[B13, B16, B19] against expm, below and above the aperiodic limit."""
+    """Against expm, below and above the aperiodic limit."""
     p, t = axis(c, k), np.linspace(0.0, 100.0, 2001)
     for form, exact in zip(closed.FORMS[kind](p, t), by_matrix(p, t), strict=True):
         assert np.abs(form - exact).max() < 1e-10 * np.abs(exact).max()
 
 
 def test_errata_of_the_rate_integrating_gyro():
-    """[B15, B16b] 5-34 with J0 in the third term of b is within 0.06 of the offset at zeta 0.1, with J 1.7."""
+    """5-34 with J0 in the third term of b is within 0.06 of the offset at zeta 0.1, with J 1.7."""
     p, t = axis(6.25), np.linspace(0.0, 100.0, 20001)
     assert p.zeta == pytest.approx(0.0988, abs=1e-4)
     a, b = by_matrix(p, t)
@@ -137,7 +137,7 @@ def test_cosimulation_converges_to_the_equations(session, kind, c, k, time):
 
 
 def test_satellite_example(session):
-    """2.15 arcmin with cos(b) and 5.70 deg of float [B17b]; 1.44 deg for the rate gyro [B21]."""
+    """2.15 arcmin with cos(b) and 5.70 deg of float; 1.44 deg for the rate gyro."""
     _, a, b = load(run(session, 2e-4, kind="rate-integrating"))
     assert a[-1] / ARCMIN == pytest.approx(2.15, abs=0.01)
     assert b[-1] / DEG == pytest.approx(5.70, abs=0.01)

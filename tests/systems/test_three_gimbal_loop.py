@@ -45,7 +45,7 @@ def whole() -> Iterator[Any]:
 @pytest.mark.parametrize("m", [0.0, 60.0, 80.0, 89.0, 89.9])
 def test_lock_table(m: float) -> None:
     """A rate of the base along the normal of the ring plane, (cos m, 0, -sin m) in base axes with the roll joint at m,
-    takes gimbal rates up to 1 / cos m of it: 1, 2, 5.76, 57.3, 573 (spec d4, 8: to 0.2 %)."""
+    takes gimbal rates up to 1 / cos m of it: 1, 2, 5.76, 57.3, 573 (to 0.2 %)."""
     rate = 0.01 * DEG
     leg = Leg("normal", 0.05, pitch=rate * math.cos(m * DEG), yaw=-rate * math.sin(m * DEG))
     with session(NAME, [leg], at_rest=lambda self: REST) as s:
@@ -154,7 +154,7 @@ def test_without_the_resolver_up_to_the_phase_margin(integral: float) -> None:
         w, pm = by_hand()
         if integral == 0.0:
             assert margin == pytest.approx(pm - math.degrees(w * 0.5e-3 / 2.0), abs=0.6)
-        else:  # (1 + integral / s) takes about atan(20 / 40); what is left lies near the 54.9 deg of the spec's set
+        else:  # (1 + integral / s) takes about atan(20 / 40); what is left lies near its phase margin
             assert margin == pytest.approx(pm - 26.0, abs=4.0)
         for azimuth, stable in [(margin - 1.0, True), (margin + 1.0, False), (-margin + 1.0, True), (180.0, False)]:
             record = s.run({**given, "azimuth": azimuth * DEG})

@@ -1,4 +1,4 @@
-"""The torquer table of the book through the command: 17.171 deg/h/mA and the linearity column."""
+"""The torquer table of Hu 1981 through the command: 17.171 deg/h/mA and the linearity column."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ NAME = "tumble_two_axis"
 DPH = math.pi / 180.0 / 3600.0
 NAMES = drift.terms(9)
 LIMIT = 1e-6  # deg/h per g^n
-RANGES = {0: (0.05, 0.55), 1: (0.5, 1.3), 2: (0.01, 0.2)}  # deg/h per g^n, book ranges; signs are drawn
+RANGES = {0: (0.05, 0.55), 1: (0.5, 1.3), 2: (0.01, 0.2)}  # deg/h per g^n, ranges of Hu 1981; signs are drawn
 
 #: 25 positions in 300 s: a stronger torquer lets the inner axis hurry.
 SHORT: dict[str, Any] = {

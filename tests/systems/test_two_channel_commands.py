@@ -93,7 +93,7 @@ def test_laboratory_record(
     sign = "k i = ω_d − ω_IA" if polarity == "book" else "k i = ω_IA − ω_d"
     assert any(sign in t for t in found["conventions"])
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "x channel" in page and ("The book" in page) == (model == "simple")
+    assert "x channel" in page and ("Quantities of Hu 1981" in page) == (model == "simple")
 
 
 @pytest.mark.parametrize(("drop", "word"), [

@@ -1,4 +1,4 @@
-"""The vertical gyro in the co-simulation: the spec's numbers, the reduction's geometry, refusals."""
+"""The vertical gyro in the co-simulation: the numbers of VERTICAL-GYRO, the reduction's geometry, refusals."""
 
 import importlib
 import math
@@ -59,7 +59,7 @@ def test_erection_time_by_law():
     assert reduction.erection_time(5 * ARCMIN, 10 * ARCMIN, "switches", 1.0, 1.0) is None
 
 
-# ------------------------------------------------------------------------------------------- the spec's numbers
+# ---------------------------------------------------------------------------- numbers of VERTICAL-GYRO
 def test_erection_from_two_degrees(session):
     known, _ = found(session, phases="erection rest")
     assert known["t_zone"].estimate == pytest.approx(27.5, abs=0.15)

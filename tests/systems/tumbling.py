@@ -19,7 +19,7 @@ RATE = 0.02  # rad/s, 274 times Earth rate: a turn takes 314 s instead of 8616 s
 #: leaves exp(-34) = 2e-15 of what the start of the table leaves in the loop.
 SHORT: dict[str, Any] = {"rate": RATE, "windows": 36, "dwell": 20.0, "settle": 3.0}
 
-#: Ranges of the coefficients in the book (ch. 2), deg/h per g^n; signs are drawn.
+#: Ranges of the coefficients in Hu 1981 (ch. 2), deg/h per g^n; signs are drawn.
 RANGES = {"D_F": (0.05, 0.55), "D_I": (0.5, 1.3), "D_O": (0.5, 1.3), "D_S": (0.5, 1.3), "D_IS": (0.1, 0.2)}
 SQUARES = (0.01, 0.06)
 
@@ -34,7 +34,7 @@ def quiet(system: System) -> dict[str, Any]:
 
 
 def gyro(rng: np.random.Generator) -> dict[str, Any]:
-    """Nine true coefficients in book range, both signs: values for the system, SI."""
+    """Nine true coefficients in the range of Hu 1981, both signs: values for the system, SI."""
     sizes = {n: rng.uniform(*RANGES.get(n, SQUARES)) for n in NAMES}
     return {f"gyro.{n}": float(size * rng.choice([-1.0, 1.0]) * DPH) for n, size in sizes.items()}
 

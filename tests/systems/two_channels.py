@@ -20,7 +20,7 @@ NAMES["simple"] = [n for n in NAMES["nine"] if n.split("_")[1] in ("0", "z", n[1
 #: A whole tumble in some 900 s.  The loops' slowest pole, -11.3 1/s, leaves exp(-34) = 2e-15 after 3 s.
 SHORT: dict[str, Any] = {"rate": RATE, "windows": 36, "dwell": 20.0, "settle": 3.0, "table.acceleration": 20.0}
 
-RANGES = {0: (0.05, 0.55), 1: (0.5, 1.3), 2: (0.01, 0.06)}  # deg/h per g^n, book ranges; signs are drawn
+RANGES = {0: (0.05, 0.55), 1: (0.5, 1.3), 2: (0.01, 0.06)}  # deg/h per g^n, ranges of Hu 1981; signs are drawn
 LOOP = 1e-3  # s2: 1/(K_sg k K_i) at k = 17.2 deg/h/mA
 
 
@@ -34,7 +34,7 @@ def quiet(system: System) -> dict[str, Any]:
 
 
 def gyro(rng: np.random.Generator, model: str = "nine") -> dict[str, Any]:
-    """True coefficients of both channels in book range, both signs; those outside the model are 0."""
+    """True coefficients of both channels in the range of Hu 1981, both signs; those outside the model are 0."""
     values = {f"gyro.{n}": 0.0 for n in NAMES["nine"]}
     for n in NAMES[model]:
         values[f"gyro.{n}"] = float(rng.uniform(*RANGES[drift.order(n)]) * rng.choice([-1.0, 1.0]) * DPH)

@@ -1,8 +1,8 @@
-"""Tests in which the gyro holds the table, torquer idle: the table rate tells the drift.  [spec d1, 5.0; eq. 3-59]
+"""Tests in which the gyro holds the table, torquer idle: the table rate tells the drift.  [MEAS-SERVO; eq. 3-59]
 
     theta' + omega_E,x = omega_d = -omega_M         theta right-handed about the input axis x, which is the table axis
 
-omega_d is the drift of gyrobench.drift in precession sign, omega_M the book's in torque sign (BOOK maps one to the
+omega_d is the drift of gyrobench.drift in precession sign, omega_M that of Hu 1981 in torque sign (BOOK maps one to the
 other, CROSS-MAP).  A window says what the table turned from its first to its last reading, so the data are exact means,
 and neighbours share a reading.  Regressors are averaged over the window as the data are.
 
@@ -29,9 +29,9 @@ from gyrobench.reduction.run_metadata import Site
 Array = NDArray[np.float64]
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations
-TRACKING = 2.0 / 3600.0 * np.pi / 180.0  # rad, the book's limit of the table against the gyro
+TRACKING = 2.0 / 3600.0 * np.pi / 180.0  # rad, limit of Hu 1981 for the table against the gyro
 
-#: our name -> the book's, and the sign of the book's against ours  [CROSS-MAP]; D_O is empirical, after eq. 2-40
+#: our name -> that of Hu 1981, and its sign against ours  [CROSS-MAP]; D_O is empirical, after eq. 2-40
 BOOK: dict[str, tuple[str, int]] = {
     "D_F": ("R", -1), "D_I": ("U_z", -1), "D_O": ("U_y", -1), "D_S": ("U_x", 1), "D_II": ("K_zx", -1),
     "D_SS": ("K_xz", 1), "D_IO": ("K_zy", -1), "D_OS": ("K_xy", 1), "D_IS": ("ΔK", -1),
@@ -178,7 +178,7 @@ def effects(
 
 
 def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """The estimates in the book's names and torque sign.  combined: our name -> the book's words for a combination."""
+    """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
     rows: list[list[Any]] = []
     for q, value, u in zip(found.quantities, found.value.tolist(), found.u.tolist(), strict=True):
         if q.name in BOOK:
@@ -186,17 +186,17 @@ def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> di
             words = (combined or {}).get(q.name, symbol)
             rows.append([words, sign * value / q.scale, u / q.scale, q.unit, q.title, "+" if sign > 0 else "−"])
     return {
-        "title": "In the book's names",
-        "caption": "Torque sign, ω_M = −ω_d; last column: sign of the book's against ours",
-        "columns": ["book", "estimate", "u of type A", "unit", "ours", "sign"],
+        "title": "Notation of Hu 1981",
+        "caption": "Torque sign, ω_M = −ω_d; last column: sign against this report",
+        "columns": ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
         "rows": rows,
     }
 
 
 CONVENTIONS = (
-    "Drift ω_d in precession sign: table rate plus Earth rate along the input axis; the book's ω_M = −ω_d.",
-    "X, Y, Z = −f/g0 along input, output and spin axis (book sign: a body axis that points up reads −1); g0 = "
-    "9.80665 m/s². Against +f/g0 (IEEE) the linear coefficients change sign.",
+    "Drift ω_d in precession sign: table rate plus Earth rate along the input axis; ω_M of Hu 1981 is −ω_d.",
+    "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 = "
+    "9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
     "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
     "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
 )

@@ -61,7 +61,7 @@ def linear_result(
     """The result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
 
     equation: Typst math.  conventions, warnings, summary: sentences.  specification: name -> limits in the printed
-    unit.  no_closed: why there are no values of the book's formulas, if there should be.  tables: the method's own,
+    unit.  no_closed: why there are no values of the source's formulas, if there should be.  tables: the method's own,
     {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
     """

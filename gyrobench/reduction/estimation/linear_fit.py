@@ -36,7 +36,7 @@ RAW = "Ljung-Box, residuals"
 class Quantity:
     """One quantity that is estimated: its name, what it means, its printed unit and that unit's size in SI.
 
-    truth and closed (the book's formula on the same data): SI, None where there is none.  shown: the printed name
+    truth and closed (the source's formula on the same data): SI, None where there is none.  shown: the printed name
     where it differs, as for the combination that a coefficient stands for; limits are looked up under both.
     combination: coefficient of the drift model -> its factor in it (per g0^n); empty: it is the one of its name.  Where
     |f| is the same in all attitudes D_OO (Dx_yy, Dy_xx) is folded into the others and left out.

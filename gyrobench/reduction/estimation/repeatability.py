@@ -2,7 +2,7 @@
 
     mean x = sum x_i / n        sigma = sqrt(sum (x_i - x)^2 / (n - 1))        u(x) = sigma / sqrt(n), t of n - 1
 
-sigma is the random drift from day to day (the book's measure of long-term performance), u that of the mean.  Whether
+sigma is the random drift from day to day (the measure of stability in Hu 1981), u that of the mean.  Whether
 it is more than each day's own uncertainty explains is a chi-squared test, sum ((x_i - x)/u_i)^2 with n - 1 degrees of
 freedom for equal u_i.  [TEST-8POS, T3-1-MEAN, T3-1-SIGMA; Hu 1981, ch. 3 par. 2.3, Table 3-1]
 
@@ -39,7 +39,7 @@ class Statistics:
 
 
 def statistics(values: Sequence[float], about: float | None = None) -> Statistics:
-    """``about``: the value that deviations are taken from in place of the mean (the book rounds its means).
+    """``about``: the value that deviations are taken from in place of the mean (Hu 1981 rounds its means).
 
     Raises ReductionError for no values or one that is no finite number.
     """

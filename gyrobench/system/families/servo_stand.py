@@ -8,7 +8,7 @@
 The input axis x of the gyro lies along the table axis, y and z on the face.  The slot stand is between site
 and table: it turns what the site says into the axes x, y, z of the attitude at angle 0, phase by phase (its mount
 number is the number of the phase).  In servo mode the torquer is idle; in all others the slot cage holds the float by
-it.  [LOOP-TABLE-SERVO; spec d1, 5.0]
+it.  [LOOP-TABLE-SERVO, MEAS-SERVO]
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _LEVEL = {
     for axis, y, up in (("y", U, "up"), ("z", horizontal, "down"))
     for way in ("up", "down")
 }
-#: attitude -> directions of x and y at angle 0; z = x cross y.  Class 1, class 2, class 3 of the book.
+#: attitude -> directions of x and y at angle 0; z = x cross y.  Class 1, 2, 3 of Hu 1981.
 ATTITUDES: dict[str, tuple[int, int]] = {
     "x down": (-U, E), "x up": (U, E), **_LEVEL, "polar S": (-P, -E), "polar N": (P, -E),
 }  # fmt: skip
