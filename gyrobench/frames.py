@@ -6,8 +6,7 @@ frame: ``v_body = C v_local``.  Gyro axes are I, O, S (input, output, spin refer
 A table with its axis on the pole has, at angle 0, the axes x_T = E, y_T = p x E, z_T = p, where p is the
 direction of the north pole of the sky.  Turned by +angle (right-handed about z_T): ``v_table = Rz(angle) base
 v_local``, and a gyro on it reads ``v_face = face v_table``.  Hu 1981 turns the table against the Earth and
-counts that positive: ``theta_book = -angle``.  [CONV-FRAMES, TUM1-GEOM; Hu 1981, eq.
-3-12..3-16]
+counts that positive: its theta is -angle.  [CONV-FRAMES, TUM1-GEOM; Hu 1981, eq. 3-12..3-16]
 """
 
 from __future__ import annotations

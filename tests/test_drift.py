@@ -146,7 +146,7 @@ def test_signs() -> None:
         drift.change_sign(D, "nasa", "ieee")
 
 
-def test_standard_gyro_is_the_table_of_the_spec_in_precession_sign() -> None:
+def test_standard_gyro_is_the_table_of_the_source_in_precession_sign() -> None:
     s = {n: v * 3600 * 180 / math.pi for n, v in drift.STANDARD.items()}
     # omega_M = R + U_z X - U_x Z + (Kzz-Kxx) XZ + Kzx X2 ...
     torque = drift.change_sign(s, "precession", "torque")

@@ -279,7 +279,7 @@ def test_stationarity(part):
 
 
 @pytest.mark.parametrize("part", ["estimator_kalman_ar", "estimator_sage_husa"])
-def test_the_table_of_the_thesis_falls_into_the_trap(part):
+def test_the_printed_table_falls_into_the_trap(part):
     with pytest.raises(ComponentError, match="give phi = -a"):
         load_part(part)(p=3, phi=[0.7466, 0.5044, 0.2538, 0.0, 0.0]).initialize()
 

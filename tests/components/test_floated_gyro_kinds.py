@@ -142,7 +142,7 @@ def test_cross_coupling_has_the_corrected_sign():
         ({"omega": [0.0, 0.0, 0.5], "J_SI": 3e-8, "dJ": 0.0}, 0.0773),  # J_SI / H = 0.309 times w_S2
     ],
 )
-def test_magnitudes_of_the_spec(given, wanted):
+def test_magnitudes_of_the_method(given, wanted):
     """[GYRO-DYNAMIC-ERR] 258, 30.9, 1.5, 0.31 deg/h; the case's rate is held while its acceleration acts."""
     assert indicated_error(**given) / DEG_H == pytest.approx(wanted, rel=0.01)
 

@@ -118,7 +118,7 @@ POSITIONS = [(E, N), (N, -E), (-E, -N), (-N, E), (U, E), (-E, U), (-U, -E), (E, 
 
 
 @pytest.mark.parametrize("position", range(1, 9))
-def test_eight_positions_of_the_book(position):
+def test_eight_positions_of_the_method(position):
     """The table of TEST-8POS written out; y channel: R_x, u_zx, u_y; x channel: R_y, u_zy, u_x; at 1 g0."""
     R_x, R_y, u_x, u_y, u_zx, u_zy = (v * DEG_H for v in (0.3, -0.5, 1.1, 0.9, -0.6, 0.8))
     latitude = math.radians(45.75)

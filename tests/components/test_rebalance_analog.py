@@ -28,7 +28,7 @@ def feed(part, u, steps, h=H, k0=0):
     return np.array(out)
 
 
-def test_default_gains_are_those_of_the_spec():
+def test_default_gains_are_those_of_the_method():
     # M = -H k i = -20 b - 200 (integral of b) N.m with u = 10 b, H = 0.2, k = 17.2 deg/h/mA
     part = started()
     k = 17.2 * DEG_H / 1e-3

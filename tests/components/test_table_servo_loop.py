@@ -39,7 +39,7 @@ def margins(loop):
         (4, FREE, 10.0, 49.7, 12.0, 0.21, None),
     ],
 )
-def test_margins_are_those_of_the_spec(network, gyro, f_c, pm, gm, low, stiffness):
+def test_margins_are_those_of_the_method(network, gyro, f_c, pm, gm, low, stiffness):
     """TABLE-SERVO, table of compensations: crossover, margins, lower gain limit, static stiffness in g.cm/arcsec."""
     loop = Loop(gyro, network=network)
     found = margins(loop)

@@ -48,7 +48,7 @@ def passive(axis, angle):
 
 
 # --------------------------------------------------------------------------------------------- attitude
-def test_matrix_of_the_spec():
+def test_matrix_of_the_method():
     """SERVO2-A: A(theta_x, theta_y), base and face of a random mount."""
     base, face = rotation(1), rotation(2)
     for x, y in np.random.default_rng(3).uniform(-4.0, 4.0, (10, 2)):
@@ -58,7 +58,7 @@ def test_matrix_of_the_spec():
         assert attitude(part) == pytest.approx(face @ a @ base, abs=1e-15)
 
 
-def test_two_axis_tumble_of_the_spec():
+def test_two_axis_tumble_of_the_method():
     """4.6: outer axis p = y(0), inner axis x: C = R_x(n th) R_y(m th) C0; gamma = -f / g in closed form."""
     latitude = math.radians(45.75)
     c, s = math.cos(latitude), math.sin(latitude)
@@ -82,7 +82,7 @@ def test_two_axis_tumble_of_the_spec():
         assert part.get("omega[1]") == pytest.approx(0.0, abs=1e-19)  # IA stays at right angles to the pole
 
 
-def test_rates_of_the_spec():
+def test_rates_of_the_method():
     """SERVO2-KIN: w_x = x' cy + w_X cy + w_Y sx sy - w_Z cx sy, w_y = y' + w_Y cx + w_Z sx."""
     part = started(mode_x=2.0, target_x=0.3, mode_y=2.0, target_y=-0.2, omega_local=[0.01, 0.02, 0.03])
     for k in range(700):

@@ -170,7 +170,7 @@ def test_a_quantity_from_several_estimates() -> None:
     assert v.u_b == pytest.approx(0.4) and v.shared["k"] == pytest.approx([0.4])  # 0.1 - 0.1 and 0.2 + 0.2; 0.3 + 0.1
 
 
-def test_names_of_the_book_are_mapped_by_what_they_stand_for() -> None:
+def test_names_of_the_source_are_mapped_by_what_they_stand_for() -> None:
     """u_zx = -1.5 Dy_y: 3 there is -2 here; an unknown of no model is compared where name and unit are the same."""
     a = result({"u_zx": (3.0, 0.3), "k_x": (5.0, 1.0)}, made_of={"u_zx": {"Dy_y": -1.5}})
     b = result({"Dy_y": (-2.1, 0.1), "k_x": (5.5, 1.0)})

@@ -104,7 +104,7 @@ def test_channels_measure_each_other() -> None:
 
 
 @pytest.mark.parametrize("model", ["simple", "nine"])
-def test_polarity_of_the_book(model: str) -> None:
+def test_opposite_polarity(model: str) -> None:
     truth = random_truth(4, NAMES[model])
     w = T.record(T.setup(model=model), truth)
     w["mean_x"], w["mean_y"] = -w["mean_x"], -w["mean_y"]
@@ -112,7 +112,7 @@ def test_polarity_of_the_book(model: str) -> None:
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
 
 
-def test_the_book_symbols_of_the_simple_model() -> None:
+def test_symbols_of_the_simple_model() -> None:
     """[MEAS-REBALANCE] k_x i_x = w_y - R_x + u_zx g_y - u_y g_z - Q_x g_y g_z, k_y i_y = w_x + R_y - u_x g_z
     + u_zy g_x + Q_y g_x g_z: currents made from these lines (gamma = 1) give the eight numbers of the table back.
     """

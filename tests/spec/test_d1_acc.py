@@ -139,7 +139,7 @@ def test_seven_points_are_needed() -> None:
 
 
 @pytest.mark.parametrize("n", [8, 12, 24])
-def test_uncertainties_are_those_of_the_spec(n: int) -> None:
+def test_uncertainties_are_those_of_the_method(n: int) -> None:
     """sigma(k1) = sigma sqrt(20/N)/g, (k0) sqrt(3/N), (k2) sqrt(8/N)/g2, (k3) sqrt(32/N)/g3, (k4, k5) sqrt(8/N)/g2:
     of the design that the reduction fits, and the scatter of the closed formulas.
     """

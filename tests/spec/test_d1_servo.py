@@ -77,7 +77,7 @@ SEEDS = range(6)
 
 
 # ------------------------------------------------------------------------------------------ 5.0, frames
-def test_attitudes_see_what_the_spec_says() -> None:
+def test_attitudes_sense_what_the_method_says() -> None:
     """SF/g and Earth rate along x in all twenty attitudes; rows of a rotation."""
     for phi in (math.radians(45.75), math.radians(-30.0)):
         s, c = math.sin(phi), math.cos(phi)
@@ -123,7 +123,7 @@ def test_servo_stiffness_offsets_the_angle_forward() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_our_sign_and_the_books(seed: int) -> None:
+def test_our_sign_and_that_of_the_source(seed: int) -> None:
     """CROSS-MAP: omega_d of gyrobench.drift is -omega_M, coefficient by coefficient; E36 printed fails."""
     rng = np.random.default_rng(seed)
     p, gamma = random_gyro(rng), rng.uniform(-1.0, 1.0, 3)

@@ -31,7 +31,7 @@ def named(result: Any) -> dict[str, Any]:
     return {c.name: c for c in result.coefficients}
 
 
-def test_book_table(book: Any) -> None:
+def test_printed_table(book: Any) -> None:
     """[LIN-TABLE] K = 17.1706 (printed 17.171); linearity with K = 17.171."""
     assert named(book)["K"].estimate == pytest.approx(17.170625, abs=1e-9)
     assert named(book)["K"].unit == "°/h/mA"

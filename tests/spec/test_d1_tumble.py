@@ -65,7 +65,7 @@ def test_averaging_windows_are_allowed_for() -> None:
     assert damped.estimate == pytest.approx(0.9549, abs=2e-3)
 
 
-def test_polarity_of_the_book() -> None:
+def test_opposite_polarity() -> None:
     """Current of Hu 1981, k i = omega_d - omega_IA: the same coefficients from the negated current."""
     truth = random_truth(4)
     s = T.setup(truth=truth)
@@ -75,7 +75,7 @@ def test_polarity_of_the_book() -> None:
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
 
 
-def test_uncertainties_follow_the_formulas_of_the_spec() -> None:
+def test_uncertainties_follow_the_formulas_of_the_method() -> None:
     """[TUM1-UNC] sigma = sigma_s = 1, N = 36 at 45.75 deg: closed-form factors 0.239 0.333 0.685 1.512 0.707; LS D_y
     0.160.
 
@@ -317,7 +317,7 @@ def test_other_attitudes_have_no_closed_formulas() -> None:
 
 
 # ------------------------------------------------------------------------------------------ the rest of a result
-def test_sensitivities_of_the_spec() -> None:
+def test_sensitivities_of_the_method() -> None:
     """[TUM1-SENS-IA] eps W sin(phi)/gamma in D_O by the closed formulas; [TUM1-SENS-AXIS] W delta/(gamma cos phi) in
     D_I (the axis tilts about east) and 2 W delta/(gamma^2 sin 2 phi) in D_OS (about p x east)."""
     truth = dict.fromkeys(NAMES, 0.0)

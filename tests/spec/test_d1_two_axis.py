@@ -112,7 +112,7 @@ def test_any_positions_will_do_for_least_squares() -> None:
     assert any("the inner angle is not 1/5 of the outer" in t and "not equally spaced" in t for t in r.warnings)
 
 
-def test_polarity_of_the_book_and_cycles() -> None:
+def test_opposite_polarity_and_cycles() -> None:
     truth = random_truth(6)
     s = T.setup(truth=truth, polarity="book")
     w = T.record(s, truth, 30, each=1, cycles=2)

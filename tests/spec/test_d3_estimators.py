@@ -74,7 +74,7 @@ def test_sine_through_the_wavelet(sine, moments, J, delay, late, now):
     assert error(found[:, 0], truth) == pytest.approx(now, abs=0.8)
 
 
-def test_drift_filter_of_the_thesis_over_a_sine(sine):
+def test_printed_drift_filter_over_a_sine(sine):
     """Sign put right, as a model of the signal: the sine is scaled by 0.389, the error 8.6 dB above the raw."""
     t, truth, z = sine
     y = play("estimator_kalman_ar", z)
@@ -82,7 +82,7 @@ def test_drift_filter_of_the_thesis_over_a_sine(sine):
     assert error(y, truth) == pytest.approx(8.6, abs=0.4)
 
 
-def test_drift_filter_of_the_thesis_at_rest():
+def test_printed_drift_filter_at_rest():
     """-8.2 dB at zero frequency, -3.0 dB at the highest, -4.6 dB for white noise: nowhere the 10 dB claimed."""
     n = 60
     step, alternating = np.ones(n), np.resize([1.0, -1.0], n)

@@ -94,7 +94,7 @@ def test_drift_in_a_single_pass() -> None:
     )
 
 
-def test_bound_of_the_spec() -> None:
+def test_bound_of_the_method() -> None:
     """[PICKOFF] 1 deg/h over 5 s = 5 arcsec."""
     assert 1.0 * DPH * 5.0 / (math.pi / 648000.0) == pytest.approx(5.0)
     r = R.reduce(made(), R.PickoffSetup(1.0, 1.0 * DPH))

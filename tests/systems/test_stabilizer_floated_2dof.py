@@ -72,7 +72,7 @@ def angle(record: Any) -> tuple[Any, Any]:
 
 
 # ------------------------------------------------------------------------------------ closed forms
-def test_numbers_of_the_spec() -> None:
+def test_numbers_of_the_method() -> None:
     """Crossover 100 rad/s, margin 52.3 degrees, slope -24 dB/dec, lower limit 0.044; python-control agrees."""
     p = closed.Loop(**DEFAULT)
     s = control.tf("s")

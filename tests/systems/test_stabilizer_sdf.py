@@ -73,7 +73,7 @@ def test_errata_of_the_rate_integrating_gyro():
     assert error == pytest.approx(3.9, abs=0.1)
 
 
-def test_numbers_of_the_spec():
+def test_numbers_of_the_method():
     """2.15 arcmin (not 6), 1.43 deg, apparent inertia, aperiodic limit 2 sqrt(J/J0) H c, quasi-spring."""
     t = 100.0
     assert closed.line(axis(C))[1] * t / ARCMIN == pytest.approx(2.149, abs=0.001)  # M t / (H i_g)

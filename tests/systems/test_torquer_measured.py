@@ -14,7 +14,7 @@ Command = Callable[..., tuple[int, str, str]]
 NAME = "torquer_scale_factor"
 
 
-def test_book_table(command: Command, tmp_path: Path) -> None:
+def test_printed_table(command: Command, tmp_path: Path) -> None:
     """[LIN-TABLE, E49]: K = 17.1706, printed 17.171; linearity against 17.171, the 5 mA value with its true sign."""
     data = Bench.find().system_folder(NAME) / "book_table.csv"
     code, out, err = command("reduce", NAME, "--data", data, "--out", tmp_path)
@@ -65,6 +65,6 @@ def test_it_is_listed(command: Command) -> None:
     assert code == 0 and NAME in out
 
 
-def test_book_table_says_where_it_comes_from() -> None:
+def test_printed_table_says_where_it_comes_from() -> None:
     head = (Bench.find().system_folder(NAME) / "book_table.csv").read_text("utf-8")
     assert "Hu 1981, table after eq. A3-6" in head and "K_n" in head

@@ -81,7 +81,7 @@ def test_lag_goes_with_the_square_of_the_rate(session: Session) -> None:
     assert worst < 1e-3 * LIMIT
 
 
-def test_d_oo_folds_as_the_spec_says(session: Session) -> None:
+def test_d_oo_folds_as_predicted(session: Session) -> None:
     """X2 + Y2 + Z2 = gamma2, so D_OO Y2 = D_OO gamma2 - D_OO X2 - D_OO Z2: it goes to D_F with +gamma2 and to D_II and
     D_SS with -1, and nowhere else.  [RANK-1g-FOLD, TUM1-YY]
     """
