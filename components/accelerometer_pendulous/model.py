@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, exp, fabs, floor, sqrt
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
+from gyrobench.component.blocks.gyro import GaussMarkov
+from gyrobench.component.math import Number, clip, floor
 
 G0 = 9.80665  # m/s2
 UG = 1e-6  # in units of g0
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class AccelerometerPendulous(Component):
@@ -45,7 +45,7 @@ class AccelerometerPendulous(Component):
     k3 = Parameter(20.0 * UG, "1", "third order in X, g0 per g0^3 (20 ug/g3)")
     k4 = Parameter(20.0 * UG, "1", "cross term X Y, g0 per g0^2 (20 ug/g2)")
     k5 = Parameter(20.0 * UG, "1", "cross term X Z, g0 per g0^2 (20 ug/g2)")
-    mount = Parameter(IDENTITY, "1", "rows: accelerometer axes x, y, z in case axes")
+    mount = Rotation("rows: accelerometer axes x, y, z in case axes")
 
     J = Parameter(1e-6, "kg.m2", "inertia of the pendulum about its hinge", above=0.0)
     C = Parameter(1e-3, "N.m.s/rad", "damping", above=0.0)
@@ -57,8 +57,7 @@ class AccelerometerPendulous(Component):
     resolution = Parameter(0.0, "A", "resolution of the measured current; 0: none", min=0.0)
 
     turn_on = Noise(0.0, "m/s2", "rms of the turn-on bias, one value a run", per="start")
-    markov = Noise(0.0, "m/s2", "rms of the Gauss-Markov bias", per="step")
-    markov_tau = Parameter(300.0, "s", "correlation time of the Gauss-Markov bias", above=0.0)
+    markov = GaussMarkov(0.0, "m/s2", "Gauss-Markov bias")
     white = Noise(5.0 * UG * G0, "m/s2/sqrt(Hz)", "white acceleration noise density (5 ug/sqrt(Hz))")
     meter = Noise(1e-9, "A/sqrt(Hz)", "noise density of the current measurement")
 
@@ -75,10 +74,6 @@ class AccelerometerPendulous(Component):
 
     excess = Discrete(0.0, "A", "current wished for beyond the limit, at the start of the internal step")
     blocked = Discrete(0.0, "rad", "angle that is not integrated (limit reached, th pushes further), likewise")
-    wander = Discrete(0.0, "m/s2", "Gauss-Markov bias")
-    decay = Discrete(0.0, "1", "its decay in one internal step")
-    fresh = Discrete(0.0, "1", "size of its innovation")
-    h_last = Discrete(0.0, "s", "internal step they were made for")
 
     def start(self) -> None:
         torquer = self.scale * self.P  # N.m/A
@@ -86,54 +81,34 @@ class AccelerometerPendulous(Component):
             self.C * (self.K + torquer * self.K_p) <= self.J * torquer * self.K_i,
             "the rebalance is unstable: C (K + scale P K_p) must exceed J scale P K_i; here K_p = {K_p}, K_i = {K_i}",
         )
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for m in range(3):
-                    dot = dot + self.mount[i][m] * self.mount[j][m]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "mount is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
-        det = self.mount[0][0] * (self.mount[1][1] * self.mount[2][2] - self.mount[1][2] * self.mount[2][1])
-        det = det - self.mount[0][1] * (self.mount[1][0] * self.mount[2][2] - self.mount[1][2] * self.mount[2][0])
-        det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
-        self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
-        self.wander = self.noise.markov
-        self.h_last = 0.0
-        wish = self.K_p * self.angle + self.K_i * self.q
-        self.excess = wish - clip(wish, -self.i_max, self.i_max)
+        self.limit()
+
+    def command(self) -> Number:
+        """Return the current that the rebalance asks for, without its limit."""
+        return self.K_p * self.angle + self.K_i * self.q
+
+    def limit(self) -> None:
+        self.excess = self.command() - clip(self.command(), -self.i_max, self.i_max)
         self.blocked = self.angle if self.excess * self.angle > 0.0 else 0.0
 
     def flow(self) -> None:
-        g = [0.0, 0.0, 0.0]
-        for j in range(3):
-            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
-            g[j] = -(row + self.mount[j][2] * self.f[2]) / G0
+        g = -(self.mount @ self.f) / G0
         slope = self.k1 + self.k2 * g[0] + self.k3 * g[0] * g[0] + self.k4 * g[1] + self.k5 * g[2]
-        w = G0 * (self.k0 + slope * g[0]) + self.noise.turn_on + self.wander + self.noise.white
-        current = self.K_p * self.angle + self.K_i * self.q - self.excess
+        w = G0 * (self.k0 + slope * g[0]) + self.noise.turn_on + self.markov_value + self.noise.white
+        current = self.command() - self.excess
         self.der.angle = self.rate
         self.der.rate = (self.P * (w - self.scale * current) - self.C * self.rate - self.K * self.angle) / self.J
         self.der.q = self.angle - self.blocked
 
     @sampled(every=1)
     def tick(self) -> None:
-        if self.h != self.h_last:
-            self.decay = exp(-self.h / self.markov_tau)
-            self.fresh = sqrt(1.0 - self.decay * self.decay)
-            self.h_last = self.h
-        self.wander = self.decay * self.wander + self.fresh * self.noise.markov
-        wish = self.K_p * self.angle + self.K_i * self.q
-        self.excess = wish - clip(wish, -self.i_max, self.i_max)
-        self.blocked = self.angle if self.excess * self.angle > 0.0 else 0.0
+        self.limit()
 
     def outputs(self) -> None:
-        wish = self.K_p * self.angle + self.K_i * self.q
-        self.i = clip(wish, -self.i_max, self.i_max)
+        self.i = clip(self.command(), -self.i_max, self.i_max)
         read = self.i + self.noise.meter
         if self.resolution > 0.0:
             read = self.resolution * floor(read / self.resolution + 0.5)
         self.i_read = read
         self.theta = self.angle
-        self.saturated = 1.0 if self.i != wish else 0.0
+        self.saturated = 1.0 if self.i != self.command() else 0.0

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import fabs, floor
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import SampledEstimator
 
 
-class EstimatorAlphaBetaGamma(Component):
+class EstimatorAlphaBetaGamma(SampledEstimator):
     """Tracking filter of fixed gains for value, slope and curvature of a signal.
 
         x- = x + T v + T2 a / 2,   v- = v + T a,   a- = a          T = Ts, T2 = T T
@@ -28,22 +28,13 @@ class EstimatorAlphaBetaGamma(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     alpha = Parameter(0.142625, "1", "gain of the value")
     beta = Parameter(0.0073125, "1", "gain of the slope")
     gamma = Parameter(0.00025, "1", "gain of the curvature")
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate, unit of z")
     innovation = Output("1", "reading less its prediction; 0 where the reading is missing")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     begun = Discrete(0.0, "1", "1 once a reading was there")
     x = Discrete(0.0, "1", "value")
     v = Discrete(0.0, "1/s", "slope")
@@ -64,17 +55,7 @@ class EstimatorAlphaBetaGamma(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
+        if self.reading > 0.5:
             if self.begun == 0.0:
                 if self.valid > 0.5:
                     self.begun = 1.0

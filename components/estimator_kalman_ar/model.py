@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import fabs, floor, index
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import ZERO, KalmanEstimator, stationary
+from gyrobench.component.math import index
 
-ZERO = [0.0, 0.0, 0.0, 0.0, 0.0]
 
-
-class EstimatorKalmanAr(Component):
+class EstimatorKalmanAr(KalmanEstimator):
     """Kalman filter for a drift that is an autoregressive process of order p, p = 1 ... 5.  [EST-KF-GEN, EST-KF-AR]
 
         x_t = phi_1 x_{t-1} + ... + phi_p x_{t-p} + w_t,   var w = Q        z_t = x_t + v_t,   var v = R
@@ -32,63 +31,26 @@ class EstimatorKalmanAr(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     p = Parameter(3, int, "order of the model", min=1, max=5)
     phi = Parameter([-0.7466, -0.5044, -0.2538, 0.0, 0.0], "1", "coefficients of x_t = sum phi_i x_{t-i} + w_t")
     Q = Parameter(3.3697e-6, "1", "variance of w, (unit of z)2", min=0.0)
     R = Parameter(3.3697e-6, "1", "variance of the noise of one reading, (unit of z)2", above=0.0)
     P0 = Parameter(1e-4, "1", "variance of each state at the start, (unit of z)2", min=0.0)
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate of x, unit of z")
-    variance = Output("1", "variance of the estimate, as the filter has it")
-    innovation = Output("1", "reading less its prediction; 0 where the reading is missing")
-    nis = Output("1", "innovation squared over its variance; 0 where the reading is missing")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     x = Discrete(ZERO, "1", "state")
     P = Discrete([ZERO, ZERO, ZERO, ZERO, ZERO], "1", "covariance of the state")
-    y = Discrete(0.0, "1", "last innovation")
-    e = Discrete(0.0, "1", "last innovation squared over its variance")
 
     def start(self) -> None:
-        turned = 1.0  # stationary with the signs turned?
-        stationary = 1.0
-        # Levinson downwards: stationary if and only if every reflection coefficient is within -1 and 1
-        for s in range(2):
-            f = [0.0, 0.0, 0.0, 0.0, 0.0]
-            g = [0.0, 0.0, 0.0, 0.0, 0.0]
-            for i in range(5):
-                f[i] = (1.0 - 2.0 * s) * self.phi[i] if i < self.p else 0.0
-            inside = 1.0
-            for m in range(5):
-                n = 4.0 - m  # place of the last coefficient
-                k = f[4 - m]
-                if fabs(k) >= 1.0:
-                    inside = 0.0
-                if inside > 0.5:
-                    for i in range(5):
-                        g[i] = f[i]
-                    for i in range(5):
-                        if i < n:
-                            f[i] = (g[i] + k * g[index(n - 1.0 - i)]) / (1.0 - k * k)
-            if s == 0.0:
-                stationary = inside
-            else:
-                turned = inside
+        as_given = stationary(self.phi, self.p, 1.0)
         self.refuse(
-            stationary < 0.5 and turned > 0.5,
+            as_given < 0.5 and stationary(self.phi, self.p, -1.0) > 0.5,
             "phi is not stationary, but with its signs turned it is: arburg (MATLAB, spectrum) returns a = -phi, phi "
             "here is that of x_t = sum phi_i x_(t-i) + w_t: give phi = -a",
         )
         self.refuse(
-            stationary < 0.5,
+            as_given < 0.5,
             "phi is not stationary: the roots of its polynomial (p = {p}) must lie within the unit circle; for a "
             "random walk take estimator_kalman_rate",
         )
@@ -101,17 +63,7 @@ class EstimatorKalmanAr(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
+        if self.reading > 0.5:
             # x- = F x; the product F P, then F P F': rows and columns move down by one, the first is new
             new = 0.0
             c = [0.0, 0.0, 0.0, 0.0, 0.0]  # first row of F P
@@ -159,6 +111,4 @@ class EstimatorKalmanAr(Component):
     def outputs(self) -> None:
         self.estimate = self.x[0]
         self.variance = self.P[0][0]
-        self.innovation = self.y
-        self.nis = self.e
         self.latency = 0.0

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import fabs, floor
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import KalmanEstimator
 
 
-class EstimatorKalmanRate(Component):
+class EstimatorKalmanRate(KalmanEstimator):
     """Kalman filter of a rate that wanders: value and slope, or a level alone.  [EST-KF-GEN, EST-KF-AR: GyroRateKf]
 
         x = (value, slope),   F = [[1, T], [0, 1]],   H = [1 0],   T = Ts,   var of a reading R
@@ -27,33 +27,19 @@ class EstimatorKalmanRate(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     q = Parameter(0.5, "1/s3", "density of the white noise that drives the slope, (unit of z)2/s3", min=0.0)
     walk = Parameter(0.0, "1/s", "density of the white noise that drives the value, (unit of z)2/s", min=0.0)
     R = Parameter(2.699449e-6, "1", "variance of the noise of one reading, (unit of z)2", above=0.0)
     P0 = Parameter(1.0, "1", "variance of the value at the start, (unit of z)2", min=0.0)
     P0_slope = Parameter(1.0, "1/s2", "variance of the slope at the start, (unit of z)2/s2", min=0.0)
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate of the value, unit of z")
-    variance = Output("1", "variance of the estimate, as the filter has it")
-    innovation = Output("1", "reading less its prediction; 0 where the reading is missing")
-    nis = Output("1", "innovation squared over its variance; 0 where the reading is missing")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     x = Discrete(0.0, "1", "value")
     v = Discrete(0.0, "1/s", "slope")
     P_xx = Discrete(0.0, "1", "variance of the value")
     P_xv = Discrete(0.0, "1/s", "covariance of value and slope")
     P_vv = Discrete(0.0, "1/s2", "variance of the slope")
-    y = Discrete(0.0, "1", "last innovation")
-    e = Discrete(0.0, "1", "last innovation squared over its variance")
 
     def start(self) -> None:
         self.x = 0.0
@@ -64,17 +50,7 @@ class EstimatorKalmanRate(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
+        if self.reading > 0.5:
             T = self.Ts
             self.x = self.x + T * self.v
             self.P_xx = self.P_xx + T * (2.0 * self.P_xv + T * self.P_vv) + self.q * T * T * T / 3.0 + self.walk * T
@@ -100,6 +76,4 @@ class EstimatorKalmanRate(Component):
     def outputs(self) -> None:
         self.estimate = self.x
         self.variance = self.P_xx
-        self.innovation = self.y
-        self.nis = self.e
         self.latency = 0.0

@@ -1,10 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import fabs, floor, index
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import SampledEstimator
+from gyrobench.component.math import index
 
 
-class EstimatorMovingAverage(Component):
+class EstimatorMovingAverage(SampledEstimator):
     """Mean of the last N readings.
 
         estimate_k = (z_k + z_{k-1} + ... + z_{k-N+1}) / N,   latency = (N - 1) Ts / 2
@@ -21,19 +22,10 @@ class EstimatorMovingAverage(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     N = Parameter(16, int, "number of readings averaged", min=1, max=512)
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate, unit of z")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     last = Discrete([0.0] * 512, "1", "the last N readings, as a ring")
     place = Discrete(0.0, "1", "where the next one goes")
     count = Discrete(0.0, "1", "readings in the ring")
@@ -41,28 +33,17 @@ class EstimatorMovingAverage(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
-            if self.valid > 0.5:
-                self.last[index(self.place)] = self.z
-                self.place = self.place + 1.0
-                if self.place >= self.N:
-                    self.place = 0.0
-                if self.count < self.N:
-                    self.count = self.count + 1.0
-                total = 0.0
-                for k in range(index(self.count)):
-                    total = total + self.last[k]
-                self.mean = total / self.count
+        if self.reading > 0.5 and self.valid > 0.5:
+            self.last[index(self.place)] = self.z
+            self.place = self.place + 1.0
+            if self.place >= self.N:
+                self.place = 0.0
+            if self.count < self.N:
+                self.count = self.count + 1.0
+            total = 0.0
+            for k in range(index(self.count)):
+                total = total + self.last[k]
+            self.mean = total / self.count
 
     def outputs(self) -> None:
         self.estimate = self.mean

@@ -1,13 +1,13 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import fabs, floor, index, maximum
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import ZERO, KalmanEstimator, stationary
+from gyrobench.component.math import index, maximum
 
-ZERO = [0.0, 0.0, 0.0, 0.0, 0.0]
 PRIOR = 1.0  # form
 
 
-class EstimatorSageHusa(Component):
+class EstimatorSageHusa(KalmanEstimator):
     """Kalman filter that estimates the variance R of its readings (Sage and Husa, simplified).  [EST-SAGE-HUSA]
 
     Model: p = 0 that of estimator_kalman_rate, state (value, slope) with the density q; p = 1 ... 5 that of
@@ -36,8 +36,6 @@ class EstimatorSageHusa(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     p = Parameter(0, int, "model: 0 value and slope, 1 to 5 autoregressive of this order", min=0, max=5)
     q = Parameter(2.0, "1/s3", "p = 0: density of the white noise that drives the slope, (unit of z)2/s3", min=0.0)
     walk = Parameter(0.0, "1/s", "p = 0: density of the white noise that drives the value, (unit of z)2/s", min=0.0)
@@ -50,20 +48,10 @@ class EstimatorSageHusa(Component):
     P0 = Parameter(1.0, "1", "variance of value or states at the start, (unit of z)2", min=0.0)
     P0_slope = Parameter(1.0, "1/s2", "p = 0: variance of the slope at the start, (unit of z)2/s2", min=0.0)
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate, unit of z")
-    variance = Output("1", "variance of the estimate, as the filter has it")
-    innovation = Output("1", "reading less its prediction; 0 where the reading is missing")
-    nis = Output("1", "innovation squared over its variance; 0 where the reading is missing")
     R_hat = Output("1", "estimated variance of a reading, (unit of z)2")
     clip_count = Output("1", "how often R was held at its smallest value")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     n = Discrete(2.0, "1", "number of states")
     F = Discrete([ZERO, ZERO, ZERO, ZERO, ZERO], "1", "transition matrix")
     G = Discrete([ZERO, ZERO, ZERO, ZERO, ZERO], "1", "G Q G'")
@@ -72,41 +60,16 @@ class EstimatorSageHusa(Component):
     R = Discrete(0.0, "1", "estimated variance of a reading")
     power = Discrete(1.0, "1", "b^(k+1)")
     clips = Discrete(0.0, "1", "how often R was held")
-    y = Discrete(0.0, "1", "last innovation")
-    e = Discrete(0.0, "1", "last innovation squared over its variance")
 
     def start(self) -> None:
-        turned = 1.0  # stationary with the signs turned?
-        stationary = 1.0
-        # Levinson downwards: stationary if and only if every reflection coefficient is within -1 and 1
-        for s in range(2):
-            f = [0.0, 0.0, 0.0, 0.0, 0.0]
-            g = [0.0, 0.0, 0.0, 0.0, 0.0]
-            for i in range(5):
-                f[i] = (1.0 - 2.0 * s) * self.phi[i] if i < self.p else 0.0
-            inside = 1.0
-            for m in range(5):
-                last = 4.0 - m  # place of the last coefficient
-                k = f[4 - m]
-                if fabs(k) >= 1.0:
-                    inside = 0.0
-                if inside > 0.5:
-                    for i in range(5):
-                        g[i] = f[i]
-                    for i in range(5):
-                        if i < last:
-                            f[i] = (g[i] + k * g[index(last - 1.0 - i)]) / (1.0 - k * k)
-            if s == 0.0:
-                stationary = inside
-            else:
-                turned = inside
+        as_given = stationary(self.phi, self.p, 1.0)
         self.refuse(
-            stationary < 0.5 and turned > 0.5,
+            as_given < 0.5 and stationary(self.phi, self.p, -1.0) > 0.5,
             "phi is not stationary, but with its signs turned it is: arburg (MATLAB, spectrum) returns a = -phi, phi "
             "here is that of x_t = sum phi_i x_(t-i) + w_t: give phi = -a",
         )
         self.refuse(
-            stationary < 0.5,
+            as_given < 0.5,
             "phi is not stationary: the roots of its polynomial (p = {p}) must lie within the unit circle; for a "
             "random walk take p = 0 with walk",
         )
@@ -142,17 +105,7 @@ class EstimatorSageHusa(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
+        if self.reading > 0.5:
             x = [0.0, 0.0, 0.0, 0.0, 0.0]
             M = [
                 [0.0, 0.0, 0.0, 0.0, 0.0],
@@ -208,8 +161,6 @@ class EstimatorSageHusa(Component):
     def outputs(self) -> None:
         self.estimate = self.x[0]
         self.variance = self.P[0][0]
-        self.innovation = self.y
-        self.nis = self.e
         self.R_hat = self.R
         self.clip_count = self.clips
         self.latency = 0.0

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
+from gyrobench.component import Discrete, Output, Parameter, sampled
+from gyrobench.component.blocks.estimator import SampledEstimator
 from gyrobench.component.math import fabs, floor, index, maximum, sign, sqrt
 
 # rings of the largest bank (db4, 6 levels), one after the other in `lines`: of a_j, 7 2^j + 1 readings each, from 0;
@@ -9,7 +10,7 @@ RECONSTRUCTED = 447
 DETAILS = 894
 
 
-class EstimatorWavelet(Component):
+class EstimatorWavelet(SampledEstimator):
     """Wavelet denoising as a stream: undecimated filter bank, soft threshold, exact delay.  [EST-WAVELET-ONLINE]
 
         a_0 = z;   j = 0 ... J-1, m = 0 ... L-1, the filters stretched by s = 2^j
@@ -36,22 +37,13 @@ class EstimatorWavelet(Component):
 
     version = "1.0.0"
 
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    Ts = Parameter(1e-3, "s", "sampling period, a whole multiple of the communication step", above=0.0)
     moments = Parameter(1, int, "wavelet, by its vanishing moments: 1 Haar, 4 db4", min=1, max=4)
     J = Parameter(3, int, "levels", min=1, max=6)
     sigma = Parameter(1.643e-3, "1", "standard deviation of the white noise of a reading, unit of z", min=0.0)
     c = Parameter(3.7232973, "1", "threshold over sigma, sqrt(2 ln 1024)", min=0.0)
 
-    z = Input(0.0, "1", "reading")
-    valid = Input(1.0, "1", "0: this reading is missing")
-
-    estimate = Output("1", "estimate, unit of z")
     latency = Output("s", "delay of the estimate")
 
-    coupling = Discrete(0.0, "s", "communication step that `every` holds for")
-    every = Discrete(1.0, "1", "communication steps in a sampling period")
-    due = Discrete(1.0, "1", "communication steps until the next reading")
     taps = Discrete(0.0, "1", "L")
     low = Discrete([0.0] * 8, "1", "h")
     high = Discrete([0.0] * 8, "1", "g")
@@ -90,17 +82,7 @@ class EstimatorWavelet(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if fabs(self.h - self.coupling) > 1e-9 * self.h:
-            self.coupling = self.h
-            self.every = floor(self.Ts / self.h + 0.5)
-            self.due = self.every
-            self.refuse(
-                self.every < 0.5 or fabs(self.every * self.h - self.Ts) > 1e-6 * self.Ts,
-                "Ts = {Ts} s must be a whole multiple of the communication step, {coupling} s",
-            )
-        self.due = self.due - 1.0
-        if self.due < 0.5:
-            self.due = self.every
+        if self.reading > 0.5:
             if self.valid > 0.5:
                 self.last = self.z
             if self.valid > 0.5 or self.count > 0.0:

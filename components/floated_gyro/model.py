@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, cos, exp, fabs, pi, sin, sqrt
-
-DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+from gyrobench.component import Discrete, Input, Output, Parameter, sampled
+from gyrobench.component.blocks.gyro import SdfGyro, torquer_rate
+from gyrobench.component.math import Number, Vector, cos, fabs, pi, sin, vector
 
 
-class FloatedGyro(Component):
+class FloatedGyro(SdfGyro):
     """Single-degree-of-freedom floated gyro.  [GYRO-DYN-1, GYRO-SDF-EOM, GYRO-STATIC-10, GYRO-COEFF-TIME-TEMP]
 
     Rate-integrating with K = 0; integrating with C = 0 as well; with a spring K > 0 a rate gyro.
@@ -56,8 +54,6 @@ class FloatedGyro(Component):
 
     version = "1.1.0"
 
-    H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
-    J = Parameter(2e-4, "kg.m2", "float inertia about the output axis", above=0.0)
     C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
     K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)
     stop = Parameter(0.0, "rad", "float stop: the run ends there (0: none)", min=0.0)
@@ -66,25 +62,8 @@ class FloatedGyro(Component):
     J_OS = Parameter(0.0, "kg.m2", "product of inertia of the float, O and S")
     J_SI = Parameter(0.0, "kg.m2", "product of inertia of the float, S and I")
     reaction = Parameter(False, bool, "1: M_react, h_I and M_I are computed; 0: they stay 0, which is quicker")
-    K_sg = Parameter(10.0, "V/rad", "pickoff gain", above=0.0)
-    u_max = Parameter(0.1, "V", "pickoff saturation", above=0.0)
-    k = Parameter(17.2e3 * DEG_H, "rad/s/A", "torquer scale factor (17.2 deg/h/mA)", above=0.0)
-    k2 = Parameter(0.0, "1/A", "torquer nonlinearity, relative, even in the rate")
-    k3 = Parameter(0.0, "1/A2", "torquer nonlinearity, relative, odd in the rate")
-    mount = Parameter(IDENTITY, "1", "rows: gyro axes I, O, S in case axes")
 
     terms = Parameter(9, int, "terms of the static model: 3, 4, 5, 8, 9 or 10")
-    D_F = Parameter(-0.3 * DEG_H, "rad/s", "constant drift (-0.3 deg/h)")
-    D_I = Parameter(-0.9 * DEG_H, "rad/s", "drift per g0 along I, mass unbalance along S (-0.9 deg/h/g)")
-    D_O = Parameter(0.1 * DEG_H, "rad/s", "drift per g0 along O, empirical (0.1 deg/h/g)")
-    D_S = Parameter(-0.7 * DEG_H, "rad/s", "drift per g0 along S, mass unbalance along I (-0.7 deg/h/g)")
-    D_II = Parameter(-0.05 * DEG_H, "rad/s", "drift per g0 squared along I (-0.05 deg/h/g2)")
-    D_OO = Parameter(0.0, "rad/s", "drift per g0 squared along O, empirical")
-    D_SS = Parameter(0.04 * DEG_H, "rad/s", "drift per g0 squared along S (0.04 deg/h/g2)")
-    D_IO = Parameter(-0.03 * DEG_H, "rad/s", "drift per g0 squared, I and O (-0.03 deg/h/g2)")
-    D_OS = Parameter(-0.02 * DEG_H, "rad/s", "drift per g0 squared, O and S (-0.02 deg/h/g2)")
-    D_IS = Parameter(-0.15 * DEG_H, "rad/s", "drift per g0 squared, I and S, anisoelasticity (-0.15 deg/h/g2)")
-
     age = Parameter(0.0, "s", "age at time 0", min=0.0)
     p_F = Parameter(0.0, "1/s", "ageing of D_F, relative (typical 1e-8)")
     p_I = Parameter(0.0, "1/s", "ageing of D_I, relative (typical 1e-8)")
@@ -94,34 +73,12 @@ class FloatedGyro(Component):
     D_TO = Parameter(0.0, "rad/s/K", "D_Tyy: drift per g0 along O and temperature difference along O")
     D_TS = Parameter(0.0, "rad/s/K", "D_Txz: drift per g0 along S and temperature difference along I")
 
-    turn_on = Noise(0.0, "rad/s", "rms of the turn-on drift, one value a run", per="start")
-    markov = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift (0.002 deg/h)", per="step")
-    markov_tau = Parameter(300.0, "s", "correlation time of the Gauss-Markov drift", above=0.0)
-    white = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density (0.0178 deg/h/sqrt(Hz))")
-    pickoff = Noise(5e-8, "V/sqrt(Hz)", "pickoff noise density")
-
-    omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
-    alpha = Input([0.0, 0.0, 0.0], "rad/s2", "angular acceleration, case axes")
-    f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
-    i = Input(0.0, "A", "torquer current")
     dT = Input([0.0, 0.0, 0.0], "K", "temperature differences along I, O, S")
 
-    u = Output("V", "pickoff voltage")
-    drift = Output("rad/s", "drift rate omega_d, precession sign")
-    b = Output("rad", "float angle")
-    saturated = Output("1", "1 while the pickoff is saturated")
     M_react = Output("N.m", "torque of the gyro on its mount, case axes", shape=(3,))
     h_I = Output("N.m.s", "spin momentum along I, H sin b, half an internal step ahead")
     M_I = Output("N.m", "torque on the mount along I without its part -dh_I/dt")
 
-    float_angle = State(0.0, "rad", "float angle b about O relative to the case")
-    float_rate = State(0.0, "rad/s", "its rate r")
-
-    wander = Discrete(0.0, "rad/s", "Gauss-Markov drift")
-    decay = Discrete(0.0, "1", "its decay in one internal step")
-    fresh = Discrete(0.0, "1", "size of its innovation")
-    h_last = Discrete(0.0, "s", "internal step they were made for")
-    per_g = Discrete(0.0, "s2/m", "-1 / g0")
     dynamic = Discrete(0.0, "1", "1 where a dynamic error is given")
 
     def start(self) -> None:
@@ -137,99 +94,50 @@ class FloatedGyro(Component):
         self.refuse(n < 8.0 and self.D_OS != 0.0, "D_OS must be 0 with terms = {terms} (from 8 on)")
         self.refuse(n < 9.0 and self.D_O != 0.0, "D_O must be 0 with terms = {terms} (from 9 on)")
         self.refuse(n < 10.0 and self.D_OO != 0.0, "D_OO must be 0 with terms = {terms} (from 10 on)")
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for m in range(3):
-                    dot = dot + self.mount[i][m] * self.mount[j][m]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "mount is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
-        det = self.mount[0][0] * (self.mount[1][1] * self.mount[2][2] - self.mount[1][2] * self.mount[2][1])
-        det = det - self.mount[0][1] * (self.mount[1][0] * self.mount[2][2] - self.mount[1][2] * self.mount[2][0])
-        det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
-        self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
-        self.per_g = -1.0 / 9.80665
-        self.wander = self.noise.markov
-        self.h_last = 0.0
         self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the float must stop before pi/2")
         self.dynamic = 0.0
         if self.dJ != 0.0 or self.J_IO != 0.0 or self.J_OS != 0.0 or self.J_SI != 0.0:
             self.dynamic = 1.0
 
-    def static_drift(self, x, y, z):
+    def static_drift(self, x: Vector) -> Number:
         age = self.age + self.t
         fixed = self.D_F * (1.0 + self.p_F * age)
         along_i = self.D_I * (1.0 + self.p_I * age) + self.D_TI * self.dT[2]
         along_o = self.D_O * (1.0 + self.p_O * age) - self.D_TO * self.dT[1]
         along_s = self.D_S * (1.0 + self.p_S * age) - self.D_TS * self.dT[0]
-        along_i = along_i + self.D_II * x + self.D_IO * y + self.D_IS * z
-        along_o = along_o + self.D_OO * y + self.D_OS * z
-        along_s = along_s + self.D_SS * z
-        return fixed + along_i * x + along_o * y + along_s * z
+        return self.polynomial(fixed, vector([along_i, along_o, along_s]), x)
 
     def flow(self) -> None:
-        w = [0.0, 0.0, 0.0]
-        g = [0.0, 0.0, 0.0]
-        for j in range(3):
-            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
-            w[j] = row + self.mount[j][2] * self.omega[2]
-            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
-            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
-        turn = self.mount[1][0] * self.alpha[0] + self.mount[1][1] * self.alpha[1]
-        turn = turn + self.mount[1][2] * self.alpha[2]
-        drift = self.static_drift(g[0], g[1], g[2]) + self.noise.turn_on + self.wander + self.noise.white
-        pull = self.k * self.i * (1.0 + self.k2 * self.i + self.k3 * self.i * self.i)
+        w = self.mount @ self.omega
         sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
-        self.der.float_angle = self.float_rate
-        torque = self.H * (sensed - drift - pull) - self.C * self.float_rate
+        rate = self.drift_rate()
+        torque = self.H * (sensed - rate - torquer_rate(self.k, self.k2, self.k3, self.i)) - self.C * self.float_rate
         if self.K > 0.0:
             torque = torque - self.K * self.float_angle
         if self.dynamic > 0.0:
             c = cos(self.float_angle)
             s = sin(self.float_angle)
-            row = self.mount[0][0] * self.alpha[0] + self.mount[0][1] * self.alpha[1]
-            a_i = row + self.mount[0][2] * self.alpha[2]
-            row = self.mount[2][0] * self.alpha[0] + self.mount[2][1] * self.alpha[1]
-            a_s = row + self.mount[2][2] * self.alpha[2]
+            a = self.mount @ self.alpha
             spin = w[0] * s + w[2] * c
             torque = torque + self.dJ * sensed * spin + self.J_SI * (spin * spin - sensed * sensed)
-            torque = torque + self.J_IO * (a_i * c - a_s * s + w[1] * spin)
-            torque = torque + self.J_OS * (a_i * s + a_s * c - w[1] * sensed)
-        self.der.float_rate = torque / self.J - turn
+            torque = torque + self.J_IO * (a[0] * c - a[2] * s + w[1] * spin)
+            torque = torque + self.J_OS * (a[0] * s + a[2] * c - w[1] * sensed)
+        self.der.float_angle = self.float_rate
+        self.der.float_rate = torque / self.J - self.mount[1] @ self.alpha
 
     @sampled(every=1)
     def tick(self) -> None:
-        if self.h != self.h_last:
-            self.decay = exp(-self.h / self.markov_tau)
-            self.fresh = sqrt(1.0 - self.decay * self.decay)
-            self.h_last = self.h
-        self.wander = self.decay * self.wander + self.fresh * self.noise.markov
         if self.stop > 0.0:
             self.refuse(fabs(self.float_angle) >= self.stop, "the float has reached its stop: b = {float_angle} rad")
 
     def outputs(self) -> None:
-        g = [0.0, 0.0, 0.0]
-        for j in range(3):
-            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
-            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
-        known = self.static_drift(g[0], g[1], g[2]) + self.noise.turn_on
-        self.drift = known + self.wander + self.noise.white
-        self.b = self.float_angle
-        wish = self.K_sg * self.float_angle + self.noise.pickoff
-        self.u = clip(wish, -self.u_max, self.u_max)
-        self.saturated = 1.0 if self.u != wish else 0.0
         if self.reaction:
-            w_o = self.mount[1][0] * self.omega[0] + self.mount[1][1] * self.omega[1]
-            w_o = w_o + self.mount[1][2] * self.omega[2]
+            w_o = self.mount[1] @ self.omega
             s = self.H * sin(self.float_angle)
             c = self.H * cos(self.float_angle)
             turn = w_o + self.float_rate
-            pull = self.k * self.i * (1.0 + self.k2 * self.i + self.k3 * self.i * self.i)
-            along_o = self.C * self.float_rate + self.K * self.float_angle + self.H * (self.drift + pull)
-            for j in range(3):
-                row = self.mount[2][j] * s * turn - self.mount[0][j] * c * turn
-                self.M_react[j] = row + self.mount[1][j] * along_o
+            precession = self.H * (self.drift + torquer_rate(self.k, self.k2, self.k3, self.i))
+            along_o = self.C * self.float_rate + self.K * self.float_angle + precession
+            self.M_react = self.mount[2] * s * turn - self.mount[0] * c * turn + self.mount[1] * along_o
             self.h_I = self.H * sin(self.float_angle + 0.5 * self.h * self.float_rate)
             self.M_I = -c * w_o

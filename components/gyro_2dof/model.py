@@ -1,10 +1,8 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, cos, exp, fabs, pi, sin, sqrt
-
-DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
+from gyrobench.component.blocks.gyro import DEG_H, PER_G, ChannelDrift, GaussMarkov, torquer_rate
+from gyrobench.component.math import Vector, clip, cos, fabs, pi, sin, vector
 
 
 class Gyro2dof(Component):
@@ -71,7 +69,7 @@ class Gyro2dof(Component):
     k3_x = Parameter(0.0, "1/A2", "nonlinearity of the torquer about x, relative, odd in the rate")
     k2_y = Parameter(0.0, "1/A", "nonlinearity of the torquer about y, relative, even in the rate")
     k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
-    mount = Parameter(IDENTITY, "1", "rows: gyro axes x, y, z in case axes")
+    mount = Rotation("rows: gyro axes x, y, z in case axes")
 
     H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
     J_x = Parameter(0.0, "kg.m2", "inertia of rotor and both gimbals about x; 0: no nutation", min=0.0)
@@ -83,33 +81,39 @@ class Gyro2dof(Component):
     stop = Parameter(0.0, "rad", "stop of the inner gimbal: the run ends there (0: none)", min=0.0)
 
     terms_x = Parameter(9, int, "terms of the x channel: 8, 9 or 10")
-    Dx_0 = Parameter(-0.3 * DEG_H, "rad/s", "x channel, constant drift (-0.3 deg/h)")
-    Dx_x = Parameter(-0.9 * DEG_H, "rad/s", "x channel, per g0 along x, mass unbalance along z (-0.9 deg/h/g)")
-    Dx_y = Parameter(0.1 * DEG_H, "rad/s", "x channel, per g0 along y, empirical (0.1 deg/h/g)")
-    Dx_z = Parameter(-0.7 * DEG_H, "rad/s", "x channel, per g0 along z, mass unbalance along x (-0.7 deg/h/g)")
-    Dx_xx = Parameter(-0.05 * DEG_H, "rad/s", "x channel, per g0 squared along x (-0.05 deg/h/g2)")
-    Dx_yy = Parameter(0.0, "rad/s", "x channel, per g0 squared along y, empirical")
-    Dx_zz = Parameter(0.04 * DEG_H, "rad/s", "x channel, per g0 squared along z (0.04 deg/h/g2)")
-    Dx_xy = Parameter(-0.03 * DEG_H, "rad/s", "x channel, per g0 squared, x and y (-0.03 deg/h/g2)")
-    Dx_yz = Parameter(-0.02 * DEG_H, "rad/s", "x channel, per g0 squared, y and z (-0.02 deg/h/g2)")
-    Dx_xz = Parameter(-0.15 * DEG_H, "rad/s", "x channel, per g0 squared, anisoelasticity (-0.15 deg/h/g2)")
+    Dx = ChannelDrift(
+        "x",
+        fixed=(-0.3, "constant drift (-0.3 deg/h)"),
+        x=(-0.9, "per g0 along x, mass unbalance along z (-0.9 deg/h/g)"),
+        y=(0.1, "per g0 along y, empirical (0.1 deg/h/g)"),
+        z=(-0.7, "per g0 along z, mass unbalance along x (-0.7 deg/h/g)"),
+        xx=(-0.05, "per g0 squared along x (-0.05 deg/h/g2)"),
+        yy=(0.0, "per g0 squared along y, empirical"),
+        zz=(0.04, "per g0 squared along z (0.04 deg/h/g2)"),
+        xy=(-0.03, "per g0 squared, x and y (-0.03 deg/h/g2)"),
+        yz=(-0.02, "per g0 squared, y and z (-0.02 deg/h/g2)"),
+        xz=(-0.15, "per g0 squared, anisoelasticity (-0.15 deg/h/g2)"),
+    )
 
     terms_y = Parameter(9, int, "terms of the y channel: 8, 9 or 10")
-    Dy_0 = Parameter(0.4 * DEG_H, "rad/s", "y channel, constant drift (0.4 deg/h)")
-    Dy_x = Parameter(-0.08 * DEG_H, "rad/s", "y channel, per g0 along x, empirical (-0.08 deg/h/g)")
-    Dy_y = Parameter(-1.0 * DEG_H, "rad/s", "y channel, per g0 along y, unbalance with outer gimbal (-1 deg/h/g)")
-    Dy_z = Parameter(0.8 * DEG_H, "rad/s", "y channel, per g0 along z, mass unbalance along y (0.8 deg/h/g)")
-    Dy_xx = Parameter(0.0, "rad/s", "y channel, per g0 squared along x, empirical")
-    Dy_yy = Parameter(-0.03 * DEG_H, "rad/s", "y channel, per g0 squared along y (-0.03 deg/h/g2)")
-    Dy_zz = Parameter(0.03 * DEG_H, "rad/s", "y channel, per g0 squared along z (0.03 deg/h/g2)")
-    Dy_xy = Parameter(-0.05 * DEG_H, "rad/s", "y channel, per g0 squared, x and y (-0.05 deg/h/g2)")
-    Dy_yz = Parameter(-0.12 * DEG_H, "rad/s", "y channel, per g0 squared, anisoelasticity (-0.12 deg/h/g2)")
-    Dy_xz = Parameter(-0.02 * DEG_H, "rad/s", "y channel, per g0 squared, x and z (-0.02 deg/h/g2)")
+    Dy = ChannelDrift(
+        "y",
+        fixed=(0.4, "constant drift (0.4 deg/h)"),
+        x=(-0.08, "per g0 along x, empirical (-0.08 deg/h/g)"),
+        y=(-1.0, "per g0 along y, unbalance with outer gimbal (-1 deg/h/g)"),
+        z=(0.8, "per g0 along z, mass unbalance along y (0.8 deg/h/g)"),
+        xx=(0.0, "per g0 squared along x, empirical"),
+        yy=(-0.03, "per g0 squared along y (-0.03 deg/h/g2)"),
+        zz=(0.03, "per g0 squared along z (0.03 deg/h/g2)"),
+        xy=(-0.05, "per g0 squared, x and y (-0.05 deg/h/g2)"),
+        yz=(-0.12, "per g0 squared, anisoelasticity (-0.12 deg/h/g2)"),
+        xz=(-0.02, "per g0 squared, x and z (-0.02 deg/h/g2)"),
+    )
 
     turn_on_x = Noise(0.0, "rad/s", "rms of the turn-on drift of the x channel, one value a run", per="start")
     turn_on_y = Noise(0.0, "rad/s", "rms of the turn-on drift of the y channel, one value a run", per="start")
-    markov_x = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift, x channel (0.002 deg/h)", per="step")
-    markov_y = Noise(0.002 * DEG_H, "rad/s", "rms of the Gauss-Markov drift, y channel (0.002 deg/h)", per="step")
+    markov_x = GaussMarkov(0.002 * DEG_H, "rad/s", "Gauss-Markov drift, x channel", "0.002 deg/h", tau="markov_tau")
+    markov_y = GaussMarkov(0.002 * DEG_H, "rad/s", "Gauss-Markov drift, y channel", "0.002 deg/h", tau="markov_tau")
     markov_tau = Parameter(300.0, "s", "correlation time of the Gauss-Markov drifts", above=0.0)
     white_x = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density, x channel (0.0178 deg/h/sqrt(Hz))")
     white_y = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density, y channel (0.0178 deg/h/sqrt(Hz))")
@@ -137,12 +141,6 @@ class Gyro2dof(Component):
     p = State(0.0, "rad/s", "inertial rate of the rotor axis about x (with nutation)")
     q = State(0.0, "rad/s", "inertial rate of the rotor axis about y (with nutation)")
 
-    wander_x = Discrete(0.0, "rad/s", "Gauss-Markov drift, x channel")
-    wander_y = Discrete(0.0, "rad/s", "Gauss-Markov drift, y channel")
-    decay = Discrete(0.0, "1", "decay in one internal step")
-    fresh = Discrete(0.0, "1", "size of the innovation")
-    h_last = Discrete(0.0, "s", "internal step they were made for")
-    per_g = Discrete(0.0, "s2/m", "-1 / g0")
     per_h = Discrete(0.0, "1/(N.m.s)", "1 / H")
 
     def start(self) -> None:
@@ -173,49 +171,25 @@ class Gyro2dof(Component):
             "full = 1 (gimbals at full size) needs nutation: J_x and J_y above 0 kg.m2",
         )
         self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the inner gimbal must stop before pi/2 (gimbal lock)")
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for m in range(3):
-                    dot = dot + self.mount[i][m] * self.mount[j][m]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "mount is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
-        det = self.mount[0][0] * (self.mount[1][1] * self.mount[2][2] - self.mount[1][2] * self.mount[2][1])
-        det = det - self.mount[0][1] * (self.mount[1][0] * self.mount[2][2] - self.mount[1][2] * self.mount[2][0])
-        det = det + self.mount[0][2] * (self.mount[1][0] * self.mount[2][1] - self.mount[1][1] * self.mount[2][0])
-        self.refuse(det < 0.0, "mount is left-handed (determinant -1): reverse one row")
-        self.per_g = -1.0 / 9.80665
         self.per_h = 1.0 / self.H
-        self.wander_x = self.noise.markov_x
-        self.wander_y = self.noise.markov_y
-        self.h_last = 0.0
 
-    def static_x(self, x, y, z):
-        along_x = self.Dx_x + self.Dx_xx * x + self.Dx_xy * y + self.Dx_xz * z
-        along_y = self.Dx_y + self.Dx_yy * y + self.Dx_yz * z
-        along_z = self.Dx_z + self.Dx_zz * z
-        return self.Dx_0 + along_x * x + along_y * y + along_z * z
+    def drift_rates(self) -> Vector:
+        g = PER_G * (self.mount @ self.f)
+        x = self.Dx.rate(g) + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
+        y = self.Dy.rate(g) + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
+        return vector([x, y])
 
-    def static_y(self, x, y, z):
-        along_x = self.Dy_x + self.Dy_xx * x + self.Dy_xy * y + self.Dy_xz * z
-        along_y = self.Dy_y + self.Dy_yy * y + self.Dy_yz * z
-        along_z = self.Dy_z + self.Dy_zz * z
-        return self.Dy_0 + along_x * x + along_y * y + along_z * z
+    def precession(self, drift: Vector) -> Vector:
+        """Return the rates of the rotor under drift and torquers; each torquer acts about the other axis."""
+        about_x = drift[0] + torquer_rate(self.k_y, self.k2_y, self.k3_y, self.i_y)
+        about_y = drift[1] + torquer_rate(self.k_x, self.k2_x, self.k3_x, self.i_x)
+        return vector([about_x, about_y])
 
     def flow(self) -> None:
-        w = [0.0, 0.0, 0.0]
-        g = [0.0, 0.0, 0.0]
-        for j in range(3):
-            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
-            w[j] = row + self.mount[j][2] * self.omega[2]
-            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
-            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
-        drift_x = self.static_x(g[0], g[1], g[2]) + self.noise.turn_on_x + self.wander_x + self.noise.white_x
-        drift_y = self.static_y(g[0], g[1], g[2]) + self.noise.turn_on_y + self.wander_y + self.noise.white_y
-        rate_x = drift_x + self.k_y * self.i_y * (1.0 + self.k2_y * self.i_y + self.k3_y * self.i_y * self.i_y)
-        rate_y = drift_y + self.k_x * self.i_x * (1.0 + self.k2_x * self.i_x + self.k3_x * self.i_x * self.i_x)
+        w = self.mount @ self.omega
+        rate = self.precession(self.drift_rates())
+        rate_x = rate[0]
+        rate_y = rate[1]
         self.der.p = 0.0
         self.der.q = 0.0
         if self.full:
@@ -242,53 +216,40 @@ class Gyro2dof(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if self.h != self.h_last:
-            self.decay = exp(-self.h / self.markov_tau)
-            self.fresh = sqrt(1.0 - self.decay * self.decay)
-            self.h_last = self.h
-        self.wander_x = self.decay * self.wander_x + self.fresh * self.noise.markov_x
-        self.wander_y = self.decay * self.wander_y + self.fresh * self.noise.markov_y
         if self.full or self.stop > 0.0:
             limit = self.stop if self.stop > 0.0 else 0.5 * pi
             self.refuse(fabs(self.psi_y) >= limit, "the inner gimbal has reached its stop: beta = {psi_y} rad")
 
     def outputs(self) -> None:
-        w = [0.0, 0.0, 0.0]
-        g = [0.0, 0.0, 0.0]
-        for j in range(3):
-            row = self.mount[j][0] * self.omega[0] + self.mount[j][1] * self.omega[1]
-            w[j] = row + self.mount[j][2] * self.omega[2]
-            row = self.mount[j][0] * self.f[0] + self.mount[j][1] * self.f[1]
-            g[j] = self.per_g * (row + self.mount[j][2] * self.f[2])
-        self.drift_x = self.static_x(g[0], g[1], g[2]) + self.noise.turn_on_x + self.wander_x + self.noise.white_x
-        self.drift_y = self.static_y(g[0], g[1], g[2]) + self.noise.turn_on_y + self.wander_y + self.noise.white_y
-        wish_x = -self.K_sg_x * self.psi_x + self.noise.pickoff_x
-        wish_y = -self.K_sg_y * self.psi_y + self.noise.pickoff_y
-        self.u_x = clip(wish_x, -self.u_max, self.u_max)
-        self.u_y = clip(wish_y, -self.u_max, self.u_max)
-        self.saturated = 1.0 if self.u_x != wish_x or self.u_y != wish_y else 0.0
+        w = self.mount @ self.omega
+        drift = self.drift_rates()
+        self.drift_x = drift[0]
+        self.drift_y = drift[1]
+        unlimited_x = -self.K_sg_x * self.psi_x + self.noise.pickoff_x
+        unlimited_y = -self.K_sg_y * self.psi_y + self.noise.pickoff_y
+        self.u_x = clip(unlimited_x, -self.u_max, self.u_max)
+        self.u_y = clip(unlimited_y, -self.u_max, self.u_max)
+        self.saturated = 1.0 if self.u_x != unlimited_x or self.u_y != unlimited_y else 0.0
         self.alpha = self.psi_x
         self.beta = self.psi_y
-        rate_x = self.drift_x + self.k_y * self.i_y * (1.0 + self.k2_y * self.i_y + self.k3_y * self.i_y * self.i_y)
-        rate_y = self.drift_y + self.k_x * self.i_x * (1.0 + self.k2_x * self.i_x + self.k3_x * self.i_x * self.i_x)
-        q = self.q if self.J_x > 0.0 else rate_y + self.per_h * self.M_x
+        rate = self.precession(drift)
+        q = self.q if self.J_x > 0.0 else rate[1] + self.per_h * self.M_x
         c = 1.0
         s = self.psi_x
         tilt = self.psi_y
-        rate = w[1]  # of the outer gimbal about y
+        turn = w[1]  # rate of the outer gimbal about y
         if self.full:
             c = cos(self.psi_x)
             s = sin(self.psi_x)
             tilt = sin(self.psi_y)
-            rate = c * w[1] + s * w[2]
+            turn = c * w[1] + s * w[2]
         # axes of the outer gimbal: bearing x, bearing y of the inner gimbal, constraint about z
-        m_x = -self.H * rate_y
-        m_y = self.H * rate_x
+        m_x = -self.H * rate[1]
+        m_y = self.H * rate[0]
         m_z = self.H * q * tilt
         if self.J_x > 0.0:
             m_x = m_x + self.C_x * (self.p - w[0])
-            m_y = m_y + self.C_y * (q - rate)
+            m_y = m_y + self.C_y * (q - turn)
         side = c * m_y - s * m_z
         m_z = s * m_y + c * m_z
-        for j in range(3):
-            self.M_react[j] = self.mount[0][j] * m_x + self.mount[1][j] * side + self.mount[2][j] * m_z
+        self.M_react = self.mount[0] * m_x + self.mount[1] * side + self.mount[2] * m_z

@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.component.math import cos, exp, fabs, floor, index, pi, sign, sin
+from gyrobench.component import IDENTITY, Discrete, Input, Noise, Output, Parameter, sampled
+from gyrobench.component.blocks.table import AxisTable
+from gyrobench.component.math import Number, cos, exp, fabs, floor, index, pi, sign, sin
 
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
-
-class IndexHead(Component):
+class IndexHead(AxisTable):
     """Indexing head: a table that stands in one of up to 24 positions only.  [TEST-ACC-MULTI, TEST-8POS, optical_index]
 
     Position k (from 0) of N stands at its nominal angle and a small error of its own,
@@ -30,8 +29,6 @@ class IndexHead(Component):
 
     version = "1.0.0"
 
-    base = Parameter(IDENTITY, "1", "rows: head axes in ENU at angle 0; the third is the axis")
-    tilt = Parameter([0.0, 0.0], "rad", "axis tilt about the first and second head axis", min=-0.1, max=0.1)
     positions = Parameter(8, int, "number of positions N of a turn", min=2, max=24)
     error = Parameter([0.0] * 24, "rad", "error of each position", min=-0.1, max=0.1)
     repeat = Noise(0.0, "rad", "rms of the repeatability, drawn for each move", per="step")
@@ -40,23 +37,14 @@ class IndexHead(Component):
     settling = Parameter(1.0, "s", "time constant with which it dies away", above=0.0)
     tolerance = Parameter(1e-7, "rad", "in position when less than this is left", above=0.0)
 
-    f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
-    omega_local = Input([0.0, 0.0, 0.0], "rad/s", "Earth rate at the site, ENU")
     mode = Input(0.0, "1", "0 hold, 1 index")
     target = Input(0.0, "1", "angle of the position, rad")
     number = Input(0.0, "1", "number of the position, 1 to N; 0: by target")
     face = Input(IDENTITY, "1", "mount: rows are the instrument axes in head axes")
 
-    angle = Output("rad", "head angle, cumulative")
-    rate = Output("rad/s", "its rate")
-    angle_read = Output("rad", "nominal angle")
-    omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
-    alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
-    f = Output("m/s2", "specific force, face axes", shape=(3,))
     position = Output("1", "number of the position, 1 to N, reached or gone to")
     in_position = Output("1", "1 when the head stands in its position")
 
-    tilted = Discrete(IDENTITY, "1", "base with tilt")
     pitch = Discrete(0.0, "rad", "angle between positions")
     goal = Discrete(0.0, "1", "position gone to, counted from 0 over all turns")
     x = Discrete(0.0, "rad", "angle")
@@ -73,30 +61,6 @@ class IndexHead(Component):
     short = Discrete(0.0, "rad", "creep with the sign of the move")
 
     def start(self) -> None:
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for k in range(3):
-                    dot = dot + self.base[i][k] * self.base[j][k]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "base is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
-        det = self.base[0][0] * (self.base[1][1] * self.base[2][2] - self.base[1][2] * self.base[2][1])
-        det = det - self.base[0][1] * (self.base[1][0] * self.base[2][2] - self.base[1][2] * self.base[2][0])
-        det = det + self.base[0][2] * (self.base[1][0] * self.base[2][1] - self.base[1][1] * self.base[2][0])
-        self.refuse(det < 0.0, "base is left-handed (determinant -1): reverse one row")
-        c1 = cos(self.tilt[0])
-        s1 = sin(self.tilt[0])
-        c2 = cos(self.tilt[1])
-        s2 = sin(self.tilt[1])
-        for k in range(3):
-            first = self.base[0][k]
-            second = c1 * self.base[1][k] + s1 * self.base[2][k]
-            third = c1 * self.base[2][k] - s1 * self.base[1][k]
-            self.tilted[0][k] = c2 * first - s2 * third
-            self.tilted[1][k] = second
-            self.tilted[2][k] = s2 * first + c2 * third
         self.pitch = 2.0 * pi / self.positions
         self.goal = 0.0
         self.x = self.error[0]
@@ -159,28 +123,11 @@ class IndexHead(Component):
             self.arrived = 1.0 if fabs(rest) < self.tolerance else 0.0
         self.t_last = self.t
 
-    def place(self):
+    def place(self) -> Number:
         return self.goal - self.positions * floor(self.goal / self.positions)
 
     def outputs(self) -> None:
-        c = cos(self.x)
-        s = sin(self.x)
-        e = [0.0, 0.0, 0.0]  # Earth rate and specific force in base axes, at angle 0
-        g = [0.0, 0.0, 0.0]
-        for i in range(3):
-            row = self.tilted[i][0] * self.omega_local[0] + self.tilted[i][1] * self.omega_local[1]
-            e[i] = row + self.tilted[i][2] * self.omega_local[2]
-            row = self.tilted[i][0] * self.f_local[0] + self.tilted[i][1] * self.f_local[1]
-            g[i] = row + self.tilted[i][2] * self.f_local[2]
-        wx = c * e[0] + s * e[1]
-        wy = c * e[1] - s * e[0]
-        wz = e[2] + self.v
-        fx = c * g[0] + s * g[1]
-        fy = c * g[1] - s * g[0]
-        for i in range(3):
-            self.omega[i] = self.face[i][0] * wx + self.face[i][1] * wy + self.face[i][2] * wz
-            self.alpha[i] = (self.face[i][0] * wy - self.face[i][1] * wx) * self.v + self.face[i][2] * self.a
-            self.f[i] = self.face[i][0] * fx + self.face[i][1] * fy + self.face[i][2] * g[2]
+        self.feel(cos(self.x), sin(self.x), self.tilted[2] @ self.omega_local + self.v, self.v, self.a)
         self.angle = self.x
         self.rate = self.v
         self.angle_read = self.read_from + (self.goal * self.pitch - self.read_from) * self.part

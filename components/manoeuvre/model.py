@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import asin, atan2, clip, cos, index, pi, sin, sqrt
+from gyrobench.component.math import Number, asin, atan2, clip, cos, index, pi, sin, sqrt
 
 NONE = [0.0] * 99
 
@@ -69,7 +69,7 @@ class Manoeuvre(Component):
         self.q[2] = ch * cp * sr + sh * sp * cr
         self.q[3] = ch * sp * sr + sh * cp * cr
 
-    def open(self):
+    def open(self) -> Number:
         """How much of the row acts."""
         on = 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
         f = self.frequency[index(clip(self.phase - 1.0, 0.0, 98.0))]
@@ -90,12 +90,7 @@ class Manoeuvre(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        size = 0.0
-        for k in range(4):
-            size = size + self.q[k] * self.q[k]
-        size = sqrt(size)
-        for k in range(4):
-            self.q[k] = self.q[k] / size
+        self.q = self.q / sqrt(self.q @ self.q)
         if self.gate <= 0.5:
             self.opened = self.t
 

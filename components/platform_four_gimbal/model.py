@@ -1,15 +1,13 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, cos, fabs, pi, sign, sin, where
+from gyrobench.component import Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.component.blocks.platform import AZ, PITCH, ROLL, RateServoGimbals, X, Y, Z, about_x, about_y, about_z
+from gyrobench.component.math import Number, clip, cos, fabs, pi, sign, sin, vector, where
 
-NONE = [0.0, 0.0, 0.0]
-PITCH, ROLL, AZ = 0, 1, 2  # the A order
-X, Y, Z = 0, 1, 2
 SECANT, SIGN = 0, 1  # gains of the servo of the fourth gimbal; 2: constant
 
 
-class PlatformFourGimbal(Component):
+class PlatformFourGimbal(RateServoGimbals):
     """Platform with a fourth gimbal that keeps the inner three away from lock: kinematics.  [PLATFORM-4GIMBAL]
 
     From outside: g4 outer roll about y, g3 pitch about x, g2 inner roll about y, g1 azimuth about z; base x right, y
@@ -34,8 +32,6 @@ class PlatformFourGimbal(Component):
     """
 
     version = "1.0.0"
-    integrator = "rk4"
-    rk4_substeps = 1
 
     k = Parameter(30.0, "1/s", "servo of the fourth gimbal", above=0.0)
     gain = Parameter(0, int, "its gain, 0: capped secant of pitch, 1: sign of cos(pitch), 2: constant 1", min=0, max=2)
@@ -46,22 +42,10 @@ class PlatformFourGimbal(Component):
     launch = Parameter(0, int, "1: starts with the fourth gimbal locked", min=0, max=1)
     allow_vertical = Parameter(0, int, "1: any gain at pitch 90 deg, 0: refuses all but the sign", min=0, max=1)
     g2_stop = Parameter(60.0 * pi / 180.0, "rad", "stop of the inner roll gimbal", above=0.0, below=pi / 2.0)
-    rate_gain = Parameter(1.0, "rad/s/V", "rate of a servo for a volt", above=0.0)
-    lag = Parameter(2e-3, "s", "lag of a servo", above=0.0)
-    drag = Parameter(200.0, "N.m.s/rad", "torque for which a servo yields a unit rate", above=0.0)
-    rate_max = Parameter(5.0, "rad/s", "largest rate of a gimbal", above=0.0)
-    theta_0 = Parameter(NONE, "rad", "joint angles at the start, A order")
     theta_4_0 = Parameter(0.0, "rad", "angle of the fourth gimbal at the start")
 
-    v = Input(NONE, "V", "voltages of the servos, A order")
-    M_load = Input(NONE, "N.m", "disturbance torques about the motor axes, A order")
-    omega_b = Input(NONE, "rad/s", "inertial rate of the base, base axes")
-    alpha_b = Input(NONE, "rad/s2", "its derivative; not used")
-    f_b = Input([0.0, 0.0, 9.80665], "m/s2", "specific force, base axes")
     lock_4 = Input(0.0, "1", "1 locks the fourth gimbal")
 
-    theta = Output("rad", "joint angles, A order", shape=(3,))
-    theta_dot = Output("rad/s", "joint rates, A order", shape=(3,))
     theta_4 = Output("rad", "angle of the fourth gimbal")
     theta_4_dot = Output("rad/s", "its rate")
     omega = Output("rad/s", "inertial rate of the platform, platform axes", shape=(3,))
@@ -72,28 +56,20 @@ class PlatformFourGimbal(Component):
     locked_4 = Output("1", "1 while it is locked")
     saturated = Output("1", "1 while a gimbal is at rate_max")
 
-    q = State(NONE, "rad", "joint angles, A order")
     q4 = State(0.0, "rad", "angle of the fourth gimbal")
-    s = State(NONE, "rad/s", "rates of the servos, A order")
-    turned = State(NONE, "rad", "integral of the inertial rate, platform axes")
 
-    before = Discrete(NONE, "rad/s", "inertial rate at the end of the step before")
-    change = Discrete(NONE, "rad/s2", "mean derivative over the last step")
     held = Discrete(0.0, "1", "1 while the fourth gimbal is locked")
     pitch = Discrete(0.0, "rad", "pitch, for messages")
     inner = Discrete(0.0, "rad", "inner roll, for messages")
 
     def start(self) -> None:
-        self.refuse(self.step > self.lag, "step = {step} s must be <= lag = {lag} s")
-        for n in range(3):
-            self.q[n] = self.theta_0[n]
         self.q4 = self.theta_4_0
         self.held = 1.0 if self.launch == 1.0 or self.lock_4 > 0.5 else 0.0
         self.inner = self.theta_0[ROLL]
         beyond = fabs(self.inner) >= self.g2_stop
         self.refuse(beyond, "theta_0[2] = {inner} rad must be within the stop of the inner roll gimbal, {g2_stop} rad")
 
-    def servo(self, g3, g2):
+    def servo(self, g3: Number, g2: Number) -> Number:
         if self.held == 1.0:
             return 0.0
         c = cos(g3)
@@ -107,39 +83,21 @@ class PlatformFourGimbal(Component):
         return clip(self.k * g * g2, -self.rate_max, self.rate_max)
 
     def flow(self) -> None:
-        for n in range(3):
-            self.der.s[n] = (self.rate_gain * self.v[n] + self.M_load[n] / self.drag - self.s[n]) / self.lag
         r4 = self.servo(self.q[PITCH], self.q[ROLL])
         self.der.q4 = r4
-        c4 = cos(self.q4)
-        s4 = sin(self.q4)
-        cf = cos(self.q[PITCH])
-        sf = sin(self.q[PITCH])
         cr = cos(self.q[ROLL])
         sr = sin(self.q[ROLL])
         top = self.rate_max
         # rates of the fourth gimbal, its own axes; then e in the axes of the inner roll gimbal without inner rates
-        bx = c4 * self.omega_b[X] - s4 * self.omega_b[Z]
-        by = self.omega_b[Y] + r4
-        bz = s4 * self.omega_b[X] + c4 * self.omega_b[Z]
-        ey = cf * by + sf * bz
-        z = cf * bz - sf * by
-        ex = cr * bx - sr * z
-        ez = sr * bx + cr * z
-        mid = clip(self.s[ROLL] - ey, -top, top)
-        out = clip((cr * self.s[PITCH] - ex) / cr, -top, top)
-        az = clip(self.s[AZ] - ez - sr * out, -top, top)
-        self.der.q[PITCH] = out
-        self.der.q[ROLL] = mid
-        self.der.q[AZ] = az
-        wx = ex + cr * out
-        wy = ey + mid
-        wz = ez + sr * out + az
-        ca = cos(self.q[AZ])
-        sa = sin(self.q[AZ])
-        self.der.turned[X] = ca * wx + sa * wy
-        self.der.turned[Y] = ca * wy - sa * wx
-        self.der.turned[Z] = wz
+        b = about_y(cos(self.q4), sin(self.q4), self.omega_b)
+        b[Y] = b[Y] + r4
+        e = about_y(cr, sr, about_x(cos(self.q[PITCH]), sin(self.q[PITCH]), b))
+        mid = clip(self.s[ROLL] - e[Y], -top, top)
+        out = clip((cr * self.s[PITCH] - e[X]) / cr, -top, top)
+        az = clip(self.s[AZ] - e[Z] - sr * out, -top, top)
+        self.der.q = vector([out, mid, az])
+        w = vector([e[X] + cr * out, e[Y] + mid, e[Z] + sr * out + az])
+        self.der.turned = about_z(cos(self.q[AZ]), sin(self.q[AZ]), w)
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -160,38 +118,15 @@ class PlatformFourGimbal(Component):
             "pitch {pitch} rad is within 5 deg of 90 deg, where gain = {gain} turns the fourth gimbal over: lock it, "
             "take gain = 1, or allow_vertical = 1",
         )
-        for n in range(3):
-            self.change[n] = (self.der.turned[n] - self.before[n]) / self.h
-            self.before[n] = self.der.turned[n]
 
     def outputs(self) -> None:
-        full = 1.0 if fabs(self.der.q4) >= self.rate_max else 0.0
-        for n in range(3):
-            self.theta[n] = self.q[n]
-            self.theta_dot[n] = self.der.q[n]
-            self.omega[n] = self.der.turned[n]
-            self.alpha[n] = self.change[n]
-            self.attitude[n] = self.turned[n]
-            if fabs(self.der.q[n]) >= self.rate_max:
-                full = 1.0
-        self.saturated = full
+        if fabs(self.der.q4) >= self.rate_max:
+            self.saturated = 1.0
         self.theta_4 = self.q4
         self.theta_4_dot = self.der.q4
         self.locked_4 = self.held
-        c4 = cos(self.q4)
-        s4 = sin(self.q4)
         cf = cos(self.q[PITCH])
-        sf = sin(self.q[PITCH])
-        cr = cos(self.q[ROLL])
-        sr = sin(self.q[ROLL])
-        ca = cos(self.q[AZ])
-        sa = sin(self.q[AZ])
         self.lock = 1.0 if self.held == 1.0 or fabs(cf) < sin(pi / 36.0) else 0.0
-        f4x = c4 * self.f_b[X] - s4 * self.f_b[Z]
-        f4z = s4 * self.f_b[X] + c4 * self.f_b[Z]
-        fy = cf * self.f_b[Y] + sf * f4z
-        z = cf * f4z - sf * self.f_b[Y]
-        fx = cr * f4x - sr * z
-        self.f[X] = ca * fx + sa * fy
-        self.f[Y] = ca * fy - sa * fx
-        self.f[Z] = sr * f4x + cr * z
+        f = about_x(cf, sin(self.q[PITCH]), about_y(cos(self.q4), sin(self.q4), self.f_b))
+        f = about_y(cos(self.q[ROLL]), sin(self.q[ROLL]), f)
+        self.f = about_z(cos(self.q[AZ]), sin(self.q[AZ]), f)

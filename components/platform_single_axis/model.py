@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, cos, fabs, sin, sqrt
+from gyrobench.component.blocks.platform import about_x, contact_moved, contact_torque, motor_current, motor_slope
+from gyrobench.component.math import Number, clip, cos, fabs, sin, sqrt, vector
 
 
 class PlatformSingleAxis(Component):
@@ -76,7 +77,7 @@ class PlatformSingleAxis(Component):
     flowed = Discrete(0.0, "A", "current at the end of the step, for L = 0")
     spring = Discrete(0.0, "N.m/rad", "stiffness of the contact")
     rub = Discrete(0.0, "N.m.s/rad", "its damping")
-    reach = Discrete([0.0, 0.0], "rad", "way at Coulomb friction and at break-away")
+    reach = Discrete(0.0, "rad", "way at Coulomb friction")
     anchor = Discrete(0.0, "rad", "where the contact is free of torque")
     slipping = Discrete(0.0, "1", "0 sticking, else the sense of slip")
     heavy = Discrete(0.0, "1", "1: there is unbalance")
@@ -97,41 +98,31 @@ class PlatformSingleAxis(Component):
             "step = {step} s must be <= 0.5 sqrt(J presliding / stiction), presliding = {presliding} rad: shorten it",
         )
         if most > 0.0:
-            self.reach[0] = self.friction / self.spring
-            self.reach[1] = self.presliding
+            self.reach = self.friction / self.spring
         self.heavy = 1.0 if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0 else 0.0
         self.angle = self.theta_0
         self.anchor = self.theta_0
         self.p = self.inertia * (self.omega_b[0] + self.theta_dot_0) + self.h_gyro
 
-    def rate(self):
+    def rate(self) -> Number:
         return (self.p - self.h_gyro) / self.inertia
 
-    def current(self, slip):
-        if self.L > 0.0:
-            return self.i
-        free = (clip(self.v, -self.v_max, self.v_max) - self.k_e * self.ratio * slip) / self.R
-        return clip(free, -self.i_max, self.i_max)
+    def current(self, slip: Number) -> Number:
+        emf = self.k_e * self.ratio * slip
+        return motor_current(self.i, self.i_max, self.v, self.v_max, emf, self.R, self.L)
 
-    def bearing(self, slip):
+    def bearing(self, slip: Number) -> Number:
         drag = self.viscous * slip
         if self.spring > 0.0:
             way = self.angle - self.anchor
-            if self.slipping == 0.0:
-                most = self.spring * self.reach[1]
-                drag = drag + clip(self.spring * way + self.rub * slip, -most, most)
-            else:
-                drag = drag + self.spring * clip(way, -self.reach[0], self.reach[0])
+            drag = drag + contact_torque(self.spring, self.rub, self.presliding, self.reach, way, slip, self.slipping)
         return -drag
 
-    def unbalanced(self):
+    def unbalanced(self) -> Number:
         if self.heavy == 0.0:
             return 0.0
-        c = cos(self.angle)
-        s = sin(self.angle)
-        fy = c * self.f_b[1] + s * self.f_b[2]
-        fz = c * self.f_b[2] - s * self.f_b[1]
-        return self.unbalance[1] * fy - self.unbalance[0] * fz
+        f = about_x(cos(self.angle), sin(self.angle), self.f_b)
+        return self.unbalance[1] * f[1] - self.unbalance[0] * f[2]
 
     def flow(self) -> None:
         w = self.rate()
@@ -141,11 +132,8 @@ class PlatformSingleAxis(Component):
         self.der.p = m + self.bearing(slip) + self.unbalanced()
         self.der.angle = slip
         self.der.turned = w
-        self.der.i = 0.0
-        if self.L > 0.0:
-            di = (clip(self.v, -self.v_max, self.v_max) - self.R * self.i - self.k_e * self.ratio * slip) / self.L
-            held = (self.i >= self.i_max and di > 0.0) or (self.i <= -self.i_max and di < 0.0)
-            self.der.i = 0.0 if held else di
+        emf = self.k_e * self.ratio * slip
+        self.der.i = motor_slope(self.i, self.i_max, self.v, self.v_max, emf, self.R, self.L)
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -153,16 +141,12 @@ class PlatformSingleAxis(Component):
         if self.L == 0.0:
             self.flowed = self.current(self.rate() - self.omega_b[0])
         if self.spring > 0.0:
-            way = self.angle - self.anchor
-            if self.slipping == 0.0:
-                push = way + self.rub / self.spring * (self.rate() - self.omega_b[0])
-                if fabs(push) > self.reach[1]:
-                    self.slipping = 1.0 if push > 0.0 else -1.0
-                    self.anchor = self.angle - self.slipping * self.reach[0]
-            elif way * self.slipping >= self.reach[0]:
-                self.anchor = self.angle - self.slipping * self.reach[0]
-            else:
-                self.slipping = 0.0
+            slip = self.rate() - self.omega_b[0]
+            moved = contact_moved(
+                self.spring, self.rub, self.presliding, self.reach, self.angle, slip, self.anchor, self.slipping
+            )
+            self.anchor = moved[0]
+            self.slipping = moved[1]
 
     def outputs(self) -> None:
         w = self.rate()
@@ -171,17 +155,12 @@ class PlatformSingleAxis(Component):
         s = sin(self.angle)
         self.theta = self.angle
         self.theta_dot = slip
-        self.omega[0] = w
-        wy = c * self.omega_b[1] + s * self.omega_b[2]
-        wz = c * self.omega_b[2] - s * self.omega_b[1]
-        self.omega[1] = wy
-        self.omega[2] = wz
+        turned = about_x(c, s, self.omega_b)
+        self.omega = vector([w, turned[1], turned[2]])
         self.alpha[0] = self.der.p / self.inertia
-        self.alpha[1] = c * self.alpha_b[1] + s * self.alpha_b[2] + slip * wz
-        self.alpha[2] = c * self.alpha_b[2] - s * self.alpha_b[1] - slip * wy
-        self.f[0] = self.f_b[0]
-        self.f[1] = c * self.f_b[1] + s * self.f_b[2]
-        self.f[2] = c * self.f_b[2] - s * self.f_b[1]
+        self.alpha[1] = c * self.alpha_b[1] + s * self.alpha_b[2] + slip * turned[2]
+        self.alpha[2] = c * self.alpha_b[2] - s * self.alpha_b[1] - slip * turned[1]
+        self.f = about_x(c, s, self.f_b)
         self.attitude = self.turned
         amps = self.i if self.L > 0.0 else self.flowed  # not of the present v: a current loop could not be ordered
         self.i_motor = amps

@@ -1,12 +1,30 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.component.blocks.platform import (
+    AZ,
+    NONE,
+    PITCH,
+    ROLL,
+    X,
+    Y,
+    Z,
+    about_x,
+    about_y,
+    about_z,
+    contact_moved,
+    contact_torque,
+    euler_torque,
+    gimbal_x,
+    gimbal_y,
+    gimbal_z,
+    motor_current,
+    motor_slope,
+    with_unbalance,
+)
 from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt
 
 ONES = [1.0, 1.0, 1.0]
-NONE = [0.0, 0.0, 0.0]
-PITCH, ROLL, AZ = 0, 1, 2  # the A order
-X, Y, Z = 0, 1, 2
 
 
 class PlatformThreeAxis(Component):
@@ -131,31 +149,19 @@ class PlatformThreeAxis(Component):
         beyond = fabs(self.pitch) > self.pitch_stop
         self.refuse(beyond, "theta_0[1] = {pitch} rad must be within the pitch stop, +-{pitch_stop} rad")
 
-    def current(self, x, limit, volts, volts_max, emf, resistance, inductance):
-        if inductance > 0.0:
-            return x
-        return clip((clip(volts, -volts_max, volts_max) - emf) / resistance, -limit, limit)
-
     def flow(self) -> None:
+        self.der.q = self.dq
         t = [0.0, 0.0, 0.0]
         for k in range(3):
-            rate = self.dq[k]
-            emf = self.k_e[k] * rate
-            amps = self.current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
-            t[k] = self.k_t[k] * amps + self.M_load[k] - self.viscous[k] * rate
-            self.der.q[k] = rate
-            self.der.i[k] = 0.0
-            if self.L[k] > 0.0:
-                di = (clip(self.v[k], -self.v_max[k], self.v_max[k]) - self.R[k] * self.i[k] - emf) / self.L[k]
-                held = (self.i[k] >= self.i_max[k] and di > 0.0) or (self.i[k] <= -self.i_max[k] and di < 0.0)
-                self.der.i[k] = 0.0 if held else di
+            emf = self.k_e[k] * self.dq[k]
+            amps = motor_current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
+            t[k] = self.k_t[k] * amps + self.M_load[k] - self.viscous[k] * self.dq[k]
+            self.der.i[k] = motor_slope(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
             if self.rough == 1.0:
                 way = self.q[k] - self.anchor[k]
-                if self.slipping[k] == 0.0:
-                    most = self.spring[k] * self.presliding
-                    t[k] = t[k] - clip(self.spring[k] * way + self.rub[k] * rate, -most, most)
-                else:
-                    t[k] = t[k] - self.spring[k] * clip(way, -self.reach[k], self.reach[k])
+                t[k] = t[k] - contact_torque(
+                    self.spring[k], self.rub[k], self.presliding, self.reach[k], way, self.dq[k], self.slipping[k]
+                )
         over = self.q[PITCH] - clip(self.q[PITCH], -self.pitch_stop, self.pitch_stop)
         if over != 0.0:
             push = self.stop_stiffness * over + self.bump * self.dq[PITCH]
@@ -167,57 +173,27 @@ class PlatformThreeAxis(Component):
         sf = sin(self.q[PITCH])
         ca = cos(self.q[AZ])
         sa = sin(self.q[AZ])
-        df = self.dq[PITCH]
-        dr = self.dq[ROLL]
-        da = self.dq[AZ]
-        # rates w and, with q'' = 0, accelerations a of roll gimbal (r), pitch gimbal (f), inner element
-        wrx = cr * self.omega_b[X] - sr * self.omega_b[Z]
-        wry = self.omega_b[Y] + dr
-        wrz = sr * self.omega_b[X] + cr * self.omega_b[Z]
-        arx = cr * self.alpha_b[X] - sr * self.alpha_b[Z] - wrz * dr
-        ary = self.alpha_b[Y]
-        arz = sr * self.alpha_b[X] + cr * self.alpha_b[Z] + wrx * dr
-        wfx = wrx + df
-        wfy = cf * wry + sf * wrz
-        wfz = cf * wrz - sf * wry
-        afx = arx
-        afy = cf * ary + sf * arz + wfz * df
-        afz = cf * arz - sf * ary - wfy * df
-        wx = ca * wfx + sa * wfy
-        wy = ca * wfy - sa * wfx
-        wz = wfz + da
-        ax = ca * afx + sa * afy + wy * da
-        ay = ca * afy - sa * afx - wx * da
+        # rates (row 0) and, with q'' = 0, accelerations (row 1) of roll gimbal, pitch gimbal, inner element
+        r = gimbal_y(cr, sr, self.dq[ROLL], 0.0, self.omega_b, self.alpha_b)
+        g = gimbal_x(cf, sf, self.dq[PITCH], 0.0, r[0], r[1])
+        p = gimbal_z(ca, sa, self.dq[AZ], 0.0, g[0], g[1])
         # torques each body needs, passed outwards
-        nx = self.I_a[X] * ax + (self.I_a[Z] - self.I_a[Y]) * wy * wz - self.M_gyro[X]
-        ny = self.I_a[Y] * ay + (self.I_a[X] - self.I_a[Z]) * wz * wx - self.M_gyro[Y]
-        nz = self.I_a[Z] * afz + (self.I_a[Y] - self.I_a[X]) * wx * wy - self.M_gyro[Z]
-        nfx = self.I_f[X] * afx + (self.I_f[Z] - self.I_f[Y]) * wfy * wfz
-        nfy = self.I_f[Y] * afy + (self.I_f[X] - self.I_f[Z]) * wfz * wfx
-        nfz = self.I_f[Z] * afz + (self.I_f[Y] - self.I_f[X]) * wfx * wfy
-        nry = self.I_r[Y] * ary + (self.I_r[X] - self.I_r[Z]) * wrz * wrx
+        n = euler_torque(self.I_a, p[1], p[0]) - self.M_gyro
+        nf = euler_torque(self.I_f, g[1], g[0])
+        nr = euler_torque(self.I_r, r[1], r[0])
         if self.heavy == 1.0:
-            frx = cr * self.f_b[X] - sr * self.f_b[Z]
-            fry = self.f_b[Y]
-            frz = sr * self.f_b[X] + cr * self.f_b[Z]
-            ffy = cf * fry + sf * frz
-            ffz = cf * frz - sf * fry
-            fx = ca * frx + sa * ffy
-            fy = ca * ffy - sa * frx
-            nx = nx + self.unbalance[2][Y] * ffz - self.unbalance[2][Z] * fy
-            ny = ny + self.unbalance[2][Z] * fx - self.unbalance[2][X] * ffz
-            nz = nz + self.unbalance[2][X] * fy - self.unbalance[2][Y] * fx
-            nfx = nfx + self.unbalance[1][Y] * ffz - self.unbalance[1][Z] * ffy
-            nfy = nfy + self.unbalance[1][Z] * frx - self.unbalance[1][X] * ffz
-            nfz = nfz + self.unbalance[1][X] * ffy - self.unbalance[1][Y] * frx
-            nry = nry + self.unbalance[0][Z] * frx - self.unbalance[0][X] * frz
-        nfx = nfx + ca * nx - sa * ny
-        nfy = nfy + sa * nx + ca * ny
-        nfz = nfz + nz
-        nry = nry + cf * nfy - sf * nfz
-        tp = t[PITCH] - nfx
-        ta = t[AZ] - nz
-        tr = t[ROLL] - nry + sf * ta
+            fr = about_y(cr, sr, self.f_b)
+            ff = about_x(cf, sf, fr)
+            n = with_unbalance(n, self.unbalance[2], about_z(ca, sa, ff))
+            nf = with_unbalance(nf, self.unbalance[1], ff)
+            nr = with_unbalance(nr, self.unbalance[0], fr)
+        nf[X] = nf[X] + ca * n[X] - sa * n[Y]
+        nf[Y] = nf[Y] + sa * n[X] + ca * n[Y]
+        nf[Z] = nf[Z] + n[Z]
+        nr[Y] = nr[Y] + cf * nf[Y] - sf * nf[Z]
+        tp = t[PITCH] - nf[X]
+        ta = t[AZ] - n[Z]
+        tr = t[ROLL] - nr[Y] + sf * ta
         # M: pitch, roll without what the azimuth takes up, and between the two
         mp = self.I_f[X] + ca * ca * self.I_a[X] + sa * sa * self.I_a[Y]
         mr = self.I_r[Y] + cf * cf * (self.I_f[Y] + sa * sa * self.I_a[X] + ca * ca * self.I_a[Y])
@@ -228,9 +204,7 @@ class PlatformThreeAxis(Component):
         self.der.dq[PITCH] = (mr * tp - mpr * tr) / det
         self.der.dq[ROLL] = ddr
         self.der.dq[AZ] = ta / self.I_a[Z] + sf * ddr
-        self.der.turned[X] = wx
-        self.der.turned[Y] = wy
-        self.der.turned[Z] = wz
+        self.der.turned = p[0]
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -240,29 +214,24 @@ class PlatformThreeAxis(Component):
         for k in range(3):
             self.i[k] = clip(self.i[k], -self.i_max[k], self.i_max[k])
             if self.spring[k] > 0.0:
-                way = self.q[k] - self.anchor[k]
-                if self.slipping[k] == 0.0:
-                    push = way + self.rub[k] / self.spring[k] * self.dq[k]
-                    if fabs(push) > self.presliding:
-                        self.slipping[k] = 1.0 if push > 0.0 else -1.0
-                        self.anchor[k] = self.q[k] - self.slipping[k] * self.reach[k]
-                elif way * self.slipping[k] >= self.reach[k]:
-                    self.anchor[k] = self.q[k] - self.slipping[k] * self.reach[k]
-                else:
-                    self.slipping[k] = 0.0
+                moved = contact_moved(
+                    self.spring[k], self.rub[k], self.presliding, self.reach[k],
+                    self.q[k], self.dq[k], self.anchor[k], self.slipping[k],
+                )  # fmt: skip
+                self.anchor[k] = moved[0]
+                self.slipping[k] = moved[1]
 
     def outputs(self) -> None:
-        full = 0.0
+        self.theta = self.q
+        self.theta_dot = self.dq
+        self.attitude = self.turned
+        self.saturated = 0.0
         for k in range(3):
-            self.theta[k] = self.q[k]
-            self.theta_dot[k] = self.dq[k]
             emf = self.k_e[k] * self.dq[k]
-            amps = self.current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
+            amps = motor_current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
             self.i_motor[k] = amps
             if fabs(self.v[k]) > self.v_max[k] or fabs(amps) >= self.i_max[k]:
-                full = 1.0
-            self.attitude[k] = self.turned[k]
-        self.saturated = full
+                self.saturated = 1.0
         self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0
         cr = cos(self.q[ROLL])
         sr = sin(self.q[ROLL])
@@ -270,31 +239,9 @@ class PlatformThreeAxis(Component):
         sf = sin(self.q[PITCH])
         ca = cos(self.q[AZ])
         sa = sin(self.q[AZ])
-        df = self.dq[PITCH]
-        dr = self.dq[ROLL]
-        da = self.dq[AZ]
-        wrx = cr * self.omega_b[X] - sr * self.omega_b[Z]
-        wry = self.omega_b[Y] + dr
-        wrz = sr * self.omega_b[X] + cr * self.omega_b[Z]
-        arx = cr * self.alpha_b[X] - sr * self.alpha_b[Z] - wrz * dr
-        ary = self.alpha_b[Y] + self.der.dq[ROLL]
-        arz = sr * self.alpha_b[X] + cr * self.alpha_b[Z] + wrx * dr
-        wfx = wrx + df
-        wfy = cf * wry + sf * wrz
-        wfz = cf * wrz - sf * wry
-        afx = arx + self.der.dq[PITCH]
-        afy = cf * ary + sf * arz + wfz * df
-        wx = ca * wfx + sa * wfy
-        wy = ca * wfy - sa * wfx
-        self.omega[X] = wx
-        self.omega[Y] = wy
-        self.omega[Z] = wfz + da
-        self.alpha[X] = ca * afx + sa * afy + wy * da
-        self.alpha[Y] = ca * afy - sa * afx - wx * da
-        self.alpha[Z] = cf * arz - sf * ary - wfy * df + self.der.dq[AZ]
-        frx = cr * self.f_b[X] - sr * self.f_b[Z]
-        frz = sr * self.f_b[X] + cr * self.f_b[Z]
-        ffy = cf * self.f_b[Y] + sf * frz
-        self.f[X] = ca * frx + sa * ffy
-        self.f[Y] = ca * ffy - sa * frx
-        self.f[Z] = cf * frz - sf * self.f_b[Y]
+        r = gimbal_y(cr, sr, self.dq[ROLL], self.der.dq[ROLL], self.omega_b, self.alpha_b)
+        g = gimbal_x(cf, sf, self.dq[PITCH], self.der.dq[PITCH], r[0], r[1])
+        p = gimbal_z(ca, sa, self.dq[AZ], self.der.dq[AZ], g[0], g[1])
+        self.omega = p[0]
+        self.alpha = p[1]
+        self.f = about_z(ca, sa, about_x(cf, sf, about_y(cr, sr, self.f_b)))

@@ -109,8 +109,8 @@ class Sequencer(Component):
                         dot = dot + a * self.faces[index(self.bad_face - 1.0)][3 * j + k]
                     self.refuse(
                         fabs(dot) > 1e-9,
-                        "phase {bad_phase}: face {bad_face} is no rotation: its rows must be unit vectors "
-                        "at right angles, to 1e-9",
+                        "phase {bad_phase}: face {bad_face} is not a rotation matrix: its rows must be "
+                        "orthonormal to 1e-9",
                     )
             m = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
             for k in range(9):

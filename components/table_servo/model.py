@@ -1,14 +1,14 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, cos, fabs, floor, index, maximum, minimum, pi, sign, sin, sqrt, tanh
+from gyrobench.component import IDENTITY, Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.component.blocks.table import AxisTable, SegmentMotion
+from gyrobench.component.math import Number, clip, cos, fabs, floor, maximum, pi, sin, sqrt, tanh
 
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
 SIXTH = 1.0 / 6.0
 
 
-class TableServo(Component):
+class TableServo(AxisTable):
     """Turntable with one axis that a gyro holds still in inertial space.  [TABLE-SERVO, LOOP-TABLE-SERVO, CTRL-CAPTURE]
 
     Modes 0 hold, 1 index, 2 rate are kinematic, those of table_rate.  Mode 3 (w inertial rate about the axis, e that of
@@ -32,8 +32,6 @@ class TableServo(Component):
 
     version = "1.0.0"
 
-    base = Parameter(IDENTITY, "1", "rows: table axes in ENU at angle 0; the third is the axis")
-    tilt = Parameter([0.0, 0.0], "rad", "axis tilt about the first and second table axis", min=-0.1, max=0.1)
     angle0 = Parameter(0.0, "rad", "angle at the start")
     acceleration = Parameter(0.1, "rad/s2", "acceleration of every kinematic move", above=0.0)
     index_rate = Parameter(0.1, "rad/s", "rate of an index move", above=0.0)
@@ -76,20 +74,12 @@ class TableServo(Component):
     encoder_fine = Parameter(360, int, "order of the fine encoder error, cycles per turn", min=1, max=100000)
     quantum = Parameter(0.0, "rad", "quantum of angle_read; 0: none", min=0.0)
 
-    f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
-    omega_local = Input([0.0, 0.0, 0.0], "rad/s", "Earth rate at the site, ENU")
     mode = Input(0.0, "1", "0 hold, 1 index, 2 rate, 3 servo")
     target = Input(0.0, "1", "angle in rad (index) or rate in rad/s (rate)")
     face = Input(IDENTITY, "1", "mount: rows are the gyro axes in table axes")
     u = Input(0.0, "V", "pickoff voltage of the gyro")
     torque = Input(0.0, "N.m", "disturbance torque on the table")
 
-    angle = Output("rad", "table angle, cumulative")
-    rate = Output("rad/s", "table rate relative to its base")
-    angle_read = Output("rad", "table angle as the encoder reads it")
-    omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
-    alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
-    f = Output("m/s2", "specific force, face axes", shape=(3,))
     in_position = Output("1", "1 when the target is reached, or the fine loop closed")
     saturated = Output("1", "1 while the motor is at its limit")
     motor = Output("N.m", "motor torque")
@@ -99,7 +89,6 @@ class TableServo(Component):
     filt = State(0.0, "V", "pickoff voltage behind the lag")
     net = State([0.0, 0.0, 0.0], "V", "state of each network")
 
-    tilted = Discrete(IDENTITY, "1", "base with tilt")
     gain = Discrete(0.0, "N.m/V", "static gain G of the loop")
     pole = Discrete([0.0, 0.0, 0.0], "rad/s", "pole of each network")
     ratio = Discrete([1.0, 1.0, 1.0], "1", "its gain at high frequency, pole / zero")
@@ -121,7 +110,6 @@ class TableServo(Component):
     load = Discrete(0.0, "N.m", "M_load without noise")
     drag = Discrete(0.0, "N.m", "tachometer torque while capturing")
     push = Discrete(0.0, "N.m", "motor torque at the end of the step")
-    acc = Discrete(0.0, "rad/s2", "acceleration about the axis")
 
     # a table turns little in a step: its sine and cosine go on from those at a mark that seldom moves
     mark = Discrete(0.0, "rad", "angle of the mark")
@@ -130,40 +118,10 @@ class TableServo(Component):
     fine_s = Discrete(0.0, "rad", "fine encoder error there")
     fine_c = Discrete(0.0, "rad", "its derivative there, per cycle angle")
 
-    x = Discrete(0.0, "rad", "angle at the end of the last step")
-    v = Discrete(0.0, "rad/s", "rate there")
+    motion = SegmentMotion()  # x, v, a: those at the end of the last step, in servo mode too
     base_last = Discrete(0.0, "rad/s", "rate of the base about the axis at the end of the last step")
-    arrived = Discrete(0.0, "1", "in position")
-    t_last = Discrete(0.0, "s", "time of x, v")
-    mode_last = Discrete(0.0, "1", "mode of the motion planned")
-    target_last = Discrete(0.0, "1", "target of the motion planned")
-    t_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "s", "start of each segment of a kinematic move")
-    x_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad", "angle there")
-    v_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad/s", "rate there")
-    a_s = Discrete([0.0, 0.0, 0.0, 0.0, 0.0], "rad/s2", "acceleration in each segment")
 
     def start(self) -> None:
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for k in range(3):
-                    dot = dot + self.base[i][k] * self.base[j][k]
-                skew = fabs(dot) > 1e-9
-                self.refuse(skew, "base is no rotation: its rows must be unit vectors at right angles, to 1e-9")
-        det = self.base[0][0] * (self.base[1][1] * self.base[2][2] - self.base[1][2] * self.base[2][1])
-        det = det - self.base[0][1] * (self.base[1][0] * self.base[2][2] - self.base[1][2] * self.base[2][0])
-        det = det + self.base[0][2] * (self.base[1][0] * self.base[2][1] - self.base[1][1] * self.base[2][0])
-        self.refuse(det < 0.0, "base is left-handed (determinant -1): reverse one row")
-        c1 = cos(self.tilt[0])
-        s1 = sin(self.tilt[0])
-        c2 = cos(self.tilt[1])
-        s2 = sin(self.tilt[1])
-        for k in range(3):
-            first = self.base[0][k]
-            third = c1 * self.base[2][k] - s1 * self.base[1][k]
-            self.tilted[0][k] = c2 * first - s2 * third
-            self.tilted[1][k] = c1 * self.base[1][k] + s1 * self.base[2][k]
-            self.tilted[2][k] = s2 * first + c2 * third
         self.refuse(self.polarity == 0.0, "polarity must be 1 or -1")
         self.refuse(
             self.C_g == 0.0 and (self.stiffness > 0.0 or self.capture == 1.0),
@@ -249,43 +207,35 @@ class TableServo(Component):
         self.mark_c = cos(self.mark)
         self.fine_s = self.encoder_amplitude[2] * sin(self.encoder_fine * self.mark + self.encoder_phase[2])
         self.fine_c = self.encoder_amplitude[2] * cos(self.encoder_fine * self.mark + self.encoder_phase[2])
-        self.x = self.angle0
+        self.motion.rest(self.angle0)
         self.theta = self.angle0
-        self.spin = self.earth(2)
-        self.base_last = self.earth(2)
-        self.t_last = self.t
-        for k in range(5):
-            self.t_s[k] = self.t
-            self.x_s[k] = self.angle0
+        self.spin = self.earth()
+        self.base_last = self.earth()
 
-    def earth(self, i):
-        row = self.tilted[index(i)][0] * self.omega_local[0] + self.tilted[index(i)][1] * self.omega_local[1]
-        return row + self.tilted[index(i)][2] * self.omega_local[2]  # of the base along its axis i
+    def earth(self) -> Number:
+        """Return the inertial rate of the base along the axis."""
+        return self.tilted[2] @ self.omega_local
 
-    def force(self, i):
-        row = self.tilted[index(i)][0] * self.f_local[0] + self.tilted[index(i)][1] * self.f_local[1]
-        return row + self.tilted[index(i)][2] * self.f_local[2]
-
-    def shaped(self, demand):
+    def shaped(self, demand: Number) -> Number:
         m = clip(demand, -self.torque_max, self.torque_max)
         return m if self.shaper == 1.0 else m * fabs(m) / self.torque_max
 
-    def sine(self, d):  # of a small angle: up to reach, 1e-3, exact to the last digit
+    def sine(self, d: Number) -> Number:  # of a small angle: up to reach, 1e-3, exact to the last digit
         return d - d * d * d * (SIXTH - d * d / 120.0)
 
-    def cosine_less_one(self, d):
+    def cosine_less_one(self, d: Number) -> Number:
         return d * d * (d * d / 24.0 - 0.5)
 
-    def sine_now(self):
+    def sine_now(self) -> Number:
         d = self.theta - self.mark
         return self.mark_s + (self.mark_s * self.cosine_less_one(d) + self.mark_c * self.sine(d))
 
-    def cosine_now(self):
+    def cosine_now(self) -> Number:
         d = self.theta - self.mark
         return self.mark_c + (self.mark_c * self.cosine_less_one(d) - self.mark_s * self.sine(d))
 
     def flow(self) -> None:
-        slip = self.spin - 0.5 * (self.base_last + self.earth(2))  # a base that moves: its mean over the step
+        slip = self.spin - 0.5 * (self.base_last + self.earth())  # a base that moves: its mean over the step
         volt = self.polarity * self.u if self.stage == FINE else 0.0
         fast = (volt - self.filt) * self.per_lag
         self.der.filt = fast
@@ -309,59 +259,25 @@ class TableServo(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        if self.mode != self.mode_last or self.target != self.target_last:
+        if self.motion.commanded(self.mode, self.target):
             known = self.mode == 0.0 or self.mode == 1.0 or self.mode == 2.0 or self.mode == 3.0
             self.refuse(not known, "mode = {mode} must be 0 hold, 1 index, 2 rate or 3 servo")
             wild = self.mode == 2.0 and fabs(self.target) > self.rate_max
             self.refuse(wild, "rate {target} rad/s exceeds rate_max = {rate_max} rad/s")
             if self.mode != 3.0:
                 self.stage = DRIVEN
-                goal = self.target if self.mode == 2.0 else 0.0  # the rate that segment 0 leads to
-                t = self.t_last + fabs(goal - self.v) / self.acceleration
-                x = self.x + 0.5 * (self.v + goal) * (t - self.t_last)
-                self.t_s[0] = self.t_last
-                self.x_s[0] = self.x
-                self.v_s[0] = self.v
-                self.a_s[0] = sign(goal - self.v) * self.acceleration
-                for k in range(1, 5):
-                    self.t_s[k] = t
-                    self.x_s[k] = x
-                    self.v_s[k] = goal
-                    self.a_s[k] = 0.0
-                way = fabs(self.target - x)
-                if self.mode == 1.0 and way * self.acceleration > 0.0:  # an angle that died away may be 1e-320
-                    s = sign(self.target - x)
-                    peak = minimum(self.index_rate, sqrt(way * self.acceleration))
-                    ramp = peak / self.acceleration
-                    cruise = maximum(way - peak * ramp, 0.0) / peak
-                    self.a_s[1] = s * self.acceleration
-                    self.t_s[2] = t + ramp
-                    self.x_s[2] = x + s * (0.5 * peak * ramp)
-                    self.v_s[2] = s * peak
-                    self.t_s[3] = self.t_s[2] + cruise
-                    self.x_s[3] = self.x_s[2] + s * peak * cruise
-                    self.v_s[3] = s * peak
-                    self.a_s[3] = -s * self.acceleration
-                    self.t_s[4] = self.t_s[3] + ramp
-                    self.x_s[4] = self.target
+                self.motion.plan(self.mode, self.target, self.acceleration, self.index_rate)
             elif self.stage == DRIVEN:
                 self.stage = CAPTURE
                 self.near_for = 0.0
-            self.mode_last = self.mode
-            self.target_last = self.target
+            self.motion.mode_last = self.mode
+            self.motion.target_last = self.target
 
         if self.stage == DRIVEN:
-            for k in range(5):
-                if self.t >= self.t_s[k]:
-                    dt = self.t - self.t_s[k]
-                    self.acc = self.a_s[k]
-                    self.v = self.v_s[k] + self.acc * dt
-                    self.x = self.x_s[k] + self.v_s[k] * dt + 0.5 * self.acc * dt * dt
-            self.arrived = 1.0 if self.t >= self.t_s[4] else 0.0
-            self.t_last = self.t
-            self.theta = self.x
-            self.spin = self.earth(2) + self.v
-        self.base_last = self.earth(2)
+            self.motion.advance()
+            self.theta = self.motion.x
+            self.spin = self.earth() + self.motion.v
+        self.base_last = self.earth()
 
         if fabs(self.theta - self.mark) > self.reach:
             self.mark = self.theta
@@ -391,14 +307,15 @@ class TableServo(Component):
         self.wish = 0.0
         if self.stage == DRIVEN:
             return
-        slip = self.spin - self.earth(2)
+        slip = self.spin - self.earth()
         if self.friction > 0.0:
             self.load = -self.friction * tanh(slip / maximum(self.friction_rate, 2.0 * self.h * self.friction / self.J))
         if self.ripple > 0.0:
             self.load = self.load + self.ripple * sin(self.ripple_cycles * self.theta + self.ripple_phase)
         if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0:
-            fx = self.cosine_now() * self.force(0) + self.sine_now() * self.force(1)
-            fy = self.cosine_now() * self.force(1) - self.sine_now() * self.force(0)
+            g = self.tilted @ self.f_local
+            fx = self.cosine_now() * g[0] + self.sine_now() * g[1]
+            fy = self.cosine_now() * g[1] - self.sine_now() * g[0]
             self.load = self.load - (self.unbalance[0] * fy - self.unbalance[1] * fx)
         others = self.load + self.torque - self.viscous * slip
         if self.stage == FINE:
@@ -419,11 +336,11 @@ class TableServo(Component):
             self.drag = -self.brake * self.spin
             demand = clip(-self.pull * volt, -limit, limit) + self.drag
             self.push = clip(demand, -self.torque_max, self.torque_max)
-        self.acc = (self.push + others) * self.per_J
-        self.x = self.theta
-        self.v = slip
-        self.t_last = self.t
-        self.arrived = 1.0 if self.stage == FINE else 0.0
+        self.motion.a = (self.push + others) * self.per_J
+        self.motion.x = self.theta
+        self.motion.v = slip
+        self.motion.t_last = self.t
+        self.motion.arrived = 1.0 if self.stage == FINE else 0.0
 
     def outputs(self) -> None:
         s = self.sine_now()
@@ -435,19 +352,11 @@ class TableServo(Component):
             read = read + (self.fine_s + (self.fine_s * self.cosine_less_one(d) + self.fine_c * self.sine(d)))
         if self.quantum > 0.0:
             read = self.quantum * floor(read / self.quantum + 0.5)
-        rate = self.spin - self.earth(2)
-        wx = c * self.earth(0) + s * self.earth(1)
-        wy = c * self.earth(1) - s * self.earth(0)
-        fx = c * self.force(0) + s * self.force(1)
-        fy = c * self.force(1) - s * self.force(0)
-        fz = self.force(2)
-        for i in range(3):
-            self.omega[i] = self.face[i][0] * wx + self.face[i][1] * wy + self.face[i][2] * self.spin
-            self.alpha[i] = (self.face[i][0] * wy - self.face[i][1] * wx) * rate + self.face[i][2] * self.acc
-            self.f[i] = self.face[i][0] * fx + self.face[i][1] * fy + self.face[i][2] * fz
+        rate = self.spin - self.earth()
+        self.feel(c, s, self.spin, rate, self.motion.a)
         self.angle = self.theta
         self.rate = rate
         self.angle_read = read
-        self.in_position = self.arrived
+        self.in_position = self.motion.arrived
         self.motor = self.push
         self.saturated = 1.0 if fabs(self.wish) > self.torque_max else 0.0

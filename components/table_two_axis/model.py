@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import cos, fabs, floor, index, maximum, minimum, sign, sin, sqrt
-
-IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+from gyrobench.component import IDENTITY, Component, Discrete, Input, Output, Parameter, Rotation, sampled
+from gyrobench.component.blocks.table import SegmentMotion
+from gyrobench.component.math import Number, cos, fabs, floor, index, sin, vector
 
 
 class TableTwoAxis(Component):
@@ -33,7 +32,7 @@ class TableTwoAxis(Component):
 
     version = "1.0.0"
 
-    base = Parameter(IDENTITY, "1", "rows: outer axis X, inner axis Y at x = 0, and Z in ENU at angles 0")
+    base = Rotation("rows: outer axis X, inner axis Y at x = 0, and Z in ENU at angles 0")
     angle0 = Parameter([0.0, 0.0], "rad", "outer and inner angle at the start")
     acceleration = Parameter([0.1, 0.1], "rad/s2", "acceleration of every move", above=0.0)
     index_rate = Parameter([0.1, 0.1], "rad/s", "rate of an index move", above=0.0)
@@ -64,158 +63,79 @@ class TableTwoAxis(Component):
     f = Output("m/s2", "specific force, face axes", shape=(3,))
     in_position = Output("1", "1 when both targets are reached")
 
-    x = Discrete([0.0, 0.0], "rad", "angle of each axis")
-    v = Discrete([0.0, 0.0], "rad/s", "its rate")
-    a = Discrete([0.0, 0.0], "rad/s2", "its acceleration")
-    arrived = Discrete([0.0, 0.0], "1", "its last segment is reached")
-    t_last = Discrete(0.0, "s", "time of x, v, a")
-    mode_last = Discrete([0.0, 0.0], "1", "mode of the motion planned")
-    target_last = Discrete([0.0, 0.0], "1", "target of the motion planned")
-    asked = Discrete(0.0, "1", "mode or target under check")
+    outer = SegmentMotion()
+    inner = SegmentMotion()
+    asked = Discrete(0.0, "1", "mode, target or angle under check")
     axis = Discrete(0.0, "1", "axis under check: 1 outer, 2 inner")
-    t_s = Discrete([[0.0] * 5] * 2, "s", "start of each segment")
-    x_s = Discrete([[0.0] * 5] * 2, "rad", "angle there")
-    v_s = Discrete([[0.0] * 5] * 2, "rad/s", "rate there")
-    a_s = Discrete([[0.0] * 5] * 2, "rad/s2", "acceleration in each segment")
 
     def start(self) -> None:
-        for i in range(3):
-            for j in range(3):
-                dot = 0.0 if i != j else -1.0
-                for k in range(3):
-                    dot = dot + self.base[i][k] * self.base[j][k]
-                self.refuse(
-                    fabs(dot) > 1e-9,
-                    "base is no rotation: its rows must be unit vectors at right angles, to 1e-9",
-                )
-        det = self.base[0][0] * (self.base[1][1] * self.base[2][2] - self.base[1][2] * self.base[2][1])
-        det = det - self.base[0][1] * (self.base[1][0] * self.base[2][2] - self.base[1][2] * self.base[2][0])
-        det = det + self.base[0][2] * (self.base[1][0] * self.base[2][1] - self.base[1][1] * self.base[2][0])
-        self.refuse(det < 0.0, "base is left-handed (determinant -1): reverse one row")
         self.refuse(self.limits_y[0] >= self.limits_y[1], "limits_y: the lower must be below the upper")
         self.refuse(
             self.angle0[1] < self.limits_y[0] or self.angle0[1] > self.limits_y[1],
             "angle0[2] is outside limits_y",
         )
-        self.t_last = self.t
-        for n in range(2):
-            self.x[n] = self.angle0[n]
-            self.v[n] = 0.0
-            self.a[n] = 0.0
-            self.arrived[n] = 0.0
-            self.mode_last[n] = 0.0
-            self.target_last[n] = 0.0
-            for k in range(5):
-                self.t_s[n][k] = self.t
-                self.x_s[n][k] = self.angle0[n]
-                self.v_s[n][k] = 0.0
-                self.a_s[n][k] = 0.0
+        self.outer.rest(self.angle0[0])
+        self.inner.rest(self.angle0[1])
+
+    def check(self, axis: Number, mode: Number, target: Number, rate_max: Number) -> None:
+        """Refuse a command that the axis cannot follow."""
+        self.axis = axis
+        self.asked = mode
+        self.refuse(
+            not (mode == 0.0 or mode == 1.0 or mode == 2.0),
+            "axis {axis} (1 outer, 2 inner): mode = {asked} must be 0 hold, 1 index or 2 rate",
+        )
+        self.asked = target
+        self.refuse(
+            mode == 2.0 and fabs(target) > rate_max,
+            "axis {axis} (1 outer, 2 inner): rate {asked} rad/s exceeds its rate_max",
+        )
+        self.refuse(
+            mode == 1.0 and axis == 2.0 and (target < self.limits_y[0] or target > self.limits_y[1]),
+            "inner axis: target {asked} rad is outside limits_y",
+        )
 
     @sampled(every=1)
     def tick(self) -> None:
-        modes = [self.mode_x, self.mode_y]
-        targets = [self.target_x, self.target_y]
-        for n in range(2):
-            mode = modes[n]
-            target = targets[n]
-            if mode != self.mode_last[n] or target != self.target_last[n]:
-                self.axis = n + 1.0
-                self.asked = mode
-                self.refuse(
-                    not (mode == 0.0 or mode == 1.0 or mode == 2.0),
-                    "axis {axis} (1 outer, 2 inner): mode = {asked} must be 0 hold, 1 index or 2 rate",
-                )
-                self.asked = target
-                self.refuse(
-                    mode == 2.0 and fabs(target) > self.rate_max[n],
-                    "axis {axis} (1 outer, 2 inner): rate {asked} rad/s exceeds its rate_max",
-                )
-                self.refuse(
-                    mode == 1.0 and n == 1 and (target < self.limits_y[0] or target > self.limits_y[1]),
-                    "inner axis: target {asked} rad is outside limits_y",
-                )
-                limit = self.acceleration[n]
-                goal = target if mode == 2.0 else 0.0  # the rate that segment 0 leads to
-                t = self.t_last + fabs(goal - self.v[n]) / limit
-                x = self.x[n] + 0.5 * (self.v[n] + goal) * (t - self.t_last)
-                self.t_s[n][0] = self.t_last
-                self.x_s[n][0] = self.x[n]
-                self.v_s[n][0] = self.v[n]
-                self.a_s[n][0] = sign(goal - self.v[n]) * limit
-                for k in range(1, 5):
-                    self.t_s[n][k] = t
-                    self.x_s[n][k] = x
-                    self.v_s[n][k] = goal
-                    self.a_s[n][k] = 0.0
-                if mode == 1.0 and target != x:
-                    way = fabs(target - x)
-                    s = sign(target - x)
-                    peak = minimum(self.index_rate[n], sqrt(way * limit))
-                    ramp = peak / limit
-                    cruise = maximum(way - peak * ramp, 0.0) / peak
-                    self.a_s[n][1] = s * limit
-                    self.t_s[n][2] = t + ramp
-                    self.x_s[n][2] = x + s * (0.5 * peak * ramp)
-                    self.v_s[n][2] = s * peak
-                    self.t_s[n][3] = self.t_s[n][2] + cruise
-                    self.x_s[n][3] = self.x_s[n][2] + s * peak * cruise
-                    self.v_s[n][3] = s * peak
-                    self.a_s[n][3] = -s * limit
-                    self.t_s[n][4] = self.t_s[n][3] + ramp
-                    self.x_s[n][4] = target
-                self.mode_last[n] = mode
-                self.target_last[n] = target
-            past = self.t - self.t_s[n][4]
-            self.arrived[n] = 1.0
-            if past >= 0.0:
-                self.a[n] = 0.0
-                self.v[n] = self.v_s[n][4]
-                self.x[n] = self.x_s[n][4] + self.v[n] * past
-            else:
-                self.arrived[n] = 0.0
-                for k in range(4):
-                    if self.t >= self.t_s[n][k]:
-                        dt = self.t - self.t_s[n][k]
-                        self.a[n] = self.a_s[n][k]
-                        self.v[n] = self.v_s[n][k] + self.a[n] * dt
-                        self.x[n] = self.x_s[n][k] + self.v_s[n][k] * dt + 0.5 * self.a[n] * dt * dt
-        self.asked = self.x[1]
+        if self.outer.commanded(self.mode_x, self.target_x):
+            self.check(1.0, self.mode_x, self.target_x, self.rate_max[0])
+            self.outer.plan(self.mode_x, self.target_x, self.acceleration[0], self.index_rate[0])
+        if self.inner.commanded(self.mode_y, self.target_y):
+            self.check(2.0, self.mode_y, self.target_y, self.rate_max[1])
+            self.inner.plan(self.mode_y, self.target_y, self.acceleration[1], self.index_rate[1])
+        self.outer.advance()
+        self.inner.advance()
+        self.asked = self.inner.x
         self.refuse(
-            self.x[1] < self.limits_y[0] or self.x[1] > self.limits_y[1],
+            self.inner.x < self.limits_y[0] or self.inner.x > self.limits_y[1],
             "inner axis: {asked} rad is beyond limits_y, it has run against its stop",
         )
-        self.t_last = self.t
 
-    def rounded(self, angle):
+    def rounded(self, angle: Number) -> Number:
         return self.quantum * floor(angle / self.quantum + 0.5) if self.quantum > 0.0 else angle
 
     def outputs(self) -> None:
         # elementary rotations from the base to the plate: axis (0 X, 1 Y, 2 Z), angle and its derivatives
         about = [1.0, 2.0, 0.0, 2.0, 2.0, 0.0, 1.0]
-        q = [0.0, 0.0, self.x[0], self.squareness, 0.0, 0.0, self.x[1]]
-        dq = [0.0, 0.0, self.v[0], 0.0, 0.0, 0.0, self.v[1]]
-        ddq = [0.0, 0.0, self.a[0], 0.0, 0.0, 0.0, self.a[1]]
+        q = [0.0, 0.0, self.outer.x, self.squareness, 0.0, 0.0, self.inner.x]
+        dq = [0.0, 0.0, self.outer.v, 0.0, 0.0, 0.0, self.inner.v]
+        ddq = [0.0, 0.0, self.outer.a, 0.0, 0.0, 0.0, self.inner.a]
         for n in range(2):
             if self.wobble[n] > 0.0:
                 order = self.wobble_order[n]
-                c = self.wobble[n] * cos(order * self.x[n] + self.wobble_phase[n])
-                s = self.wobble[n] * sin(order * self.x[n] + self.wobble_phase[n])
-                spin = order * self.v[n]
-                turn = order * self.a[n]
+                c = self.wobble[n] * cos(order * q[4 * n + 2] + self.wobble_phase[n])
+                s = self.wobble[n] * sin(order * q[4 * n + 2] + self.wobble_phase[n])
+                spin = order * dq[4 * n + 2]
+                turn = order * ddq[4 * n + 2]
                 q[4 * n] = c
                 q[4 * n + 1] = s
                 dq[4 * n] = -s * spin
                 dq[4 * n + 1] = c * spin
                 ddq[4 * n] = -s * turn - c * spin * spin
                 ddq[4 * n + 1] = c * turn - s * spin * spin
-        w = [0.0, 0.0, 0.0]
-        p = [0.0, 0.0, 0.0]  # derivative of w
-        g = [0.0, 0.0, 0.0]
-        for i in range(3):
-            row = self.base[i][0] * self.omega_local[0] + self.base[i][1] * self.omega_local[1]
-            w[i] = row + self.base[i][2] * self.omega_local[2]
-            row = self.base[i][0] * self.f_local[0] + self.base[i][1] * self.f_local[1]
-            g[i] = row + self.base[i][2] * self.f_local[2]
+        w = self.base @ self.omega_local
+        p = vector([0.0, 0.0, 0.0])  # derivative of w
+        g = self.base @ self.f_local
         for k in range(7):
             if q[k] != 0.0 or dq[k] != 0.0 or ddq[k] != 0.0:
                 e = about[k]
@@ -235,14 +155,13 @@ class TableTwoAxis(Component):
                 row = c * g[index(j)] + s * g[index(m)]
                 g[index(m)] = c * g[index(m)] - s * g[index(j)]
                 g[index(j)] = row
-        for i in range(3):
-            self.omega[i] = self.face[i][0] * w[0] + self.face[i][1] * w[1] + self.face[i][2] * w[2]
-            self.alpha[i] = self.face[i][0] * p[0] + self.face[i][1] * p[1] + self.face[i][2] * p[2]
-            self.f[i] = self.face[i][0] * g[0] + self.face[i][1] * g[1] + self.face[i][2] * g[2]
-        self.angle_x = self.x[0]
-        self.angle_y = self.x[1]
-        self.rate_x = self.v[0]
-        self.rate_y = self.v[1]
-        self.angle_x_read = self.rounded(self.x[0])
-        self.angle_y_read = self.rounded(self.x[1])
-        self.in_position = self.arrived[0] * self.arrived[1]
+        self.omega = self.face @ w
+        self.alpha = self.face @ p
+        self.f = self.face @ g
+        self.angle_x = self.outer.x
+        self.angle_y = self.inner.x
+        self.rate_x = self.outer.v
+        self.rate_y = self.inner.v
+        self.angle_x_read = self.rounded(self.outer.x)
+        self.angle_y_read = self.rounded(self.inner.x)
+        self.in_position = self.outer.arrived * self.inner.arrived

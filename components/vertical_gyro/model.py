@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import asin, atan2, clip, cos, fabs, maximum, sign, sin, sqrt
+from gyrobench.component.math import Vector, asin, atan2, clip, cos, cross, fabs, maximum, sign, sin, sqrt, vector
 
 
 class VerticalGyro(Component):
@@ -64,50 +64,47 @@ class VerticalGyro(Component):
     g4 = State(0.0, "rad", "angle of the ring")
 
     def start(self) -> None:
-        size = sqrt(self.f[0] * self.f[0] + self.f[1] * self.f[1] + self.f[2] * self.f[2])
+        size = sqrt(self.f @ self.f)
         self.refuse(size < 1e-6, "no specific force at the start: the rotor axis is set from the apparent vertical")
         # u turned about the vector t = (tilt_x, tilt_y, 0): u cos|t| + t x u sin|t|/|t| + t (t u)(1 - cos|t|)/|t|2
-        x = self.f[0] / size
-        y = self.f[1] / size
-        z = self.f[2] / size
+        v = self.f / size
         a = self.tilt[0]
         b = self.tilt[1]
         angle = sqrt(a * a + b * b)
         s = sin(angle) / angle if angle > 0.0 else 1.0
-        along = (a * x + b * y) * (1.0 - cos(angle)) / (angle * angle) if angle > 0.0 else 0.0
-        self.n[0] = x * cos(angle) + s * b * z + along * a
-        self.n[1] = y * cos(angle) - s * a * z + along * b
-        self.n[2] = z * cos(angle) + s * (a * y - b * x)
+        along = (a * v[0] + b * v[1]) * (1.0 - cos(angle)) / (angle * angle) if angle > 0.0 else 0.0
+        self.n[0] = v[0] * cos(angle) + s * b * v[2] + along * a
+        self.n[1] = v[1] * cos(angle) - s * a * v[2] + along * b
+        self.n[2] = v[2] * cos(angle) + s * (a * v[1] - b * v[0])
         self.g4 = atan2(self.n[0], self.n[2]) if self.ring else 0.0
 
-    def flow(self) -> None:
-        # x_i, y_i in vehicle axes: of the gimbal beside the rotor
-        c = 1.0
-        s = 0.0
-        x = [0.0, 0.0, 0.0]
+    def in_ring(self) -> Vector:
+        """Return (sin g2, cos g3 cos g2), from the rotor axis in axes of the ring; n_y is -sin g3 cos g2."""
+        c = cos(self.g4)
+        s = sin(self.g4)
+        return vector([clip(c * self.n[0] - s * self.n[2], -1.0, 1.0), s * self.n[0] + c * self.n[2]])
+
+    def inner_x(self) -> Vector:
+        """Return x_i in vehicle axes: of the gimbal beside the rotor, R2(g4)' R1(g3)' (cos g2, 0, -sin g2)."""
         if self.ring:
             c = cos(self.g4)
             s = sin(self.g4)
-            s2 = clip(c * self.n[0] - s * self.n[2], -1.0, 1.0)  # n in axes of the ring: sin g2 first
-            v_z = s * self.n[0] + c * self.n[2]  # cos g3 cos g2; n_y is -sin g3 cos g2
-            c2 = sqrt(1.0 - s2 * s2)
+            r = self.in_ring()
+            c2 = sqrt(1.0 - r[0] * r[0])
             level = maximum(c2, 1e-9)
-            # x_i = R2(g4)' R1(g3)' (cos g2, 0, -sin g2)
-            out = -s2 * v_z / level
-            x[0] = c * c2 + s * out
-            x[1] = -s2 * self.n[1] / level
-            x[2] = -s * c2 + c * out
-            way = sign(v_z) if self.reversal else 1.0
-            self.der.g4 = clip(self.k_ring * way * asin(s2), -self.ring_rate, self.ring_rate)
-        else:
-            level = sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2])
-            x[0] = self.n[2] / level
-            x[2] = -self.n[0] / level
-            self.der.g4 = 0.0
-        y = [0.0, 0.0, 0.0]
-        y[0] = self.n[1] * x[2] - self.n[2] * x[1]
-        y[1] = self.n[2] * x[0] - self.n[0] * x[2]
-        y[2] = self.n[0] * x[1] - self.n[1] * x[0]
+            out = -r[0] * r[1] / level
+            return vector([c * c2 + s * out, -r[0] * self.n[1] / level, -s * c2 + c * out])
+        level = sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2])
+        return vector([self.n[2] / level, 0.0, -self.n[0] / level])
+
+    def flow(self) -> None:
+        self.der.g4 = 0.0
+        if self.ring:
+            r = self.in_ring()
+            sense = sign(r[1]) if self.reversal else 1.0
+            self.der.g4 = clip(self.k_ring * sense * asin(r[0]), -self.ring_rate, self.ring_rate)
+        x = self.inner_x()
+        y = cross(self.n, x)
         to_x = self.T_x / self.H + self.drift[0] + self.noise.white
         to_y = self.T_y / self.H + self.drift[1] + self.noise.white_y
         self.der.n[0] = to_x * x[0] + to_y * y[0] - self.omega[1] * self.n[2] + self.omega[2] * self.n[1]
@@ -116,44 +113,25 @@ class VerticalGyro(Component):
 
     @sampled(every=1)
     def tick(self) -> None:
-        size = sqrt(self.n[0] * self.n[0] + self.n[1] * self.n[1] + self.n[2] * self.n[2])
-        for k in range(3):
-            self.n[k] = self.n[k] / size
+        self.n = self.n / sqrt(self.n @ self.n)
         self.refuse(
             self.ring == 0.0 and fabs(self.n[1]) > 0.9998,
             "the gimbals have locked: pitch within 1.15 deg of 90 deg, and ring = 0: take the follow-up ring",
         )
 
     def outputs(self) -> None:
-        x = [0.0, 0.0, 0.0]
         if self.ring:
-            c = cos(self.g4)
-            s = sin(self.g4)
-            s2 = clip(c * self.n[0] - s * self.n[2], -1.0, 1.0)
-            v_z = s * self.n[0] + c * self.n[2]
-            c2 = sqrt(1.0 - s2 * s2)
-            level = maximum(c2, 1e-9)
-            out = -s2 * v_z / level
-            x[0] = c * c2 + s * out
-            x[1] = -s2 * self.n[1] / level
-            x[2] = -s * c2 + c * out
-            self.pitch = atan2(self.n[1], v_z)
+            r = self.in_ring()
+            self.pitch = atan2(self.n[1], r[1])
             self.roll = -self.g4
-            self.inner = asin(s2)
+            self.inner = asin(r[0])
         else:
-            level = sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2])
-            x[0] = self.n[2] / level
-            x[2] = -self.n[0] / level
-            self.pitch = atan2(self.n[1], level)
+            self.pitch = atan2(self.n[1], sqrt(self.n[0] * self.n[0] + self.n[2] * self.n[2]))
             self.roll = atan2(-self.n[0], self.n[2])
             self.inner = 0.0
         self.ring_angle = self.g4
-        y_x = self.n[1] * x[2] - self.n[2] * x[1]
-        y_y = self.n[2] * x[0] - self.n[0] * x[2]
-        y_z = self.n[0] * x[1] - self.n[1] * x[0]
-        self.f_inner[0] = x[0] * self.f[0] + x[1] * self.f[1] + x[2] * self.f[2]
-        self.f_inner[1] = y_x * self.f[0] + y_y * self.f[1] + y_z * self.f[2]
-        self.f_inner[2] = self.n[0] * self.f[0] + self.n[1] * self.f[1] + self.n[2] * self.f[2]
+        x = self.inner_x()
+        self.f_inner = vector([x, cross(self.n, x), self.n]) @ self.f
         self.e_x = atan2(self.f_inner[1], self.f_inner[2])
         self.e_y = -atan2(self.f_inner[0], self.f_inner[2])
-        self.turn = self.n[0] * self.omega[0] + self.n[1] * self.omega[1] + self.n[2] * self.omega[2]
+        self.turn = self.n @ self.omega

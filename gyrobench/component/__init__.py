@@ -3,7 +3,8 @@
 Of gyrobench this package imports only ``errors``: a Python FMU carries a copy of both.
 """
 
-from gyrobench.component.component import Component, ComponentError, sampled
+from gyrobench.component.component import Component
+from gyrobench.component.composition import Block, ComponentError, sampled
 from gyrobench.component.declarations import (
     Declaration,
     Discrete,
@@ -14,8 +15,11 @@ from gyrobench.component.declarations import (
     Scalar,
     State,
 )
+from gyrobench.component.rotation import IDENTITY, Rotation
 
 __all__ = [
+    "IDENTITY",
+    "Block",
     "Component",
     "ComponentError",
     "Declaration",
@@ -24,6 +28,7 @@ __all__ = [
     "Noise",
     "Output",
     "Parameter",
+    "Rotation",
     "Scalar",
     "State",
     "sampled",

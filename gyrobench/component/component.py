@@ -1,9 +1,8 @@
-"""What a component (a part of the bench) is.
+"""The class of which every part is a subclass: its values, its equations, how they are stepped.
 
-A part is one class of declarations and equations.  The class is the single source of the plain Python
-part, the Python FMU, the native FMU (its equations translated to C), the model description and the
-linearization.  This package and ``gyrobench.errors`` are all that a part needs to run: a Python
-FMU carries copies of them and nothing else of gyrobench.
+A part is one class of declarations and equations, with those of its bases and blocks (see ``composition``).  The class
+is the single source of the plain Python part, the Python FMU, the native FMU (its equations translated to C), the
+model description and the linearization.
 
 Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut into
 ``n = ceil(H / step)`` equal internal steps ``h = H / n`` with the inputs held.  In each one
@@ -20,16 +19,26 @@ After the last one ``outputs`` is evaluated and all is checked to be finite but 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from gyrobench.component.composition import (
+    EQUATIONS,
+    ArraySlot,
+    ComponentError,
+    Derivatives,
+    Piece,
+    Placed,
+    View,
+    flatten,
+    own_equations,
+    own_items,
+    pieces,
+)
 from gyrobench.component.declarations import (
     Declaration,
-    Discrete,
-    Input,
     Noise,
-    Output,
     Parameter,
     Scalar,
     State,
@@ -40,72 +49,61 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.math import Dual, lift
 from gyrobench.component.numerics import normal, phi1
-from gyrobench.errors import GyrobenchError
+from gyrobench.component.vectors import Vector
 
-__all__ = [
-    "Component",
-    "ComponentError",
-    "Declaration",
-    "Discrete",
-    "Input",
-    "Noise",
-    "Output",
-    "Parameter",
-    "Scalar",
-    "State",
-    "sampled",
-]
-
-
-class ComponentError(GyrobenchError):
-    """A part refuses its parameters, its inputs, or what became of its states."""
-
-
-def sampled(every: int = 1) -> Callable[[Callable[[Any], None]], Callable[[Any], None]]:
-    """Marks a method that runs after each ``every``-th internal step."""
-
-    def mark(method: Callable[[Any], None]) -> Callable[[Any], None]:
-        method._every = every  # type: ignore[attr-defined]
-        return method
-
-    return mark
+RESERVED = ("der", "noise", "instance")
 
 
 class Component:
     """Base of every part: collects the declarations and steps the equations (see the module's text)."""
 
     version: ClassVar[str] = "1.0.0"
+    sources: ClassVar[dict[str, str]] = {}  # files of the part by module name, where it was loaded from a bench
     integrator: ClassVar[str] = "exponential"  # or "rk4"
     rk4_substeps: ClassVar[int] = 20  # of one internal step
     nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
     declarations: ClassVar[dict[str, Declaration]] = {}
+    placed: ClassVar[dict[str, Placed]] = {}  # blocks by name
+    pieces: ClassVar[dict[str, list[Piece]]] = {}  # equations by kind
     layout: ClassVar[list[Scalar]] = []
     states: ClassVar[list[Scalar]] = []
     noises: ClassVar[list[Noise]] = []
-    ticks: ClassVar[list[tuple[str, int]]] = []
 
     t = 0.0
     h = 0.0
 
+    if TYPE_CHECKING:  # names that blocks declare
+
+        def __getattr__(self, name: str) -> Any: ...
+
     def __init_subclass__(cls) -> None:
-        found = {n: d for n, d in vars(cls).items() if isinstance(d, Declaration)}
+        cls._own = own_items(cls)
+        cls._functions = own_equations(cls)
+        for kind in EQUATIONS:  # called by name, an equation is that of all bases and blocks
+            setattr(cls, kind, vars(Component)[kind])
+        found, cls.placed, by_class = flatten(cls, Component)
+        cls.pieces = pieces(cls, Component, by_class)
         if any(isinstance(d, Noise) for d in found.values()):
-            found["seed"] = Parameter(1, int, "seed of the noise of this instance", min=0)
-        methods = {n: m for n, m in vars(cls).items() if hasattr(m, "_every")}
-        if "step" not in found and (methods or any(isinstance(d, State) for d in found.values())):
+            found.setdefault("seed", Parameter(1, int, "seed of the noise of this instance", min=0))
+        if "step" not in found and (cls.pieces["sampled"] or any(isinstance(d, State) for d in found.values())):
             found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
         for n, d in found.items():
-            if hasattr(Component, n) or n in ("der", "noise", "instance"):
+            if hasattr(Component, n) or n in RESERVED:
                 raise ComponentError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
             d.name = n
+            if d.shape:
+                setattr(cls, n, ArraySlot(n))
+        if any(p.block.nonlinear for p in _all_placed(cls.placed)):
+            cls.nonlinear = True
         cls.declarations = found
         cls.layout = make_layout(found)
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in found.values() if isinstance(d, Noise)]
-        cls.ticks = [(n, m._every) for n, m in methods.items()]
         cls._by_name = {s.name: s for s in cls.layout}
         cls._watched = [s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory]
 
+    _own: ClassVar[dict[str, Any]] = {}
+    _functions: ClassVar[dict[str, Any]] = {}
     _by_name: ClassVar[dict[str, Scalar]] = {}
     _watched: ClassVar[list[Scalar]] = []  # must be finite after each step
 
@@ -122,19 +120,38 @@ class Component:
 
     # ------------------------------------------------------------------ equations of a part
     def start(self) -> None:
-        """Once, when initialization ends: derived values, and refusals."""
+        """Run the ``start`` equations of all bases and blocks: derived values, and refusals."""
+        self._equations("start")
 
     def flow(self) -> None:
-        """``self.der.<state>`` from states, discretes, parameters, inputs, noise."""
+        """Run the ``flow`` equations: ``self.der.<state>`` from states, discretes, parameters, inputs, noise."""
+        self._equations("flow")
 
     def outputs(self) -> None:
-        """Outputs, at the present instant."""
+        """Run the ``outputs`` equations, at the present instant."""
+        self._equations("outputs")
+
+    def _equations(self, kind: str) -> None:
+        for piece in self.pieces[kind]:
+            self._guard(piece)
+
+    def _guard(self, piece: Piece) -> None:
+        try:
+            piece.function(self if piece.placed is None else self._view(piece.placed))
+        except (ArithmeticError, IndexError, ValueError) as e:
+            where = f"{piece.function.__name__} at t = {self.t:.9g} s"
+            raise ComponentError(f"{self.instance}: {e} in {where}") from e
+
+    def _view(self, placed: Placed) -> View:
+        return View(self, placed)
 
     def refuse(self, condition: Any, message: str) -> None:
-        """Ends the run with ``message`` if the condition holds; ``{H}`` in it prints self.H with %g."""
+        """End the run with ``message`` if the condition holds; ``{H}`` in it prints self.H with %g."""
         if condition:
-            values = {s.name: f"{self._at(s):g}" for s in self.layout if len(s.path) == 1}
-            raise ComponentError(f"{self.instance}: {message.format(**values)} (t = {self.t:.9g} s)")
+            self._refused(message.format(**{s.name: f"{self._at(s):g}" for s in self.layout if len(s.path) == 1}))
+
+    def _refused(self, text: str) -> None:
+        raise ComponentError(f"{self.instance}: {text} (t = {self.t:.9g} s)")
 
     # ------------------------------------------------------------------ values
     def _at(self, s: Scalar) -> float:
@@ -195,7 +212,7 @@ class Component:
 
     def reset(self) -> None:
         """Back to before initialization, every value at its start."""
-        self.der = SimpleNamespace()
+        self.der = Derivatives()
         self.noise = SimpleNamespace(**{n.name: 0.0 for n in self.noises})
         for d in self.declarations.values():
             setattr(self, d.name, floats(d.start))
@@ -252,14 +269,14 @@ class Component:
         self._tick = 0
         self._draw("start")
         self._draw("step")
-        self._guard(self.start)
-        self._guard(self.outputs)
+        self.start()
+        self.outputs()
         self._dirty = False
 
     def _refresh(self) -> None:
         if self._dirty:
             if self._running:
-                self._guard(self.outputs)
+                self._equations("outputs")
                 self._dirty = False
             else:
                 self._evaluate_start()
@@ -287,19 +304,12 @@ class Component:
             if self.states:
                 self._advance(h)
             self.t = t + (k + 1) * h
-            for name, every in self.ticks:
-                if self._tick % every == 0:
-                    self._guard(getattr(self, name))
-        self._guard(self.outputs)
+            for piece in self.pieces["sampled"]:
+                if self._tick % piece.every == 0:
+                    self._guard(piece)
+        self.outputs()
         self._dirty = False
         self._finite()
-
-    def _guard(self, method: Callable[[], None]) -> None:
-        try:
-            method()
-        except (ArithmeticError, IndexError, ValueError) as e:
-            where = f"{method.__name__} at t = {self.t:.9g} s"
-            raise ComponentError(f"{self.instance}: {e} in {where}") from e
 
     def _finite(self) -> None:
         for s in self._watched:
@@ -315,14 +325,14 @@ class Component:
             size = getattr(self, n.name)
             x = 0.0
             if size != 0.0:
-                x = size * normal(int(self.seed), port, self._tick)  # type: ignore[attr-defined]
+                x = size * normal(int(self.seed), port, self._tick)
                 if per == "second":
                     x = x / math.sqrt(self.h)
             setattr(self.noise, n.name, x)
 
     # ------------------------------------------------------------------ integration
     def _flow(self) -> list[float]:
-        self._guard(self.flow)
+        self._equations("flow")
         d = self.der
         return [float(_dig(getattr(d, s.path[0]), s.path[1:])) for s in self.states]
 
@@ -334,7 +344,7 @@ class Component:
         """Derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__dict__)
-        twin.der = SimpleNamespace()
+        twin.der = Derivatives()
         for name, d in self.declarations.items():
             setattr(twin, name, _dual(getattr(self, name)))
             if isinstance(d, State):
@@ -343,8 +353,8 @@ class Component:
         for name, weight in seeds.items():
             s = self._find(name)
             _dig(getattr(twin, s.path[0]), s.path[1:]).d = weight
-        twin._guard(twin.flow)
-        twin._guard(twin.outputs)
+        twin._equations("flow")
+        twin._equations("outputs")
         der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
         out = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in self.layout if s.section == "output"]
         return der, [lift(y).d for y in out]
@@ -394,4 +404,10 @@ def _dig(x: Any, path: tuple[Any, ...]) -> Any:
 
 
 def _dual(x: Any) -> Any:
-    return [_dual(e) for e in x] if isinstance(x, list) else Dual(float(x))
+    return Vector([_dual(e) for e in x]) if isinstance(x, list) else Dual(float(x))
+
+
+def _all_placed(placed: dict[str, Placed]) -> Iterable[Placed]:
+    for p in placed.values():
+        yield p
+        yield from _all_placed(p.blocks)

@@ -6,7 +6,9 @@ import math
 import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
+
+from gyrobench.component.vectors import Vector
 
 Shape = tuple[int, ...]
 
@@ -16,11 +18,11 @@ def shape_of(start: Any) -> Shape:
 
 
 def full(value: Any, shape: Shape) -> Any:
-    return [full(value, shape[1:]) for _ in range(shape[0])] if shape else value
+    return Vector([full(value, shape[1:]) for _ in range(shape[0])]) if shape else value
 
 
 def floats(x: Any) -> Any:
-    return [floats(e) for e in x] if isinstance(x, list | tuple) else float(x)
+    return Vector([floats(e) for e in x]) if isinstance(x, list | tuple) else float(x)
 
 
 class Declaration:
@@ -48,6 +50,15 @@ class Declaration:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+
+    if TYPE_CHECKING:  # in the equations a declared name is a number, or a vector
+
+        @overload
+        def __get__(self, part: None, owner: type) -> Declaration: ...
+        @overload
+        def __get__(self, part: object, owner: type) -> Any: ...
+        def __get__(self, part: object, owner: type) -> Any: ...
+        def __set__(self, part: object, value: Any) -> None: ...
 
     def bound_broken(self, x: float) -> str | None:
         """The bound that x breaks, in words; NaN breaks every bound."""

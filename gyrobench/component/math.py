@@ -1,4 +1,4 @@
-"""The functions equations may call, for numbers and for dual numbers.
+"""Functions that equations may call, for numbers and for dual numbers.
 
 A :class:`Dual` carries a value and one directional derivative (forward mode).  The native target
 repeats the same rules in C (``packaging/core.h``), operation by operation, so that the linearization,
@@ -9,6 +9,11 @@ from __future__ import annotations
 
 import math
 from typing import Any, TypeAlias
+
+from gyrobench.component.vectors import Vector as Vector
+from gyrobench.component.vectors import cross as cross
+from gyrobench.component.vectors import dot as dot
+from gyrobench.component.vectors import vector as vector
 
 pi = math.pi
 TWO_PI = 2.0 * math.pi
@@ -38,6 +43,8 @@ class Dual:
         return lift(o) - self
 
     def __mul__(self, o: Any) -> Dual:
+        if isinstance(o, list):  # a number times a vector: the vector knows how
+            return NotImplemented
         b = lift(o)
         return Dual(self.v * b.v, self.d * b.v + self.v * b.d)
 
@@ -191,3 +198,5 @@ FUNCTIONS = (
     "sin", "cos", "tan", "asin", "atan", "atan2", "sqrt", "exp", "log", "tanh", "floor",
     "fabs", "where", "minimum", "maximum", "clip", "sign",
 )  # fmt: skip
+
+ARRAY_FUNCTIONS = ("vector", "dot", "cross")

@@ -39,7 +39,7 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     Raises ValueError (the text says why) for a part whose step is not the same one step later.
     """
     discrete = [s.name for s in part.layout if s.section == "discrete"]
-    if not part.ticks or not discrete or not inputs:
+    if not part.pieces["sampled"] or not discrete or not inputs:
         return None
     twin = type(part)(part.instance)
     twin.set_state(part.get_state())

@@ -5,7 +5,8 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.source import Source, dependencies
+from gyrobench.packaging.dependencies import dependencies
+from gyrobench.packaging.source import Source
 from gyrobench.units import base_unit
 
 #: section -> causality, variability, initial

@@ -9,8 +9,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
+from gyrobench.packaging.dependencies import dependencies
 from gyrobench.packaging.description import ATTRIBUTES, number, summary, unit_name, units
-from gyrobench.packaging.source import Source, dependencies
+from gyrobench.packaging.source import Source
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from gyrobench.component import State
-from gyrobench.component.math import FUNCTIONS
-from gyrobench.packaging.source import Source, local, member
+from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
+from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells, words
+from gyrobench.packaging.source import Code, SubsetError, gives_value, local, member, returns
+
+if TYPE_CHECKING:
+    from gyrobench.packaging.translate import Procedure, Translation
 
 OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "d_add"),
@@ -24,43 +29,37 @@ COMPARISONS: dict[type[ast.AST], str] = {
     ast.NotEq: "!=",
 }
 OWN_C = {"fabs", "minimum", "maximum", "clip", "sign"}  # written in core.h, the others are libm's
-ARGUMENTS = {"atan2": 2, "minimum": 2, "maximum": 2, "clip": 3, "where": 3}  # the others take one
-Shape = tuple[int, ...]
-Range = tuple[int | None, int | None]  # smallest and largest value of an index; None: known when it runs
-
-
-@dataclass
-class Place:
-    """A variable: its C text without the owner, what it is, and the shape that is left to be indexed."""
-
-    text: str
-    kind: str  # "local", "self", "loop" or "constant"
-    shape: Shape = ()
-    name: str = ""
+ARGUMENTS = {"atan2": 2, "minimum": 2, "maximum": 2, "clip": 3, "where": 3, "dot": 2, "cross": 2}  # the others take one
+WRITE = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
 class Expressions:
     """Translates the expressions of one method, for numbers (``dual=False``) or for dual numbers."""
 
-    def __init__(self, source: Source, name: str, dual: bool, writes: tuple[type, ...]):
-        self.source, self.name, self.dual, self.writes = source, name, dual, writes
-        self.node = source.methods.get(name)
-        self.locals: dict[str, Shape] = {}
+    def __init__(self, translation: Translation, code: Code, dual: bool, shapes: tuple[Shape, ...] = ()) -> None:
+        self.translation, self.code, self.dual = translation, code, dual
+        self.declared = translation.source.cls.declarations
+        self.locals: dict[str, Shape] = {}  # temporaries too, under their C names
+        self.bare: set[str] = set()  # locals made from a list: no arithmetic in Python
         self.loops: dict[str, Range] = {}
-        self.arguments = [a.arg for a in self.node.args.args[1:]] if self.node else []
+        self.arguments = dict(zip(code.arguments, shapes, strict=True))
         self.assigned = set(self.arguments)  # locals that surely have a value here
-        self.helper = name in source.helpers
+        self.pre: list[str] = []  # statements that come before the one in hand
+        self.temporaries = 0
+        self.touched: set[str] = set()  # flat names that are written, here or in what is called
 
-    # ------------------------------------------------------------------------------ expressions
+    def refuse(self, node: ast.AST, what: str) -> SubsetError:
+        return self.code.refuse(node, what)
+
+    # ------------------------------------------------------------------------------ places
     def index(self, e: ast.expr) -> tuple[str, Range]:
         """A whole number, counted from 0: loop variables, literals, + - *, and index(expr)."""
         if isinstance(e, ast.Constant) and isinstance(e.value, int):
             return str(e.value), (e.value, e.value)
         if isinstance(e, ast.Name) and e.id in self.loops:
             return local(e.id), self.loops[e.id]
-        if isinstance(e, ast.Name) and e.id in self.source.constants:
-            n = int(self.source.constants[e.id])
-            return str(n), (n, n)
+        if isinstance(e, ast.Name) and (x := self.code.constant(e.id)) is not None:
+            return str(int(x)), (int(x), int(x))
         if isinstance(e, ast.BinOp) and isinstance(e.op, ast.Add | ast.Sub | ast.Mult):
             (a, (a0, a1)), (b, (b0, b1)) = self.index(e.left), self.index(e.right)
             text = f"({a} {OPERATORS[type(e.op)][0]} {b})"
@@ -74,7 +73,7 @@ class Expressions:
             return text, (min(ends), max(ends))
         if isinstance(e, ast.Call) and isinstance(e.func, ast.Name) and e.func.id == "index" and len(e.args) == 1:
             return f"whole({self.scalar(e.args[0])})", (None, None)
-        raise self.source.refuse(
+        raise self.refuse(
             e, f"{ast.unparse(e)!r}: an index is a loop variable, a whole number from 0 on, or index(expression)"
         )
 
@@ -86,133 +85,375 @@ class Expressions:
                 return Place(local(e.id), "loop")
             if e.id in self.locals or e.id in self.arguments:
                 if e.id not in self.assigned:
-                    raise self.source.refuse(e, f"{e.id!r} is not assigned on every path before it is read")
-                return Place(local(e.id), "local", self.locals.get(e.id, ()), e.id)
-            if e.id in self.source.constants:
-                return Place(repr(self.source.constants[e.id]), "constant")
-            raise self.source.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
-        if isinstance(e, ast.Attribute):
+                    raise self.refuse(e, f"{e.id!r} is not assigned on every path before it is read")
+                shape = self.locals[e.id] if e.id in self.locals else self.arguments[e.id]
+                return Place(local(e.id), "local", e.id, shape)
+            if (x := self.code.constant(e.id)) is not None:
+                return Place(repr(x), "constant")
+            raise self.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
+        if isinstance(e, ast.Attribute) and (e.attr != "T" or ast.unparse(e.value) == "self"):
             return self.attribute(e)
-        raise self.source.refuse(e, f"{ast.unparse(e)!r} is no variable")
+        found = self.value(e)
+        if not found.shape:
+            raise self.refuse(e, f"{ast.unparse(e)} is a number: it has no elements")
+        return self.kept(found)
 
     def element(self, e: ast.Subscript) -> Place:
         of = self.place(e.value)
-        if isinstance(e.slice, ast.Slice):
-            raise self.source.refuse(e, "no slices: write a for loop over the elements")
         if isinstance(e.slice, ast.Tuple):
-            raise self.source.refuse(e, f"write {ast.unparse(e.value)}[i][j]")
+            raise self.refuse(e, f"write {ast.unparse(e.value)}[i][j]")
         if not of.shape:
-            raise self.source.refuse(e, f"{ast.unparse(e.value)} is a number: it has no elements")
+            raise self.refuse(e, f"{ast.unparse(e.value)} is a number: it has no elements")
         size = of.shape[0]
+        if isinstance(e.slice, ast.Slice):
+            return of.indexed(self.span(e, e.slice, size))
         text, (first, last) = self.index(e.slice)
         if first is None or last is None:
             text = f"at(part, {text}, {size})"
         elif first <= last and not (first >= 0 and last < size):
             which = f"is {first}" if first == last else f"runs over {first} to {last}"
             have = f"{ast.unparse(e.value)} has the elements 0 to {size - 1}"
-            raise self.source.refuse(e, f"the index {ast.unparse(e.slice)} {which}: {have}")
-        return Place(f"{of.text}[{text}]", of.kind, of.shape[1:], of.name)
+            raise self.refuse(e, f"the index {ast.unparse(e.slice)} {which}: {have}")
+        return of.indexed(text)
+
+    def span(self, e: ast.Subscript, s: ast.Slice, size: int) -> Span:
+        ends = [(0, 0) if s.lower is None else self.index(s.lower)[1], (size, size)]
+        if s.upper is not None:
+            ends[1] = self.index(s.upper)[1]
+        (first, same), (last, end) = ends
+        if s.step is not None or first is None or last is None or first != same or last != end:
+            raise self.refuse(e, f"the slice {ast.unparse(e)} must be [a:b] with whole numbers that are fixed")
+        if not 0 <= first < last <= size:
+            raise self.refuse(e, f"the slice {ast.unparse(e)}: {ast.unparse(e.value)} has the elements 0 to {size - 1}")
+        return first, last - first
 
     def attribute(self, e: ast.Attribute) -> Place:
-        declared = self.source.cls.declarations
-        if isinstance(e.value, ast.Name) and e.value.id == "self":
+        source = ast.unparse(e.value)
+        name = self.code.flat(e.attr)
+        d = self.declared.get(name)
+        if source == "self":
             if e.attr in ("t", "h"):
-                return Place(e.attr, "self", (), e.attr)
-            if e.attr in declared:
-                return Place(member(e.attr), "self", declared[e.attr].shape, e.attr)
-            if e.attr in self.source.constants:
-                return Place(repr(self.source.constants[e.attr]), "constant")
-            raise self.source.refuse(e, f"self.{e.attr} is not declared in {self.source.cls.__name__}")
-        if ast.unparse(e.value) == "self.der" and isinstance(declared.get(e.attr), State):
-            return Place(f"der.{member(e.attr)}", "self", declared[e.attr].shape, f"der.{e.attr}")
-        if ast.unparse(e.value) == "self.noise" and any(n.name == e.attr for n in self.source.cls.noises):
-            return Place(f"noise.{member(e.attr)}", "self", (), f"noise.{e.attr}")
-        raise self.source.refuse(
-            e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise"
-        )
+                return Place(e.attr, "self", e.attr)
+            if d is not None:
+                return Place(member(name), "self", name, d.shape)
+            if (x := self.code.constant(e.attr, of_self=True)) is not None:
+                return Place(repr(x), "constant")
+            owner = self.code.owner or self.translation.source.cls
+            raise self.refuse(e, f"self.{e.attr} is not declared in {owner.__name__}")
+        if source == "self.der" and isinstance(d, State):
+            return Place(f"der.{member(name)}", "self", f"der.{name}", d.shape)
+        if source == "self.noise" and any(n.name == name for n in self.translation.source.cls.noises):
+            return Place(f"noise.{member(name)}", "self", f"noise.{name}")
+        if source.startswith("self.") and (found := self.of_block(e, source)) is not None:
+            return found
+        raise self.refuse(e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise")
 
+    def of_block(self, e: ast.Attribute, source: str) -> Place | None:
+        """``self.block.x``: a declaration of a block."""
+        blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
+        placed = blocks.get(source.removeprefix("self."))
+        if placed is None:
+            return None
+        if e.attr not in placed.names:
+            raise self.refuse(e, f"{ast.unparse(e)} is not declared in {type(placed.block).__name__}")
+        name = placed.names[e.attr]
+        return Place(member(name), "self", name, self.declared[name].shape)
+
+    # ------------------------------------------------------------------------------ expressions
     def expression(self, e: ast.expr) -> str:
+        """Return the text of a number."""
+        found = self.value(e)
+        if found.shape:
+            raise self.refuse(e, f"{ast.unparse(e)} is {words(found.shape)}: take one element of it")
+        return found.text
+
+    def value(self, e: ast.expr) -> Value:
         d = self.dual
         if isinstance(e, ast.Constant):
             if isinstance(e.value, bool) or not isinstance(e.value, int | float):
-                raise self.source.refuse(e, f"{e.value!r} is no number: equations are of numbers only")
+                raise self.refuse(e, f"{e.value!r} is no number: equations are of numbers only")
             if abs(e.value) > 1.7e308:
-                raise self.source.refuse(e, f"{e.value!r} is not finite")
-            return f"d_con({float(e.value)!r})" if d else repr(float(e.value))
+                raise self.refuse(e, f"{e.value!r} is not finite")
+            return self.number(f"d_con({float(e.value)!r})" if d else repr(float(e.value)), plain=True)
+        if isinstance(e, ast.Attribute) and e.attr == "T" and ast.unparse(e.value) != "self":
+            return self.transposed(e)
         if isinstance(e, ast.Name | ast.Attribute | ast.Subscript):
-            found = self.place(e)
-            text, kind = found.text, found.kind
-            if found.shape:
-                dimensions = " x ".join(map(str, found.shape))
-                raise self.source.refuse(e, f"{ast.unparse(e)} is an array ({dimensions}): take one element of it")
-            if kind == "constant":
-                return f"d_con({text})" if d else text
-            if kind == "loop":
-                return f"d_con({text})" if d else f"(double){text}"
-            if kind == "local":
-                return text
-            return f"d_of(self->{text}, seed->{text})" if d else f"self->{text}"
+            return self.of_place(self.place(e))
         if isinstance(e, ast.BinOp):
-            if isinstance(e.op, ast.Pow):
-                raise self.source.refuse(e, "no `**` (its rounding differs between targets): write x * x")
-            if type(e.op) not in OPERATORS:
-                raise self.source.refuse(e, "only + - * / (for remainders write x - y * floor(x / y))")
-            infix, call = OPERATORS[type(e.op)]
-            a, b = self.expression(e.left), self.expression(e.right)
-            return f"{call}({a}, {b})" if d else f"({a} {infix} {b})"
+            return self.binary(e)
         if isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.USub):
-            return f"d_neg({self.expression(e.operand)})" if d else f"(-{self.expression(e.operand)})"
+            return self.each((self.value(e.operand),), lambda a: f"d_neg({a})" if d else f"(-{a})")
         if isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.UAdd):
-            return self.expression(e.operand)
+            return self.value(e.operand)
         if isinstance(e, ast.IfExp):
-            return f"({self.condition(e.test)} ? {self.expression(e.body)} : {self.expression(e.orelse)})"
+            return self.choice(e, e.test, e.body, e.orelse)
         if logical(e):
-            return f"d_con({self.condition(e)})" if d else f"(double)({self.condition(e)})"
+            return self.number(f"d_con({self.condition(e)})" if d else f"(double)({self.condition(e)})")
         if isinstance(e, ast.Call):
             return self.call(e)
         if isinstance(e, ast.BoolOp):
-            raise self.source.refuse(e, f"write 1.0 if {ast.unparse(e)} else 0.0")
-        raise self.source.refuse(e, f"{ast.unparse(e)!r} is outside the subset of equations")
+            raise self.refuse(e, f"write 1.0 if {ast.unparse(e)} else 0.0")
+        if isinstance(e, ast.List):
+            raise self.refuse(e, f"write vector({ast.unparse(e)}), from gyrobench.component.math")
+        raise self.refuse(e, f"{ast.unparse(e)!r} is outside the subset of equations")
 
-    def call(self, e: ast.Call) -> str:
+    def number(self, text: str, plain: bool = False) -> Value:
+        return Value((), lambda: text, plain)
+
+    def of_place(self, p: Place) -> Value:
         d = self.dual
+        if p.kind == "constant":
+            return self.number(f"d_con({p.base})" if d else p.base, plain=True)
+        if p.kind == "loop":
+            return self.number(f"d_con({p.base})" if d else f"(double){p.base}", plain=True)
+        p = self.settled(p)
+        reads = frozenset([f"{p.kind}.{p.name}"])
+        if p.kind == "local":
+            storage = p.at() if p.whole and p.shape else ""
+            return Value(p.shape, p.at, True, p.whole, storage, reads)
+        storage = f"self->{p.at()}" if p.whole and p.shape and not d else ""
+
+        def element(*i: str) -> str:
+            return f"d_of(self->{p.at(*i)}, seed->{p.at(*i)})" if d else f"self->{p.at(*i)}"
+
+        return Value(p.shape, element, True, p.whole, storage, reads)
+
+    def each(self, of: tuple[Value, ...], text: Callable[..., str]) -> Value:
+        """Return the value made of the elements of ``of`` (numbers serve all elements)."""
+        shape = next((v.shape for v in of if v.shape), ())
+
+        def element(*i: str) -> str:
+            return text(*(v.element(*i) if v.shape else v.text for v in of))
+
+        return Value(shape, element, False, all(v.aligned for v in of), "", _reads(of))
+
+    def binary(self, e: ast.BinOp) -> Value:
+        if isinstance(e.op, ast.Pow):
+            raise self.refuse(e, "no `**` (its rounding differs between targets): write x * x")
+        if isinstance(e.op, ast.MatMult):
+            return self.product(e, self.operand(e.left), self.operand(e.right))
+        if type(e.op) not in OPERATORS:
+            raise self.refuse(e, "only + - * / @ (for remainders write x - y * floor(x / y))")
+        a, b = self.value(e.left), self.value(e.right)
+        if a.shape or b.shape:
+            self.check_arithmetic(e, a, b)
+            a, b = (v if v.shape or v.plain else self.named(v) for v in (a, b))
+        infix, function = OPERATORS[type(e.op)]
+        return self.each((a, b), lambda x, y: f"{function}({x}, {y})" if self.dual else f"({x} {infix} {y})")
+
+    def check_arithmetic(self, e: ast.BinOp, a: Value, b: Value) -> None:
+        for side in (e.left, e.right):
+            if isinstance(side, ast.Name) and side.id in self.bare:
+                raise self.refuse(side, f"{side.id} is a list: write {side.id} = vector([...]), which knows arithmetic")
+        text, shapes = ast.unparse(e), f"{words(a.shape)} and {words(b.shape)}"
+        if isinstance(e.op, ast.Add | ast.Sub) and a.shape != b.shape:
+            raise self.refuse(e, f"{text}: {shapes} are not added")
+        if isinstance(e.op, ast.Mult) and a.shape and b.shape:
+            raise self.refuse(e, f"{text}: {shapes}: write @, dot or cross, or a for loop over the elements")
+        if isinstance(e.op, ast.Div) and b.shape:
+            raise self.refuse(e, f"{text}: only a number divides")
+
+    def operand(self, e: ast.expr) -> Value:
+        """An array of which elements are read several times: kept in a temporary if it is computed."""
+        if isinstance(e, ast.Name) and e.id in self.bare:
+            raise self.refuse(e, f"{e.id} is a list: write {e.id} = vector([...]), which knows arithmetic")
+        found = self.value(e)
+        if not found.shape:
+            raise self.refuse(e, f"{ast.unparse(e)} is a number: a vector or a matrix is needed here")
+        return found if found.plain else self.of_place(self.kept(found))
+
+    def product(self, e: ast.expr, a: Value, b: Value) -> Value:
+        """a @ b, summed from left to right."""
+        if a.shape[-1] != b.shape[0]:
+            raise self.refuse(e, f"{ast.unparse(e)}: {words(a.shape)} and {words(b.shape)} do not fit")
+        shape = a.shape[:-1] + b.shape[1:]
+        rows = len(a.shape) - 1
+
+        def element(*i: str) -> str:
+            terms = [(a.element(*i[:rows], str(k)), b.element(str(k), *i[rows:])) for k in range(b.shape[0])]
+            total = self.times(*terms[0])
+            for x, y in terms[1:]:
+                total = f"d_add({total}, {self.times(x, y)})" if self.dual else f"({total} + {self.times(x, y)})"
+            return total
+
+        return Value(shape, element, False, False, "", _reads((a, b)))
+
+    def times(self, x: str, y: str) -> str:
+        return f"d_mul({x}, {y})" if self.dual else f"({x} * {y})"
+
+    def transposed(self, e: ast.Attribute) -> Value:
+        of = self.operand(e.value)
+        if len(of.shape) != 2:
+            raise self.refuse(e, f"{ast.unparse(e.value)} is {words(of.shape)}: only a matrix is transposed")
+        return Value(of.shape[::-1], lambda i, j: of.element(j, i), of.plain, False, "", of.reads)
+
+    def choice(self, e: ast.expr, test: ast.expr, then: ast.expr, other: ast.expr) -> Value:
+        condition = self.condition(test)
+        before = len(self.pre)
+        a, b = self.value(then), self.value(other)
+        if len(self.pre) > before:
+            raise self.refuse(e, "an array is computed in one branch only: assign it to a local before, or use `if`")
+        if a.shape != b.shape:
+            raise self.refuse(e, f"{ast.unparse(e)}: {words(a.shape)} or {words(b.shape)}: both must be of one shape")
+        return self.each((a, b), lambda x, y: f"({condition} ? {x} : {y})")
+
+    # ------------------------------------------------------------------------------ calls
+    def call(self, e: ast.Call) -> Value:
         if e.keywords:
-            raise self.source.refuse(e, "no keyword arguments")
-        if isinstance(e.func, ast.Attribute) and ast.unparse(e.func.value) == "self":
-            name = e.func.attr
-            if name not in self.source.helpers:
-                raise self.source.refuse(e, f"self.{name} is no helper method of this part")
-            self.count(e, f"self.{name}", len(self.source.methods[name].args.args) - 1)
-            args = "".join(f", {self.expression(a)}" for a in e.args)
-            return f"{name}_d(part, seed{args})" if d else f"{name}_(part{args})"
+            raise self.refuse(e, "no keyword arguments")
+        code = self.callee(e)
+        if code is not None:
+            if not gives_value(code.node):
+                raise self.refuse(e, f"{ast.unparse(e.func)} returns nothing: call it on a line of its own")
+            return self.returned(e, code)
         name = e.func.id if isinstance(e.func, ast.Name) else ""
+        if name in ARRAY_FUNCTIONS:
+            return self.array_function(e, name)
         if name not in FUNCTIONS:
-            known = ", ".join(FUNCTIONS)
-            text = ast.unparse(e.func)
-            if text.removeprefix("math.") in FUNCTIONS:
-                name = text.removeprefix("math.")
-                raise self.source.refuse(e, f"write {name}(...) with `from gyrobench.component.math import {name}`")
-            if text in ("int", "round", "abs", "min", "max"):
-                write = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
-                raise self.source.refuse(e, f"no {text}(): write {write[text]}, from gyrobench.component.math")
-            raise self.source.refuse(e, f"{text!r} is not callable in equations; these are: {known}")
+            raise self.unknown_function(e)
         self.count(e, name, ARGUMENTS.get(name, 1))
         if name == "where":
-            a, b = self.expression(e.args[1]), self.expression(e.args[2])
-            return f"({self.condition(e.args[0])} ? {a} : {b})"
+            return self.choice(e, *e.args)
         args = ", ".join(self.expression(a) for a in e.args)
-        if d:
-            return f"d_{name}({args})"
-        return f"f_{name}({args})" if name in OWN_C else f"{name}({args})"
+        if self.dual:
+            return self.number(f"d_{name}({args})")
+        return self.number(f"f_{name}({args})" if name in OWN_C else f"{name}({args})")
+
+    def callee(self, e: ast.Call) -> Code | None:
+        """Return the procedure or function that is called; None where it is one of the language."""
+        source = self.translation.source
+        if isinstance(e.func, ast.Name):
+            if e.func.id in FUNCTIONS or e.func.id in ARRAY_FUNCTIONS:
+                return None
+            code = source.function(e.func.id, self.code)
+            if code is not None and not (gives_value(code.node) and returns(code.node.body)):
+                raise self.refuse(e, f"{e.func.id} is a function: it returns a value on every path")
+            return code
+        if not isinstance(e.func, ast.Attribute):
+            return None
+        of = ast.unparse(e.func.value)
+        if of == "self":
+            code = source.method(e.func.attr, self.code)
+            if code is None:
+                raise self.refuse(e, f"self.{e.func.attr} is no procedure of this part")
+            return code
+        blocks = self.code.placed.blocks if self.code.placed else source.cls.placed
+        if of.removeprefix("self.") in blocks:
+            code = source.block_method(of.removeprefix("self."), e.func.attr, self.code)
+            if code is None:
+                raise self.refuse(e, f"{of}.{e.func.attr} is no procedure of this block")
+            return code
+        return None
+
+    def unknown_function(self, e: ast.Call) -> SubsetError:
+        text = ast.unparse(e.func)
+        if text.removeprefix("math.") in FUNCTIONS:
+            name = text.removeprefix("math.")
+            return self.refuse(e, f"write {name}(...) with `from gyrobench.component.math import {name}`")
+        if text in WRITE:
+            return self.refuse(e, f"no {text}(): write {WRITE[text]}, from gyrobench.component.math")
+        known = ", ".join((*FUNCTIONS, *ARRAY_FUNCTIONS))
+        return self.refuse(e, f"{text!r} is not callable in equations; these are: {known}")
+
+    def invoke(self, e: ast.Call, code: Code) -> tuple[Procedure, str]:
+        """Translate what is called for arguments of these shapes; return it and the text of its arguments."""
+        self.count(e, ast.unparse(e.func), len(code.arguments))
+        values = [self.value(a) for a in e.args]
+        procedure = self.translation.procedure(code, tuple(v.shape for v in values), self.dual, e, self.code)
+        head = ["part"] + (["seed"] if self.dual else [])
+        args = [v.text if not v.shape else (v.storage or self.kept(v).at()) for v in values]
+        return procedure, ", ".join([*head, *args])
+
+    def returned(self, e: ast.Call, code: Code) -> Value:
+        procedure, args = self.invoke(e, code)
+        self.touched |= procedure.touched
+        if not procedure.shape:
+            return self.number(f"{procedure.name}({args})")
+        at = self.temporary(procedure.shape)
+        self.pre.append(f"{procedure.name}({args}, {at.base});")
+        return self.of_place(at)
+
+    def array_function(self, e: ast.Call, name: str) -> Value:
+        self.count(e, name, ARGUMENTS.get(name, 1))
+        if name == "vector":
+            if not isinstance(e.args[0], ast.List):
+                found = self.value(e.args[0])
+                if not found.shape:
+                    raise self.refuse(
+                        e, f"{ast.unparse(e.args[0])} is a number: write vector([...]), or an array to copy"
+                    )
+                return Value(found.shape, found.element, False, found.aligned, "", found.reads)
+            return self.literal(e.args[0])
+        a, b = (self.operand(x) for x in e.args)
+        if name == "dot":
+            if len(a.shape) != 1 or a.shape != b.shape:
+                raise self.refuse(e, f"dot of {words(a.shape)} and {words(b.shape)}: two vectors of one length")
+            return self.product(e, a, b)
+        if a.shape != (3,) or b.shape != (3,):
+            raise self.refuse(e, f"cross of {words(a.shape)} and {words(b.shape)}: two vectors of three")
+
+        def element(i: str) -> str:
+            j, k = (int(i) + 1) % 3, (int(i) + 2) % 3
+            x = self.times(a.element(str(j)), b.element(str(k)))
+            y = self.times(a.element(str(k)), b.element(str(j)))
+            return f"d_sub({x}, {y})" if self.dual else f"({x} - {y})"
+
+        return Value((3,), element, False, False, "", _reads((a, b)))
+
+    def literal(self, e: ast.List) -> Value:
+        """[a, b, c], or a list of such lists or vectors."""
+        rows = [self.literal(r) if isinstance(r, ast.List) else self.value(r) for r in e.elts]
+        if len({r.shape for r in rows}) != 1:
+            raise self.refuse(e, "an array is a list of numbers, or of lists of equal length")
+        shape = (len(rows), *rows[0].shape)
+        return Value(shape, lambda i, *more: rows[int(i)].element(*more), False, False, "", _reads(tuple(rows)))
 
     def count(self, e: ast.Call, name: str, n: int) -> None:
         if len(e.args) != n:
-            raise self.source.refuse(e, f"{name} takes {n} argument{'s' if n != 1 else ''}, not {len(e.args)}")
+            raise self.refuse(e, f"{name} takes {n} argument{'s' if n != 1 else ''}, not {len(e.args)}")
 
+    # ------------------------------------------------------------------------------ temporaries
+    def temporary(self, shape: Shape) -> Place:
+        self.temporaries += 1
+        name = f"t{self.temporaries}_"
+        self.locals[name] = shape
+        return Place(name, "local", name, shape)
+
+    def settled(self, p: Place) -> Place:
+        """A row whose index is known when it runs: the index is computed once for all its elements."""
+        if not p.shape or not any(isinstance(t, str) and t.startswith("at(") for t in p.taken):
+            return p
+        taken: list[str | Span] = []
+        for t in p.taken:
+            if isinstance(t, str) and t.startswith("at("):
+                self.temporaries += 1
+                self.pre.append(f"const int t{self.temporaries}_ = {t};")
+                t = f"t{self.temporaries}_"
+            taken.append(t)
+        return Place(p.base, p.kind, p.name, p.dims, tuple(taken))
+
+    def kept(self, v: Value) -> Place:
+        """Compute an array before the statement in hand, into a temporary."""
+        at = self.temporary(v.shape)
+        self.pre += [f"{at.at(*i)} = {v.element(*i)};" for i in cells(v.shape)]
+        return at
+
+    def named(self, v: Value) -> Value:
+        """Compute a number before the statement in hand, so that all elements share it."""
+        at = self.temporary(())
+        self.pre.append(f"{at.base} = {v.text};")
+        return self.of_place(at)
+
+    # ------------------------------------------------------------------------------ conditions
     def condition(self, e: ast.expr) -> str:
         if isinstance(e, ast.BoolOp):
             word = " && " if isinstance(e.op, ast.And) else " || "
-            return "(" + word.join(self.condition(v) for v in e.values) + ")"
+            first = self.condition(e.values[0])
+            before = len(self.pre)
+            rest = [self.condition(v) for v in e.values[1:]]
+            if len(self.pre) > before:
+                raise self.refuse(e, "an array is computed behind and/or: assign it to a local before")
+            return "(" + word.join([first, *rest]) + ")"
         if isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.Not):
             return f"!({self.condition(e.operand)})"
         if isinstance(e, ast.Compare):
@@ -220,7 +461,7 @@ class Expressions:
             parts = []
             for a, op, b in zip(sides, e.ops, sides[1:], strict=False):
                 if type(op) not in COMPARISONS:
-                    raise self.source.refuse(e, "only < <= > >= == != compare numbers")
+                    raise self.refuse(e, "only < <= > >= == != compare numbers")
                 parts.append(f"{a} {COMPARISONS[type(op)]} {b}")
             return "(" + " && ".join(parts) + ")"
         return f"({self.scalar(e)} != 0.0)"
@@ -228,6 +469,10 @@ class Expressions:
     def scalar(self, e: ast.expr) -> str:
         text = self.expression(e)
         return f"({text}).v" if self.dual else text
+
+
+def _reads(of: tuple[Value, ...]) -> frozenset[str]:
+    return frozenset().union(*(v.reads for v in of)) if of else frozenset()
 
 
 def logical(e: ast.expr) -> bool:

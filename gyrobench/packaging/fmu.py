@@ -1,62 +1,23 @@
-"""Part -> FMU: loading, building, the cache by content, validation, reference runs."""
+"""Part -> FMU: what goes into the archive, and the cache by content."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.metadata
-import importlib.util
-import inspect
 import os
 import shutil
-import sys
 import tempfile
 import zipfile
 from pathlib import Path
-from types import ModuleType
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
-from gyrobench.errors import GyrobenchError
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description
 from gyrobench.packaging.description3 import build_description, model_description3
+from gyrobench.packaging.loading import BuildError, load_part, sources
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
-
-
-class BuildError(GyrobenchError):
-    """A part that cannot be built; the text says which and why."""
-
-
-def import_file(path: Path, name: str) -> ModuleType:
-    """Imports one file under a module name of its own, so that parts of two benches do not mix."""
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
-
-
-def load_part(name: str, bench: Path | None = None) -> type[Component]:
-    """The Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
-    folder = Bench.find(bench).part_folder(name)
-    path = folder / "model.py"
-    key = "gyrobench_part_" + hashlib.sha256(str(path.resolve()).encode() + path.read_bytes()).hexdigest()[:16]
-    module = sys.modules.get(key) or import_file(path, key)
-    own = [
-        c
-        for c in vars(module).values()
-        if inspect.isclass(c) and issubclass(c, Component) and c.__module__ == module.__name__
-    ]
-    if len(own) != 1:
-        raise BuildError(f"{path}: one Component class is expected, found {len(own)}")
-    cls: type[Component] = own[0]
-    return cls
 
 
 def _hash(*texts: str) -> str:
@@ -150,11 +111,12 @@ def build(
         raise BuildError(f"FMI {fmi} {target}: there are FMI 2 native, FMI 2 python, FMI 3 native")
     platforms = platforms or (compiler.this_platform(),)
     cls = load_part(part, bench) if isinstance(part, str) else part
-    name = part if isinstance(part, str) else Path(inspect.getfile(cls)).parent.name
+    name = part if isinstance(part, str) else sources(cls)["model"].parent.name
     identifier = name
-    model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
-    what = _hash(model, _tool_text(), target, str(fmi), name)
-    readme = Path(inspect.getfile(cls)).parent / "README.md"
+    files = sources(cls)
+    texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in files.items()]
+    what = _hash(*texts, _tool_text(), target, str(fmi), name)
+    readme = files["model"].parent / "README.md"
     documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
     if target == "native":
         how = "".join(p + compiler.identity(p) for p in platforms)

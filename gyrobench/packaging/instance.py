@@ -17,7 +17,8 @@ from typing import Any, ClassVar, Protocol
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.errors import GyrobenchError
-from gyrobench.packaging.fmu import build, load_part
+from gyrobench.packaging.fmu import build
+from gyrobench.packaging.loading import load_part
 
 
 class InstanceError(GyrobenchError):

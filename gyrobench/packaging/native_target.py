@@ -6,15 +6,13 @@ import importlib.util
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.source import Source, followed, member, written
-from gyrobench.packaging.translate import equations
+from gyrobench.packaging.arrays import dimensions
+from gyrobench.packaging.dependencies import followed, written
+from gyrobench.packaging.source import Source, member
+from gyrobench.packaging.translate import Translation
 
 HERE = Path(__file__).parent
 PER = {"start": 0, "step": 1, "second": 2}
-
-
-def _dimensions(shape: tuple[int, ...]) -> str:
-    return "".join(f"[{n}]" for n in shape)
 
 
 def _struct(cls: type[Component]) -> str:
@@ -26,7 +24,7 @@ def _struct(cls: type[Component]) -> str:
         if s.section == "derivative":
             if ("der", s.decl.name) not in done:
                 done.add(("der", s.decl.name))
-                inner.append(f"{member(s.decl.name)}{_dimensions(s.decl.shape)}")
+                inner.append(f"{member(s.decl.name)}{dimensions(s.decl.shape)}")
             continue
         if inner:
             lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
@@ -34,7 +32,7 @@ def _struct(cls: type[Component]) -> str:
         if ("", s.decl.name) not in done:
             done.add(("", s.decl.name))
             comment = f"{s.decl.unit}, {s.decl.doc}".replace("*/", "* /")
-            lines.append(f"    double {member(s.decl.name)}{_dimensions(s.decl.shape)}; /* {comment} */")
+            lines.append(f"    double {member(s.decl.name)}{dimensions(s.decl.shape)}; /* {comment} */")
     if inner:
         lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
     if cls.noises:
@@ -126,7 +124,7 @@ def c_source(cls: type[Component], guid: str) -> str:
         "/* what the outputs follow from, where that is inputs and discretes alone */",
         _table("static const int followed[]", follow or [], "0"),
         '#include "core.h"',
-        equations(source),
+        Translation(source).text,
     ]
     return "\n\n".join(parts) + "\n"
 

@@ -10,11 +10,11 @@ directional derivatives.
 
 from __future__ import annotations
 
-import inspect
 import re
 from pathlib import Path
 
 from gyrobench.component import Component
+from gyrobench.packaging.loading import ROOM, BuildError, sources
 
 TOOL = Path(__file__).parent.parent
 RUNTIME = (*sorted((TOOL / "component").rglob("*.py")), TOOL / "errors.py")  # what a Python FMU carries of gyrobench
@@ -110,22 +110,25 @@ class {cls}(Fmi2Slave):
 
 
 def renamed(text: str, unique: str) -> str:
-    """Imports of gyrobench become imports of the FMU's own runtime package."""
-    return re.sub(r"^(\s*)(from|import) gyrobench\b", rf"\1\2 {unique}", text, flags=re.M)
+    """Return a file whose imports of gyrobench and of other parts are those of the FMU's own runtime package."""
+    text = re.sub(r"^(\s*)(from|import) gyrobench\b", rf"\1\2 {unique}", text, flags=re.M)
+    return re.sub(rf"^(\s*)from {ROOM}\b", rf"\1from {unique}.{ROOM}", text, flags=re.M)
 
 
 def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
-    """(module name, files under resources/).  Raises ValueError if the model imports what it cannot carry."""
+    """Return (module name, files under resources/).  Raises BuildError if the model imports what it cannot carry."""
     unique = f"gb_{cls.__name__.lower()}_{guid.replace('-', '')[:12]}"
-    model = Path(inspect.getfile(cls)).read_text(encoding="utf-8")
-    for module in re.findall(r"^(?:from|import) gyrobench\.([\w.]+)", model, flags=re.M):
-        if module.split(".")[0] != "component":
-            raise ValueError(
-                f"{inspect.getfile(cls)} imports gyrobench.{module}: a part uses gyrobench.component "
-                "only, so that its Python FMU can carry it"
-            )
     texts = {f.relative_to(TOOL).as_posix(): f.read_text(encoding="utf-8") for f in RUNTIME}
-    files = {f"{unique}/{n}": renamed(t, unique) for n, t in {**texts, "model.py": model}.items()}
+    for name, path in sources(cls).items():
+        text = path.read_text(encoding="utf-8")
+        for module in re.findall(r"^(?:from|import) gyrobench\.([\w.]+)", text, flags=re.M):
+            if module.split(".")[0] != "component":
+                raise BuildError(
+                    f"{path} imports gyrobench.{module}: a part uses gyrobench.component only, so that its Python FMU "
+                    "can carry it"
+                )
+        texts[f"{name.replace('.', '/')}.py"] = text
+    files = {f"{unique}/{n}": renamed(t, unique) for n, t in texts.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"
     files[f"{module}.py"] = SLAVE.format(cls=cls.__name__, version=cls.version, unique=unique)

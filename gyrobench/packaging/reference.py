@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.fmu import load_part
 from gyrobench.packaging.instance import Instance, Plain, make
+from gyrobench.packaging.loading import load_part
 
 Signal = Callable[[float], float]  # of the time, s
 

@@ -1,15 +1,19 @@
-"""The source text of a part: its methods, its constants, its names in C, and what its outputs depend on."""
+"""The source text of a part: the syntax trees of its equations and procedures, its constants, its names in C."""
 
 from __future__ import annotations
 
 import ast
-import inspect
+import functools
 import math
-import sys
-from collections.abc import Iterable
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from types import FunctionType
+from typing import Any
 
-from gyrobench.component import Component, Discrete, Input, Output, State
+from gyrobench.component import Block, Component
+from gyrobench.component import math as language
+from gyrobench.component.composition import EQUATIONS, Piece, Placed
 from gyrobench.errors import GyrobenchError
 
 KEYWORDS = {
@@ -30,147 +34,160 @@ class SubsetError(GyrobenchError):
 
 
 def member(name: str) -> str:
-    """The C name of a declared quantity in struct Vars."""
+    """Return the C name of a declared quantity in struct Vars."""
     return name + "_" if name in MEMBERS or name.endswith("_") else name
 
 
 def local(name: str) -> str:
-    """The C name of a local variable or an argument."""
+    """Return the C name of a local variable or an argument."""
     return name + "_" if name in LOCALS or name.endswith("_") or name.startswith(("d_", "f_")) else name
 
 
-class Source:
-    """The class definition of a part, its constants, and where it stands."""
+@functools.lru_cache(maxsize=256)
+def _tree(path: str, _changed: float) -> ast.Module:
+    return ast.parse(Path(path).read_text(encoding="utf-8"))
 
-    def __init__(self, cls: type[Component]) -> None:
-        self.cls = cls
-        self.path = Path(inspect.getfile(cls))
-        tree = ast.parse(self.path.read_text(encoding="utf-8"))
-        node = next((n for n in tree.body if isinstance(n, ast.ClassDef) and n.name == cls.__name__), None)
-        if node is None:
-            raise SubsetError(f"{self.path}: class {cls.__name__} must stand at the top level of its file")
-        self.methods = {n.name: n for n in node.body if isinstance(n, ast.FunctionDef)}
-        self.constants = {
-            k: float(v)
-            for k, v in {**vars(sys.modules[cls.__module__]), **vars(cls)}.items()
-            if isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)
-        }
-        known = {"start", "flow", "outputs", *(n for n, _ in cls.ticks)}
-        self.helpers = [n for n in self.methods if n not in known and not n.startswith("__")]
-        for name, method in self.methods.items():
-            a = method.args
-            if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
-                raise self.refuse(method, f"{name}() takes plain arguments without defaults")
-            if name in known and len(a.args) != 1:
-                raise self.refuse(method, f"{name}() takes self only")
-            if name in self.helpers and not returns(method.body):
-                raise self.refuse(method, f"{name}() is a helper method: it returns a number on every path")
+
+@dataclass(frozen=True)
+class Code:
+    """One method or function: its syntax tree, and where its names lead.
+
+    owner: the class (of the part or of a block) whose method it is; None for a function of a module.  placed: the
+    block in which it stands.
+    """
+
+    function: FunctionType
+    node: ast.FunctionDef
+    owner: type | None
+    placed: Placed | None
+
+    @property
+    def path(self) -> str:
+        return self.function.__code__.co_filename
 
     def refuse(self, node: ast.AST, what: str) -> SubsetError:
         return SubsetError(f"{self.path}:{getattr(node, 'lineno', 0)}: {what}")
 
+    def flat(self, name: str) -> str:
+        """Return the part's name of ``self.name``."""
+        return self.placed.names.get(name, f"{self.placed.name}.{name}") if self.placed else name
+
+    def constant(self, name: str, of_self: bool = False) -> float | None:
+        """Return the number that a name stands for: of the class (``self.name`` too), or of the module."""
+        x = getattr(self.owner, name, None) if self.owner is not None else None
+        if x is None and not of_self:
+            x = self.function.__globals__.get(name)
+        return float(x) if isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) else None
+
+    def nodes(self) -> Iterator[ast.AST]:
+        """Yield every node of the body."""
+        return (n for s in self.node.body for n in ast.walk(s))
+
+    @property
+    def arguments(self) -> list[str]:
+        names = [a.arg for a in self.node.args.args]
+        return names[1:] if self.owner is not None else names
+
+
+def read_code(function: Any, owner: type | None, placed: Placed | None) -> Code:
+    """Return the code of a function.  Raises SubsetError where there is no file to read it from."""
+    at = function.__code__
+    path = Path(at.co_filename)
+    if not path.is_file():
+        raise SubsetError(f"{function.__qualname__}: equations must stand in a file, this one is in {at.co_filename}")
+    for node in ast.walk(_tree(str(path), path.stat().st_mtime)):
+        if isinstance(node, ast.FunctionDef) and node.name == function.__name__:
+            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+            if first == at.co_firstlineno:
+                return Code(function, node, owner, placed)
+    raise SubsetError(f"{path}:{at.co_firstlineno}: {function.__qualname__} is not found in its file: was it changed?")
+
+
+class Source:
+    """What a part computes: the code of its equations, and the code that they call."""
+
+    def __init__(self, cls: type[Component]) -> None:
+        self.cls = cls
+        self.equations: dict[str, list[tuple[Piece, Code]]] = {}
+        for kind, pieces in cls.pieces.items():
+            self.equations[kind] = [(p, self.code_of(p)) for p in pieces]
+
+    def code_of(self, piece: Piece) -> Code:
+        """Return the code of an equation.  Raises SubsetError where it takes more than self."""
+        owner = type(piece.placed.block) if piece.placed else self.cls
+        code = read_code(piece.function, owner, piece.placed)
+        _plain_arguments(code)
+        if code.arguments:
+            raise code.refuse(code.node, f"{code.node.name}() takes self only")
+        return code
+
+    def uncalled(self) -> list[Code]:
+        """Return the procedures of the part and of its blocks, called or not; refuse those that could not be."""
+        found: list[Code] = []
+        left = list(self.cls.placed.values())
+        classes: list[tuple[type, Placed | None]] = [(self.cls, None)]
+        while left:
+            inner = left.pop()
+            classes.append((type(inner.block), inner))
+            left += inner.blocks.values()
+        for owner, p in classes:
+            for klass in owner.__mro__:
+                if klass in (object, Component, Block):
+                    continue
+                for name, f in vars(klass).items():
+                    if isinstance(f, FunctionType) and procedure_name(name, f):
+                        code = read_code(f, owner, p)
+                        _plain_arguments(code)
+                        if gives_value(code.node) and not returns(code.node.body):
+                            raise code.refuse(code.node, f"{name}() returns a number on every path, or on none")
+                        found.append(code)
+        return found
+
+    def method(self, name: str, code: Code) -> Code | None:
+        """Return the procedure that ``self.name(...)`` calls in ``code``; None where there is none of that name."""
+        f = getattr(code.owner, name, None)
+        if not isinstance(f, FunctionType) or f is vars(Component).get(name) or not procedure_name(name, f):
+            return None
+        return read_code(f, code.owner, code.placed)
+
+    def block_method(self, block: str, name: str, code: Code) -> Code | None:
+        """Return the procedure that ``self.block.name(...)`` calls in ``code``."""
+        blocks = code.placed.blocks if code.placed else self.cls.placed
+        placed = blocks.get(block)
+        f = getattr(type(placed.block), name, None) if placed else None
+        if placed is None or not isinstance(f, FunctionType) or not procedure_name(name, f):
+            return None
+        return read_code(f, type(placed.block), placed)
+
+    def function(self, name: str, code: Code) -> Code | None:
+        """Return the function of a module that ``name(...)`` calls in ``code``; None for one of the language."""
+        f = code.function.__globals__.get(name)
+        if not isinstance(f, FunctionType) or f is getattr(language, name, None):
+            return None
+        found = read_code(f, None, None)
+        _plain_arguments(found)
+        return found
+
+
+def procedure_name(name: str, f: Any) -> bool:
+    """Return whether a method is a procedure: not an equation, not one of Python's own."""
+    return name not in EQUATIONS and not hasattr(f, "_every") and not name.startswith("__")
+
+
+def _plain_arguments(code: Code) -> None:
+    a = code.node.args
+    if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
+        raise code.refuse(code.node, f"{code.node.name}() takes plain arguments without defaults")
+
+
+def gives_value(node: ast.FunctionDef) -> bool:
+    """Return whether a function returns a value anywhere."""
+    return any(isinstance(n, ast.Return) and n.value is not None for n in ast.walk(node))
+
 
 def returns(statements: list[ast.stmt]) -> bool:
-    """Whether these statements end in a return on every path."""
+    """Return whether these statements end in a return on every path."""
     last = statements[-1] if statements else None
     if isinstance(last, ast.If):
         return returns(last.body) and returns(last.orelse)
     return isinstance(last, ast.Return)
-
-
-# -------------------------------------------------------------------------------------- dependencies
-class Dependencies:
-    """Which inputs (declared names) the variables written by one method depend on, without delay."""
-
-    def __init__(self, source: Source, method: str) -> None:
-        self.source = source
-        self.inputs = {n for n, d in source.cls.declarations.items() if isinstance(d, Input)}
-        self.reach: dict[str, set[str]] = {}
-        self.inside: set[str] = set()  # helpers being read
-        node = source.methods.get(method)
-        before: dict[str, set[str]] | None = None
-        while before != self.reach:  # until nothing changes: loops carry values from one turn to the next
-            before = {k: set(v) for k, v in self.reach.items()}
-            self.run(node.body if node else [], set())
-
-    def read(self, e: ast.AST) -> set[str]:
-        found: set[str] = set()
-        for n in ast.walk(e):
-            if not isinstance(n, ast.Attribute | ast.Name):
-                continue
-            text = ast.unparse(n)
-            name = text.removeprefix("self.")
-            found |= self.reach.get(text, set())
-            if text == name:
-                continue
-            if name in self.inputs:
-                found.add(name)
-            elif name in self.source.helpers and name not in self.inside:
-                self.inside.add(name)
-                found |= self.read(self.source.methods[name])
-                self.inside.discard(name)
-        return found
-
-    def run(self, statements: Iterable[ast.stmt], under: set[str]) -> None:
-        """``under``: what decides whether these statements run."""
-        under = set(under)
-        for s in statements:
-            if isinstance(s, ast.Assign | ast.AugAssign | ast.AnnAssign) and s.value is not None:
-                target = s.targets[0] if isinstance(s, ast.Assign) else s.target
-                base = target
-                while isinstance(base, ast.Subscript):
-                    base = base.value
-                self.reach.setdefault(ast.unparse(base), set()).update(self.read(s.value) | self.read(target) | under)
-            elif isinstance(s, ast.If):
-                test = self.read(s.test)
-                self.run(s.body, under | test)
-                self.run(s.orelse, under | test)
-                if any(isinstance(n, ast.Return) for n in ast.walk(s)):
-                    under |= test  # what follows runs or does not
-            elif isinstance(s, ast.For):
-                self.run(s.body, under | self.read(s.iter))
-
-
-def dependencies(source: Source, method: str = "outputs") -> dict[str, set[str]]:
-    """Output (declared name) -> the inputs it follows without delay."""
-    reach = Dependencies(source, method).reach
-    return {n: reach.get(f"self.{n}", set()) for n, d in source.cls.declarations.items() if isinstance(d, Output)}
-
-
-# ------------------------------------------------------------------------------- what changes, what follows
-def _members(source: Source, method: str, inside: frozenset[str] = frozenset()) -> set[str]:
-    """Every `X` of a `self.X` in a method and in the helpers that it calls."""
-    node = source.methods.get(method)
-    names = {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)} if node else set()
-    for h in names & (set(source.helpers) - inside):
-        names |= _members(source, h, inside | {method, h})
-    return names
-
-
-def written(source: Source) -> set[str]:
-    """The discretes that a sampled method writes; the others keep what ``start`` gave them."""
-    names: set[str] = set()
-    for tick, _ in source.cls.ticks:
-        for n in ast.walk(source.methods[tick]):
-            if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store):
-                names.add(n.attr)
-            elif isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store):
-                names |= {a.attr for a in ast.walk(n.value) if isinstance(a, ast.Attribute)}
-    return {n for n in names if isinstance(source.cls.declarations.get(n), Discrete)}
-
-
-def followed(source: Source) -> list[str] | None:
-    """The inputs and changing discretes that ``outputs`` reads, discretes first.  None where it reads states, noise or
-    time, with which it changes at every step, and where it is too short (no loop) to be worth looking.
-    """
-    read = _members(source, "outputs")
-    node = source.methods.get("outputs")
-    if node is None or not any(isinstance(n, ast.For) for n in ast.walk(node)):
-        return None
-    declared = source.cls.declarations
-    if read & {"t", "h", "der", "noise"} or any(isinstance(declared.get(n), State) for n in read):
-        return None
-    changing = written(source)
-    return [n for n in declared if n in read & changing] + [
-        n for n in declared if n in read and isinstance(declared[n], Input)
-    ]

@@ -10,56 +10,103 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 from gyrobench.component import Discrete, Input, Output, Parameter, State
-from gyrobench.packaging.expressions import Expressions, Shape
-from gyrobench.packaging.source import Source, SubsetError, local, member, returns
+from gyrobench.packaging.arrays import Place, Shape, Value, cells, dimensions, words
+from gyrobench.packaging.expressions import Expressions
+from gyrobench.packaging.source import Code, Source, SubsetError, gives_value, local, member, returns
 
 WRITABLE: dict[str, tuple[type, ...]] = {
     "start": (Discrete, State),
     "flow": (),
     "outputs": (Output,),
+    "sampled": (Discrete, State),
 }
+PROCEDURE = "procedure"
+TEMPORARY = re.compile(r"t\d+_")
+HINTS = {"flow": "self.der.X", "outputs": "outputs"}
+
+
+@dataclass
+class Procedure:
+    """A translated procedure: its C name, what it returns (None: nothing), what it writes."""
+
+    name: str
+    shape: Shape | None = None
+    touched: set[str] = field(default_factory=set)
+    refuses: bool = False
 
 
 class Method(Expressions):
-    """Translates one method."""
+    """Translates one equation, procedure or function.  kind: of WRITABLE, or "procedure"."""
+
+    def __init__(
+        self, translation: Translation, code: Code, dual: bool, kind: str, shapes: tuple[Shape, ...] = ()
+    ) -> None:
+        super().__init__(translation, code, dual, shapes)
+        self.kind = kind
+        self.name = code.node.name
+        self.gives = kind == PROCEDURE and gives_value(code.node)
+        self.result: Shape | None = None
+        self.refuses = False
+        self.views: set[str] = set()  # locals that are an input or a parameter under another name
 
     # ------------------------------------------------------------------------------- statements
     def body(self, statements: Iterable[ast.stmt], depth: int) -> list[str]:
-        return [line for s in statements for line in self.statement(s, depth)]
+        return [line for s in statements for line in self.whole_statement(s, depth)]
+
+    def whole_statement(self, s: ast.stmt, depth: int) -> list[str]:
+        """A statement behind what must be computed before it."""
+        outside, self.pre = self.pre, []
+        lines = self.statement(s, depth)
+        lines = ["    " * depth + x for x in self.pre] + lines
+        self.pre = outside
+        return lines
 
     def statement(self, s: ast.stmt, depth: int) -> list[str]:
         pad = "    " * depth
         if isinstance(s, ast.Pass) or (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)):
             return []
-        if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call) and ast.unparse(s.value.func) == "self.refuse":
-            return self.refusal(s.value, pad)
+        if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call):
+            if ast.unparse(s.value.func) == "self.refuse":
+                return self.refusal(s.value, pad)
+            return self.procedure_call(s.value, pad)
         if isinstance(s, ast.Assign | ast.AnnAssign):
             target = s.targets[0] if isinstance(s, ast.Assign) else s.target
             if isinstance(s, ast.Assign) and (len(s.targets) > 1 or isinstance(target, ast.Tuple)):
-                raise self.source.refuse(s, "one target an assignment: write one line for each")
+                raise self.refuse(s, "one target an assignment: write one line for each")
             if s.value is None:
                 return []
-            if isinstance(s.value, ast.List):
-                return self.array(target, s.value, pad)
-            return self.assign(target, self.expression(s.value), pad)
+            return self.assign(target, s.value, pad)
         if isinstance(s, ast.AugAssign):
-            value = ast.copy_location(ast.BinOp(s.target, s.op, s.value), s)
-            return self.assign(s.target, self.expression(value), pad)
+            return self.assign(s.target, ast.copy_location(ast.BinOp(s.target, s.op, s.value), s), pad)
         if isinstance(s, ast.If):
             return self.branch(s, depth)
         if isinstance(s, ast.For):
             return self.loop(s, depth)
         if isinstance(s, ast.Return):
-            if s.value is None:
-                return [f"{pad}return;"]
-            if not self.helper:
-                raise self.source.refuse(s, f"{self.name} returns nothing")
-            return [f"{pad}return {self.expression(s.value)};"]
+            return self.give_back(s, pad)
         if isinstance(s, ast.While):
-            raise self.source.refuse(s, "no while: write `for k in range(n)` with a fixed n, and `if` inside")
-        raise self.source.refuse(s, f"`{ast.unparse(s).splitlines()[0]}` is outside the subset of equations")
+            raise self.refuse(s, "no while: write `for k in range(n)` with a fixed n, and `if` inside")
+        raise self.refuse(s, f"`{ast.unparse(s).splitlines()[0]}` is outside the subset of equations")
+
+    def procedure_call(self, e: ast.Call, pad: str) -> list[str]:
+        """A procedure on a line of its own: it writes, and may refuse."""
+        code = None if e.keywords else self.callee(e)
+        if code is None:
+            raise self.refuse(e, f"`{ast.unparse(e)}` is outside the subset of equations")
+        if gives_value(code.node):
+            raise self.refuse(e, f"{ast.unparse(e.func)} returns a value: assign it")
+        if self.gives:
+            raise self.refuse(e, f"{self.name} returns a value and so writes nothing: {code.node.name} may write")
+        procedure, args = self.invoke(e, code)
+        for name in sorted(procedure.touched):
+            if not self.may_write(name):
+                raise self.refuse_write(e, name, ast.unparse(e.func))
+        self.touched |= procedure.touched
+        self.refuses |= procedure.refuses
+        return [f"{pad}{procedure.name}({args});", *([f"{pad}if (part->failed) return;"] * procedure.refuses)]
 
     def loop(self, s: ast.For, depth: int) -> list[str]:
         pad = "    " * depth
@@ -71,12 +118,12 @@ class Method(Expressions):
             or not 1 <= len(call.args) <= 2
             or s.orelse
         ):
-            raise self.source.refuse(s, "only `for k in range(n)` and `for k in range(a, b)`")
+            raise self.refuse(s, "only `for k in range(n)` and `for k in range(a, b)`")
         bounds = [self.index(a) for a in call.args]
         (first, (lo, _)), (last, (_, end)) = bounds if len(bounds) == 2 else (("0", (0, 0)), bounds[0])
         k = s.target.id
         if k in self.locals or k in self.arguments or k in self.loops:
-            raise self.source.refuse(s, f"the loop variable {k!r} has a name that is in use")
+            raise self.refuse(s, f"the loop variable {k!r} has a name that is in use")
         self.loops[k] = (lo, None if end is None else end - 1)
         before = set(self.assigned)
         lines = [
@@ -102,70 +149,161 @@ class Method(Expressions):
             self.assigned = then & self.assigned
         return [*lines, f"{pad}}}"]
 
-    def assign(self, target: ast.expr, value: str, pad: str) -> list[str]:
+    def give_back(self, s: ast.Return, pad: str) -> list[str]:
+        if s.value is None:
+            return [f"{pad}return;"]
+        if not self.gives:
+            raise self.refuse(s, f"{self.name} returns nothing")
+        self.no_view(s.value, "returned")
+        found = self.value(s.value)
+        if self.result is not None and found.shape != self.result:
+            raise self.refuse(s, f"{self.name} returns {words(self.result)} above and {words(found.shape)} here")
+        self.result = found.shape
+        if not found.shape:
+            return [f"{pad}return {found.text};"]
+        if not found.aligned:
+            found = self.of_place(self.kept(found))
+        return [*(f"{pad}out_{''.join(f'[{k}]' for k in i)} = {found.element(*i)};" for i in cells(found.shape)),
+                f"{pad}return;"]  # fmt: skip
+
+    # ------------------------------------------------------------------------------- assignments
+    def assign(self, target: ast.expr, value: ast.expr, pad: str) -> list[str]:
         if isinstance(target, ast.Name):
-            if target.id in self.loops:
-                raise self.source.refuse(target, f"the loop variable {target.id!r} is not assigned to")
-            if self.locals.get(target.id, ()):
-                raise self.source.refuse(target, f"{target.id!r} is an array: write its elements")
-            if target.id not in self.arguments:
-                self.locals.setdefault(target.id, ())
-            self.assigned.add(target.id)
-            return [f"{pad}{local(target.id)} = {value};"]
+            return self.assign_local(target, value, pad)
         to = self.place(target)
-        if to.shape:
-            raise self.source.refuse(target, f"{ast.unparse(target)} is an array: write its elements")
         if to.kind == "local":
-            return [f"{pad}{to.text} = {value};"]
-        if to.kind != "self" or not self.may_write(to.name):
-            raise self.refuse_write(target, to.name)
-        if self.dual:
-            return [f"{pad}{{ dual r_ = {value}; self->{to.text} = r_.v; seed->{to.text} = r_.d; }}"]
-        return [f"{pad}self->{to.text} = {value};"]
+            if to.name in self.arguments or to.name in self.views:
+                raise self.refuse(target, f"the elements of {to.name!r} are only read: copy it by vector()")
+            if to.name not in self.bare and self.locals.get(to.name) is None:
+                raise self.refuse(target, f"{to.name!r} is not an array")
+        elif to.kind != "self" or not self.may_write(to.name):
+            raise self.refuse_write(target, to.name, ast.unparse(target))
+        if to.kind == "self":
+            self.touched.add(to.name)
+        if not to.shape:
+            return self.store(to, self.number(self.expression(value)), pad)
+        if to.taken:
+            self.no_view(value, "stored in another", even_inputs=True)
+        return self.store(to, self.fitting(target, value, to), pad)
 
-    def may_write(self, name: str) -> bool:
-        if name.startswith("der."):
-            return self.name == "flow"
-        decl = self.source.cls.declarations.get(name)
-        return isinstance(decl, self.writes) and not isinstance(decl, Parameter)
-
-    def refuse_write(self, target: ast.expr, name: str) -> SubsetError:
-        text = f"{self.name}() does not write {ast.unparse(target)}"
-        if isinstance(self.source.cls.declarations.get(name), Parameter | Input):
-            return self.source.refuse(target, f"{text}: parameters and inputs are only read; use a local or a Discrete")
-        may = {"flow": "self.der.X", "outputs": "outputs", "start": "discretes and states"}
-        return self.source.refuse(target, f"{text}: it writes {may.get(self.name, 'discretes and states')} only")
-
-    def array(self, target: ast.expr, value: ast.List, pad: str) -> list[str]:
-        if not isinstance(target, ast.Name):
-            raise self.source.refuse(target, "only a local array is made from a list: write self.X[i] = ...")
-        rows = [r.elts if isinstance(r, ast.List) else None for r in value.elts]
-        widths = {None if r is None else len(r) for r in rows}
-        if len(widths) != 1 or 0 in widths:
-            raise self.source.refuse(value, "an array is a list of numbers, or of lists of equal length")
-        (width,) = widths
-        shape: Shape = (len(rows),) if width is None else (len(rows), width)
+    def assign_local(self, target: ast.Name, value: ast.expr, pad: str) -> list[str]:
         name = target.id
-        if name in self.loops or name in self.arguments or self.locals.get(name, shape) != shape:
-            raise self.source.refuse(target, f"{name!r} is something else already")
-        cells = [(f"[{i}]", e) for i, e in enumerate(value.elts)]
-        if width is not None:
-            cells = [(f"[{i}][{j}]", e) for i, r in enumerate(rows) for j, e in enumerate(r or [])]
-        lines = [f"{pad}{local(name)}{i} = {self.expression(e)};" for i, e in cells]
-        self.locals[name] = shape
+        if name in self.loops:
+            raise self.refuse(target, f"the loop variable {name!r} is not assigned to")
+        if isinstance(value, ast.List):
+            found = self.literal(value)
+            self.bare.add(name)
+        else:
+            if isinstance(value, ast.Call) and (direct := self.direct(name, value, pad)) is not None:
+                return direct
+            seen = self.no_view(value, "assigned to a local")
+            self.views = self.views | {name} if seen else self.views - {name}
+            found = self.value(value)
+            if found.shape:
+                self.bare.discard(name)
+        known = self.arguments.get(name, self.locals.get(name, found.shape))
+        if known != found.shape or (found.shape and name in self.arguments):
+            raise self.refuse(target, f"{name!r} is something else already, {words(known)}")
+        if name not in self.arguments:
+            self.locals.setdefault(name, found.shape)
+        to = Place(local(name), "local", name, found.shape)
+        if found.shape and not found.aligned and f"local.{name}" in found.reads:
+            found = self.of_place(self.kept(found))
         self.assigned.add(name)
+        return self.store(to, found, pad)
+
+    def direct(self, name: str, e: ast.Call, pad: str) -> list[str] | None:
+        """``w = procedure(...)`` of an array: the procedure writes into the local itself."""
+        code = None if e.keywords else self.callee(e)
+        read = {n.id for n in ast.walk(e) if isinstance(n, ast.Name)}
+        if code is None or not gives_value(code.node) or name in read or name in self.arguments:
+            return None
+        procedure, args = self.invoke(e, code)
+        if not procedure.shape:
+            self.touched |= procedure.touched
+            self.locals.setdefault(name, ())
+            if self.locals[name]:
+                raise self.refuse(e, f"{name!r} is {words(self.locals[name])} already: take another name")
+            self.assigned.add(name)
+            return [f"{pad}{local(name)} = {procedure.name}({args});"]
+        if self.locals.setdefault(name, procedure.shape) != procedure.shape:
+            raise self.refuse(e, f"{name!r} is {words(self.locals[name])} already: take another name")
+        self.bare.discard(name)
+        self.assigned.add(name)
+        return [f"{pad}{procedure.name}({args}, {local(name)});"]
+
+    def no_view(self, value: ast.expr, what: str, even_inputs: bool = False) -> bool:
+        """Refuse an array that is handed on as it is: the same one in Python, a copy in C.
+
+        True for an input or a parameter, which does not change: a local that only reads it is the same in both.
+        """
+        if isinstance(value, ast.Name | ast.Attribute | ast.Subscript) and not (
+            isinstance(value, ast.Attribute) and value.attr == "T"
+        ):
+            before = len(self.pre), self.temporaries
+            at = self.place(value)
+            del self.pre[before[0] :]
+            self.temporaries = before[1]
+            if at.shape and not TEMPORARY.fullmatch(at.name):
+                fixed = at.kind == "self" and isinstance(self.declared.get(at.name), Parameter | Input)
+                if fixed and not even_inputs:
+                    return True
+                text = ast.unparse(value)
+                raise self.refuse(value, f"{text} is an array, {what} as it is: write vector({text}), a copy")
+        return False
+
+    def fitting(self, target: ast.expr, value: ast.expr, to: Place) -> Value:
+        found = self.literal(value) if isinstance(value, ast.List) else self.value(value)
+        if found.shape != to.shape:
+            text = ast.unparse(target)
+            raise self.refuse(target, f"{text} is {words(to.shape)}, what is assigned to it {words(found.shape)}")
+        if not found.aligned and f"{to.kind}.{to.name}" in found.reads:
+            found = self.of_place(self.kept(found))
+        return found
+
+    def store(self, to: Place, value: Value, pad: str) -> list[str]:
+        lines: list[str] = []
+        to = self.settled(to)
+        for i in cells(to.shape):
+            text, at = value.element(*i), to.at(*i)
+            if to.kind == "local":
+                lines.append(f"{pad}{at} = {text};")
+            elif self.dual:
+                lines.append(f"{pad}{{ dual r_ = {text}; self->{at} = r_.v; seed->{at} = r_.d; }}")
+            else:
+                lines.append(f"{pad}self->{at} = {text};")
         return lines
 
+    def may_write(self, name: str) -> bool:
+        if name.startswith("noise.") or (self.kind == PROCEDURE and self.gives):
+            return False
+        if name.startswith("der."):
+            return self.kind in ("flow", PROCEDURE)
+        decl = self.declared.get(name)
+        allowed = (Discrete, State, Output) if self.kind == PROCEDURE else WRITABLE[self.kind]
+        return isinstance(decl, allowed) and not isinstance(decl, Parameter)
+
+    def refuse_write(self, node: ast.AST, name: str, source: str) -> SubsetError:
+        text = f"{self.name}() does not write {source}"
+        if self.kind == PROCEDURE and self.gives:
+            return self.refuse(node, f"{text}: a procedure that returns a value writes nothing")
+        if isinstance(self.declared.get(name), Parameter | Input):
+            return self.refuse(node, f"{text}: parameters and inputs are only read; use a local or a Discrete")
+        return self.refuse(node, f"{text}: it writes {HINTS.get(self.kind, 'discretes and states')} only")
+
     def refusal(self, call: ast.Call, pad: str) -> list[str]:
-        if self.helper:
-            raise self.source.refuse(call, "a helper method does not refuse: do it in start, flow, outputs or a tick")
+        if self.gives or self.code.owner is None:
+            raise self.refuse(call, "a procedure that returns a value does not refuse: do it where it is called")
         if len(call.args) != 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
-            raise self.source.refuse(call, 'write self.refuse(condition, "message with {H}")')
+            raise self.refuse(call, 'write self.refuse(condition, "message with {H}")')
+        self.refuses = True
         message = call.args[1].value
-        names = re.findall(r"\{(\w+)\}", message)
+        if self.code.placed:
+            message = message.replace("{self}", self.code.placed.name)
+        names = [self.code.flat(n) for n in re.findall(r"\{(\w+)\}", message)]
         for n in names:
-            if n not in self.source.cls.declarations or self.source.cls.declarations[n].shape:
-                raise self.source.refuse(call, f"{{{n}}} is no scalar of this part")
+            if n not in self.declared or self.declared[n].shape:
+                raise self.refuse(call, f"{{{n}}} is no scalar of this part")
         text = re.sub(r"\{\w+\}", "%g", message.replace("%", "%%")).replace("\\", "\\\\").replace('"', '\\"')
         values = "".join(f"plain(self->{member(n)}), " for n in names)
         return [
@@ -176,17 +314,18 @@ class Method(Expressions):
         ]
 
     # --------------------------------------------------------------------------------- function
-    def function(self) -> str:
+    def text(self, name: str) -> tuple[str, str]:
+        """Return the C function under ``name``: its head and the whole."""
         number = "dual" if self.dual else "double"
         seed = ", Vars *seed" if self.dual else ""
-        if self.helper:
-            head = self.prototype()
-        else:
-            head = f"static inline void {self.name}{'_d' if self.dual else ''}(Part *part{seed})"
-        lines = self.body(self.node.body, 1) if self.node else []
+        lines = self.body(self.code.node.body, 1)
+        args = "".join(f", {number} {local(a)}{dimensions(s)}" for a, s in self.arguments.items())
+        args += f", {number} out_{dimensions(self.result)}" if self.result else ""
+        kind = number if self.gives and not self.result else "void"
+        head = f"static inline {kind} {name}(Part *part{seed}{args})"
         zero = "{0.0, 0.0}" if self.dual else "0.0"
         declared = [
-            f"    {number} {local(n)}{''.join(f'[{k}]' for k in shape)}{'' if shape else f' = {zero}'};"
+            f"    {number} {_c_name(n)}{dimensions(shape)}{'' if shape else f' = {zero}'};"
             for n, shape in self.locals.items()
         ]
         opening = ["    Vars *self = &part->n.v;"]
@@ -194,35 +333,93 @@ class Method(Expressions):
             opening.append("    (void)self;")
         if self.dual and not any("seed" in x for x in lines):
             opening.append("    (void)seed;")
-        return "\n".join([f"{head} {{", *opening, *declared, *lines, "}"])
-
-    def prototype(self) -> str:
-        """The head of a helper method; inline, for not every helper is used by both flow and outputs."""
-        number, seed, suffix = ("dual", ", Vars *seed", "_d") if self.dual else ("double", "", "_")
-        args = "".join(f", {number} {local(a)}" for a in self.arguments)
-        return f"static inline {number} {self.name}{suffix}(Part *part{seed}{args})"
+        return head, "\n".join([f"{head} {{", *opening, *declared, *lines, "}"])
 
 
-def method_names(source: Source) -> list[str]:
-    return ["start", "flow", "outputs", *(n for n, _ in source.cls.ticks)]
+def _c_name(name: str) -> str:
+    """Return the C name of a local; a temporary has its own."""
+    return name if TEMPORARY.fullmatch(name) else local(name)
 
 
-def equations(source: Source) -> str:
-    """Every method of the part as C, helpers first."""
-    out = []
-    heads = [Method(source, h, dual, ()).prototype() + ";" for h in source.helpers for dual in (False, True)]
-    if heads:
-        out.append("\n".join(heads))
-    for h in source.helpers:
-        out += [Method(source, h, False, ()).function(), Method(source, h, True, ()).function()]
-    for name in method_names(source):
-        writes = WRITABLE.get(name, (Discrete, State))
-        out.append(Method(source, name, False, writes).function())
-    for name in ("flow", "outputs"):
-        out.append(Method(source, name, True, WRITABLE[name]).function())
-    turns = []
-    for name, every in source.cls.ticks:
-        turn = f"    if (fmod(part->n.v.tick, {every}.0) == 0.0) {name}(part);"
-        turns.append(turn if every > 1 else f"    {name}(part);")
-    out.append("\n".join(["static inline void ticks(Part *part) {", *(turns or ["    (void)part;"]), "}"]))
-    return "\n\n".join(out)
+class Translation:
+    """All that a part computes, as C: ``text`` holds the functions, ``heads`` those that are declared before."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.heads: list[str] = []
+        self.functions: list[str] = []
+        self.procedures: dict[tuple[object, ...], Procedure] = {}
+        self.under_way: list[object] = []
+        self.written: set[str] = set()  # by the sampled methods
+        for kind in ("start", "flow", "outputs"):
+            self.equation(kind, False)
+        for kind in ("flow", "outputs"):
+            self.equation(kind, True)
+        self.sampled()
+        for code in source.uncalled():  # refused even where nothing calls them
+            if not code.arguments and all(code.function is not key[0] for key in self.procedures):
+                self.procedure(code, (), False, code.node, code)
+
+    def equation(self, kind: str, dual: bool) -> None:
+        """One kind of equation: the pieces, and where there are several, what calls them in turn."""
+        suffix = "_d" if dual else ""
+        pieces = self.source.equations[kind]
+        seed = ", Vars *seed" if dual else ""
+        args = "part, seed" if dual else "part"
+        if len(pieces) == 1 and pieces[0][1].placed is None:
+            self.functions.append(Method(self, pieces[0][1], dual, kind).text(kind + suffix)[1])
+            return
+        calls = []
+        for piece, code in pieces:
+            method = Method(self, code, dual, kind)
+            name = f"{code.placed.name if code.placed else piece.owner.__name__}_{kind}{suffix}"
+            where = f"{code.placed.name}: {type(code.placed.block).__name__}" if code.placed else piece.owner.__name__
+            self.functions.append(f"/* {where} */\n{method.text(name)[1]}")
+            calls.append(f"    {name}({args});")
+            calls += ["    if (part->failed) return;"] * method.refuses
+        unused = ["    (void)part;", *(["    (void)seed;"] * dual)] if not calls else []
+        head = f"static inline void {kind}{suffix}(Part *part{seed})"
+        self.functions.append("\n".join([f"{head} {{", *unused, *calls, "}"]))
+
+    def sampled(self) -> None:
+        turns = []
+        for piece, code in self.source.equations["sampled"]:
+            method = Method(self, code, False, "sampled")
+            bases = sum(c.node.name == code.node.name for _, c in self.source.equations["sampled"]) > 1
+            owner = code.placed.name if code.placed else piece.owner.__name__ if bases else ""
+            name = f"{owner}_{code.node.name}" if owner else code.node.name
+            self.functions.append(method.text(name)[1])
+            self.written |= method.touched
+            call = f"{name}(part);"
+            if piece.every > 1:
+                call = f"if (fmod(part->n.v.tick, {piece.every}.0) == 0.0) {call}"
+            turns.append(f"    {call}")
+            turns += ["    if (part->failed) return;"] * method.refuses
+        self.functions.append(
+            "\n".join(["static inline void ticks(Part *part) {", *(turns or ["    (void)part;"]), "}"])
+        )
+
+    def procedure(self, code: Code, shapes: tuple[Shape, ...], dual: bool, node: ast.AST, caller: Code) -> Procedure:
+        """Return a procedure for arguments of these shapes, translated where it is not yet."""
+        key = (code.function, code.placed.name if code.placed else "", shapes, dual)
+        if key in self.procedures:
+            return self.procedures[key]
+        if key in self.under_way:
+            raise caller.refuse(node, f"{code.node.name} calls itself: equations have no recursion")
+        self.under_way.append(key)
+        name = f"{code.placed.name}_{code.node.name}" if code.placed else code.node.name
+        name += "_d" if dual else "_"
+        same = sum(p.name.rstrip("0123456789") == name for p in self.procedures.values())
+        name += str(same + 1) if same else ""
+        method = Method(self, code, dual, PROCEDURE, shapes)
+        head, text = method.text(name)
+        self.under_way.pop()
+        self.heads.append(head + ";")
+        self.functions.append(text)
+        found = Procedure(name, method.result if method.gives else None, method.touched, method.refuses)
+        self.procedures[key] = found
+        return found
+
+    @property
+    def text(self) -> str:
+        return "\n\n".join((["\n".join(self.heads)] if self.heads else []) + self.functions)

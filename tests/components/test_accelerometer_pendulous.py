@@ -203,13 +203,13 @@ def test_random_bias():
     first, constant = [], []
     for seed in range(1000):
         part = started(k0=0.0, markov=1e-4, seed=seed)
-        first.append(part.wander)
+        first.append(part.markov_value)
         part = settled([0.0, 0.0, 0.0], 0.3, k0=0.0, turn_on=3e-4, seed=seed) if seed < 300 else part
         constant.append(part.scale * part.i)
     assert np.std(first) == pytest.approx(1e-4, rel=5 / math.sqrt(2000))
     assert np.std(constant[:300]) == pytest.approx(3e-4, rel=5 / math.sqrt(600))
     part = started(k0=0.0, markov=2e-4, markov_tau=1.0, step=1.0)
-    x = record(part, 16_000, 0.1, "wander")
+    x = record(part, 16_000, 0.1, "markov_value")
     independent = 1600.0 / 2.0
     assert x.var() == pytest.approx(4e-8, rel=5 * math.sqrt(2 / independent))
     assert np.mean(x[10:] * x[:-10]) / 4e-8 == pytest.approx(math.exp(-1.0), abs=5 * math.sqrt(2 / independent))
@@ -220,7 +220,7 @@ def test_random_bias():
     "parameters, message",
     [
         ({"K_i": 400.0}, r"the rebalance is unstable: .* K_p = 0.3, K_i = 400"),
-        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is no rotation"),
+        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is not a rotation matrix"),
         ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
         ({"scale": 0.0}, "scale = 0 m/s2/A must be > 0"),
         ({"k1": -1.0}, "k1 = -1 1 must be > 0"),

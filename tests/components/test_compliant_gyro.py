@@ -210,7 +210,7 @@ def test_noise_density_does_not_depend_on_the_step(port, name, h):
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is no rotation"),
+        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is not a rotation matrix"),
         ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
         ({"K_I": 0.0}, "K_I = 0 N.m/rad must be > 0"),
         ({"K_O": -1.0}, "K_O = -1 N.m/rad must be > 0"),

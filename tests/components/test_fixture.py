@@ -200,7 +200,7 @@ def test_refuses_a_mount_that_is_none(mount):
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is not a rotation matrix"),
         ({"base": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "base is left-handed"),
         ({"mounts": [[1, 2]] * 48 + [[2, -2]]}, "mounts: x and y of a mount must be two directions at right angles"),
         ({"mounts": [[1, 2]] * 48 + [[2, 4]]}, "mounts: x and y of a mount"),

@@ -350,7 +350,7 @@ def test_term_sets(channel, second):
         ({"terms_y": 11}, "terms_y = 11 is no static model of a channel"),
         ({"J_x": 1e-4}, "J_x = 0.0001 and J_y = 0 kg.m2: give both"),
         ({"C_y": 1e-4}, "C_x and C_y must be 0 without nutation"),
-        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is no rotation"),
+        ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is not a rotation matrix"),
         ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
         ({"H": 0.0}, "H = 0 N.m.s must be > 0"),
         ({"J_x": -1.0}, "J_x = -1 kg.m2 must be >= 0"),

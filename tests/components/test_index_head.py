@@ -132,7 +132,7 @@ def test_frames_are_those_of_table_rate():
     like = TableRate(base=base, tilt=tilt, angle0=part.angle)
     like.face, like.omega_local, like.f_local = face, earth, f
     like.initialize()
-    like.x, like.v, like.a = part.angle, part.rate, part.a
+    like.motion_x, like.motion_v, like.motion_a = part.angle, part.rate, part.a
     like.outputs()
     assert part.rate > 0.1
     for name in ("omega", "alpha", "f"):
@@ -164,7 +164,7 @@ def test_eight_positions_by_the_sequencer():
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is not a rotation matrix"),
         ({"base": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "base is left-handed"),
         ({"positions": 25}, "positions = 25 1 must be <= 24"),
         ({"error": [0.2] + [0.0] * 23}, r"error\[1\] = 0.2 rad must be <= 0.1"),

@@ -160,7 +160,7 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
         ({**OK, "window": 0.0}, "phase 2: the window must be above 0"),
         ({**OK, "window": 1.1}, "phase 2: the window is longer than the dwell"),
         ({**RATE, "window": 6.1}, "phase 2: the window is longer than the dwell"),
-        ({**OK, "face": 3}, "phase 2: face 3 is no rotation"),
+        ({**OK, "face": 3}, "phase 2: face 3 is not a rotation matrix"),
         ({**OK, "face": 4}, "phase 2: face 4 is left-handed"),
     ],
 )

@@ -112,11 +112,11 @@ def test_moves_against_a_tight_reference():
     for target in (1.0, -0.04, 3.3):
         part = started(mode=1.0, target=target, acceleration=0.3, index_rate=0.2)
         track = run(part, 25.0)
-        corners = part.t_s[1:]
+        corners = part.motion_t_s[1:]
         y = [0.0, 0.0]
         edges = [corners[0], *corners[1:], 25.0]
         reference = {}
-        for a, (t0, t1) in zip([*part.a_s[1:]], itertools.pairwise(edges), strict=True):
+        for a, (t0, t1) in zip([*part.motion_a_s[1:]], itertools.pairwise(edges), strict=True):
             if t1 <= t0:
                 continue
             inside = track[(track[:, 0] > t0) & (track[:, 0] <= t1), 0]
@@ -199,7 +199,7 @@ def test_alpha_is_the_derivative_of_omega():
     rate, alpha = np.array(rate), np.array(alpha)
     slope = (rate[2:] - rate[:-2]) / (2 * h)
     error = abs(slope - alpha[1:-1]).max(axis=1)
-    corners = [c / h for c in part.t_s]
+    corners = [c / h for c in part.motion_t_s]
     smooth = [all(abs(k + 2 - c) > 2 for c in corners) for k in range(len(error))]
     assert error[smooth].max() < 1e-6
     assert abs(alpha).max() > 0.4
@@ -218,7 +218,7 @@ def test_gravity_turns_the_right_way():
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is not a rotation matrix"),
         ({"base": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "base is left-handed"),
         ({"acceleration": 0.0}, "acceleration = 0 rad/s2 must be > 0"),
         ({"index_rate": 0.0}, "index_rate = 0 rad/s must be > 0"),

@@ -219,7 +219,7 @@ def test_alpha_is_the_derivative_of_omega():
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is not a rotation matrix"),
         ({"base": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "base is left-handed"),
         ({"J": 0.0}, "J = 0 kg.m2 must be > 0"),
         ({"H_g": -0.2}, "H_g = -0.2 N.m.s must be > 0"),

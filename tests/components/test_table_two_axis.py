@@ -131,7 +131,7 @@ def test_omega_and_alpha_are_derivatives(errors):
         w_all.append(list(turning.omega))
         alpha.append(list(turning.alpha))
     c, w, w_all, alpha = (np.array(z) for z in (c, w, w_all, alpha))
-    corners = [t / h for row in still.t_s for t in row]
+    corners = [t / h for row in (still.outer_t_s, still.inner_t_s) for t in row]
     smooth = np.array([all(abs(k + 2 - t) > 2 for t in corners) for k in range(len(c) - 2)])
     rate = (c[2:] - c[:-2]) / (2.0 * h) @ c[1:-1].transpose(0, 2, 1)
     found = np.stack([rate[:, 1, 2], rate[:, 2, 0], rate[:, 0, 1]], axis=1)  # -[w x] has w_x at (y, z)
@@ -193,7 +193,7 @@ def test_inner_axis_stops_at_its_limit():
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is no rotation"),
+        ({"base": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "base is not a rotation matrix"),
         ({"base": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "base is left-handed"),
         ({"acceleration": [0.1, 0.0]}, r"acceleration\[2\] = 0 rad/s2 must be > 0"),
         ({"limits_y": [1.0, -1.0]}, "limits_y: the lower must be below the upper"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +17,9 @@ from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component, ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
+from gyrobench.packaging.dependencies import reached
 from gyrobench.packaging.reference import read_reference
+from gyrobench.packaging.source import Source
 
 SIZES = {"rad/s": 1e-3, "rad": 1e-3, "A": 1e-3, "V": 1e-3}
 
@@ -48,12 +49,16 @@ class Traced:
     __hash__ = None  # type: ignore[assignment]
 
 
+def _applied(f: Callable[..., Any], a: Traced, b: Any) -> Traced:
+    return Traced(f(a.sx, Traced.of(b).sx), f(a.v, Traced.of(b).v))
+
+
 def _operators() -> None:
     import operator
 
     for name in ("add", "sub", "mul", "truediv"):
         f = getattr(operator, name)
-        setattr(Traced, f"__{name}__", lambda a, b, f=f: Traced(f(a.sx, Traced.of(b).sx), f(a.v, Traced.of(b).v)))
+        setattr(Traced, f"__{name}__", lambda a, b, f=f: NotImplemented if isinstance(b, list) else _applied(f, a, b))
         setattr(Traced, f"__r{name}__", lambda a, b, f=f: Traced(f(Traced.of(b).sx, a.sx), f(Traced.of(b).v, a.v)))
     for name in ("lt", "le", "gt", "ge", "eq", "ne"):
         f = getattr(operator, name)
@@ -79,10 +84,12 @@ def traced(name: str) -> Callable[..., Traced]:
 
 def trace(part: Component, monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, list[str]]:
     """d(state derivatives, outputs) / d(parameters, inputs, states), by CasADi at the part's present point."""
-    module = sys.modules[type(part).__module__]
-    for name in gyrobench.component.math.FUNCTIONS:
-        if hasattr(module, name):
-            monkeypatch.setattr(module, name, traced(name))
+    source = Source(type(part))
+    codes = [c for k in ("flow", "outputs") for _, code in source.equations[k] for c in reached(code, source)]
+    for names in {id(c.function.__globals__): c.function.__globals__ for c in codes}.values():
+        for name in gyrobench.component.math.FUNCTIONS:
+            if name in names:
+                monkeypatch.setitem(names, name, traced(name))
     real = [s for s in part.layout if s.section in ("parameter", "input", "state") and s.decl.type is float]
     symbols = casadi.SX.sym("z", len(real))
     twin = copy.deepcopy(part)

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from gyrobench.packaging import load_part
-from gyrobench.packaging.source import Source, followed
+from gyrobench.packaging.dependencies import followed
+from gyrobench.packaging.source import Source
 
 OUT = ["f[1]", "f[2]", "f[3]"]
 

@@ -12,8 +12,9 @@ from toybench import HEAD, TOYS
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.packaging import SubsetError, compiler, load_part, native_target
+from gyrobench.packaging.dependencies import dependencies
 from gyrobench.packaging.instance import make
-from gyrobench.packaging.source import Source, dependencies
+from gyrobench.packaging.source import Source
 
 Written = Callable[[str, str], type[Component]]
 
@@ -31,6 +32,9 @@ DECLARED = """\
     def rate(self, a, b):
         return a * b
 
+    def store(self, a):
+        self.q = a
+
     def flow(self):
         self.der.x = -self.x
 
@@ -42,7 +46,10 @@ REFUSED = {
     "self.y = self.x ** 2": "write x * x",
     "self.y **= 2.0": "write x * x",
     "while self.x > 0:\n    self.y = 1.0": "no while: write `for k in range(n)`",
-    "a = self.u[0:1]": "no slices: write a for loop",
+    "a = self.u[0:1]\na[0] = 1.0": "the elements of 'a' are only read: copy it by vector()",
+    "self.y = self.u[0:3]": "the slice self.u[0:3]: self.u has the elements 0 to 1",
+    "self.y = self.u[self.w:2]": "an index is a loop variable",
+    "self.y = self.u[0:2:1]": "must be [a:b] with whole numbers that are fixed",
     "self.y = foo": "unknown name 'foo'",
     "self.p = 1.0": "parameters and inputs are only read; use a local or a Discrete",
     "self.u[0] = 1.0": "outputs() does not write self.u[0]",
@@ -63,7 +70,28 @@ REFUSED = {
     "self.y = self.x % 2.0": "write x - y * floor(x / y)",
     "print(self.x)": "`print(self.x)` is outside the subset",
     "self.y = self.u": "self.u is an array (2): take one element",
-    "a = self.m[0]": "self.m[0] is an array (2)",
+    "a = self.z": "self.z is an array, assigned to a local as it is: write vector(self.z), a copy",
+    "a = vector(self.u)\nb = a": "write vector(a), a copy",
+    "self.z = self.m": "self.z is an array (2), what is assigned to it an array (2 x 2)",
+    "self.z = self.x": "self.z is an array (2), what is assigned to it a number",
+    "self.y = self.u + self.u": "self.u + self.u is an array (2): take one element",
+    "self.z = self.u + self.w": "an array (2) and a number are not added",
+    "self.z = self.u * self.u": "write @, dot or cross, or a for loop",
+    "self.z = 1.0 / self.u": "only a number divides",
+    "self.z = self.m @ self.w": "self.w is a number: a vector or a matrix is needed here",
+    "self.z = vector([1.0, 2.0, 3.0]) @ self.m": "an array (3) and an array (2 x 2) do not fit",
+    "self.y = dot(self.u, self.m)": "two vectors of one length",
+    "self.z = cross(self.u, self.u)": "two vectors of three",
+    "self.z = self.u.T": "only a matrix is transposed",
+    "a = [1.0, 2.0]\nself.z = a + self.u": "a is a list: write a = vector([...])",
+    "self.z = a": "unknown name 'a'",
+    "self.y = vector(self.x)": "self.x is a number: write vector([...])",
+    "self.z = self.u if self.x > 0.0 else self.w": "both must be of one shape",
+    "self.z = self.u if self.x > 0.0 else (self.m @ self.u) @ self.m": "an array is computed in one branch only",
+    "self.rate(1.0, 2.0)": "self.rate returns a value: assign it",
+    "self.y = self.store(1.0)": "self.store returns nothing: call it on a line of its own",
+    "self.store(1.0)": "outputs() does not write self.store: it writes outputs only",
+    "self.y = outside(1.0)": "'outside' is not callable in equations",
     "self.y = self.m[0, 1]": "write self.m[i][j]",
     "self.y = self.x[0]": "self.x is a number",
     "self.y = self.u[2]": "self.u has the elements 0 to 1",
@@ -76,13 +104,12 @@ REFUSED = {
     "self.y = self.foo": "self.foo is not declared in Toy",
     "a = [1.0, 2.0]\nself.y = a[2]": "a has the elements 0 to 1",
     "a = [[1.0, 2.0], [3.0]]": "lists of equal length",
-    "self.z = [1.0, 2.0]": "write self.X[i] = ...",
     "a = 1.0\na = [1.0, 2.0]": "'a' is something else already",
     "if self.x > 0.0:\n    a = 1.0\nself.y = a": "'a' is not assigned on every path",
     "for k in range(2):\n    pass\nself.y = k": "unknown name 'k'",
     "self.y = sin(self.x, self.x)": "sin takes 1 argument, not 2",
     "self.y = self.rate(self.x)": "self.rate takes 2 arguments, not 1",
-    "self.y = self.start()": "self.start is no helper method",
+    "self.y = self.start()": "self.start is no procedure of this part",
     "self.y = self.x and self.w": "write 1.0 if self.x and self.w else 0.0",
     "self.y = 1e400": "is not finite",
     "return 1.0": "outputs returns nothing",

@@ -1,0 +1,82 @@
+"""Vectors and matrices of fixed shape: the values of the language that have elements.
+
+A matrix is a vector of rows.  Products are summed from left to right, first product first, in every target:
+``(a[0] b[0] + a[1] b[1]) + a[2] b[2]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+class Vector(list[Any]):
+    """A list with the arithmetic of the language: + - of equal shapes, * / by a number, @, .T, slices."""
+
+    __slots__ = ()
+
+    def __add__(self, o: Any) -> Any:
+        return Vector([a + b for a, b in zip(self, o, strict=True)])
+
+    def __radd__(self, o: Any) -> Any:
+        return Vector([b + a for a, b in zip(self, o, strict=True)])
+
+    def __sub__(self, o: Any) -> Vector:
+        return Vector([a - b for a, b in zip(self, o, strict=True)])
+
+    def __rsub__(self, o: Any) -> Vector:
+        return Vector([b - a for a, b in zip(self, o, strict=True)])
+
+    def __mul__(self, x: Any) -> Any:
+        return Vector([a * x for a in self])
+
+    def __rmul__(self, x: Any) -> Any:
+        return Vector([x * a for a in self])
+
+    def __truediv__(self, x: Any) -> Vector:
+        return Vector([a / x for a in self])
+
+    def __neg__(self) -> Vector:
+        return Vector([-a for a in self])
+
+    def __pos__(self) -> Vector:
+        return self
+
+    def __matmul__(self, o: Any) -> Any:
+        if isinstance(self[0], list):
+            return Vector([row @ o for row in self])
+        if isinstance(o[0], list):
+            return Vector([dot(self, column) for column in o.T])
+        return dot(self, o)
+
+    @property
+    def T(self) -> Vector:
+        """The transpose of a matrix."""
+        return Vector([Vector(column) for column in zip(*self, strict=True)])
+
+    def __getitem__(self, k: Any) -> Any:
+        found = list.__getitem__(self, k)
+        return Vector(found) if isinstance(k, slice) else found
+
+
+def copied(x: Any) -> Any:
+    """Return a number, or a copy of an array."""
+    return Vector([copied(e) for e in x]) if isinstance(x, list | tuple) else x
+
+
+def vector(x: Sequence[Any]) -> Vector:
+    """Return a new vector, or matrix, with the elements of a list or of another one: a copy."""
+    return Vector([copied(e) for e in x])
+
+
+def dot(a: Any, b: Any) -> Any:
+    """Return the scalar product of two vectors of one length."""
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def cross(a: Any, b: Any) -> Vector:
+    """Return the vector product of two vectors of three."""
+    return Vector([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

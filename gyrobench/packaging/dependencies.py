@@ -1,0 +1,171 @@
+"""What the outputs of a part depend on, without delay: read from the syntax trees, along all that is called."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from typing import TypeAlias
+
+from gyrobench.component import Discrete, Input, Output, State
+from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
+from gyrobench.packaging.source import Code, Source
+
+Reach: TypeAlias = dict[str, set[str]]  # variable -> the inputs it follows
+
+
+def called(e: ast.AST, code: Code, source: Source) -> Code | None:
+    """Return the procedure or function that an expression calls; None where it calls none of the part's."""
+    if not isinstance(e, ast.Call):
+        return None
+    if isinstance(e.func, ast.Name):
+        language = e.func.id in FUNCTIONS or e.func.id in ARRAY_FUNCTIONS
+        return None if language else source.function(e.func.id, code)
+    if isinstance(e.func, ast.Attribute):
+        of = ast.unparse(e.func.value)
+        if of == "self":
+            return source.method(e.func.attr, code)
+        if of.startswith("self."):
+            return source.block_method(of.removeprefix("self."), e.func.attr, code)
+    return None
+
+
+class Dependencies:
+    """Which inputs (declared names) the variables written by one kind of equation follow."""
+
+    def __init__(self, source: Source, kind: str) -> None:
+        self.source = source
+        self.inputs = {n for n, d in source.cls.declarations.items() if isinstance(d, Input)}
+        self.reach: Reach = {}
+        before: Reach | None = None
+        while before != self.reach:  # until nothing changes: loops carry values from one turn to the next
+            before = {k: set(v) for k, v in self.reach.items()}
+            for _, code in source.equations[kind]:
+                self.run(code.node.body, code, {}, set())
+
+    def read(self, e: ast.AST, code: Code, locals_: Reach) -> set[str]:
+        """Return the inputs that an expression follows."""
+        if isinstance(e, ast.Name):
+            return set(locals_.get(e.id, set()))
+        if isinstance(e, ast.Attribute):
+            name = flat_name(e, code)
+            if name is not None:
+                return self.reach.get(name, set()) | ({name} & self.inputs)
+        found: set[str] = set()
+        callee = called(e, code, self.source)
+        if callee is not None:
+            assert isinstance(e, ast.Call)
+            args = [self.read(a, code, locals_) for a in e.args]
+            inner = dict(zip(callee.arguments, args, strict=False))
+            return found.union(*args, self.run(callee.node.body, callee, inner, set()))
+        for child in ast.iter_child_nodes(e):
+            found |= self.read(child, code, locals_)
+        return found
+
+    def run(self, statements: Iterable[ast.stmt], code: Code, locals_: Reach, under: set[str]) -> set[str]:
+        """Follow statements; return what the values they return follow.  under: what decides whether they run."""
+        under, given = set(under), set()
+        for s in statements:
+            if isinstance(s, ast.Assign | ast.AugAssign | ast.AnnAssign) and s.value is not None:
+                target = s.targets[0] if isinstance(s, ast.Assign) else s.target
+                base = target
+                while isinstance(base, ast.Subscript):
+                    base = base.value
+                follows = self.read(s.value, code, locals_) | self.read(target, code, locals_) | under
+                name = flat_name(base, code)
+                where = self.reach if name is not None else locals_
+                where.setdefault(name if name is not None else ast.unparse(base), set()).update(follows)
+            elif isinstance(s, ast.Expr):
+                self.read(s.value, code, locals_)  # a procedure: what it writes
+                callee = called(s.value, code, self.source)
+                if callee is not None and under:
+                    for name in written_names(callee, self.source):
+                        self.reach.setdefault(name, set()).update(under)
+            elif isinstance(s, ast.Return):
+                given |= under | (self.read(s.value, code, locals_) if s.value is not None else set())
+            elif isinstance(s, ast.If):
+                test = self.read(s.test, code, locals_)
+                given |= self.run(s.body, code, locals_, under | test)
+                given |= self.run(s.orelse, code, locals_, under | test)
+                if any(isinstance(n, ast.Return) for n in ast.walk(s)):
+                    under |= test  # what follows runs or does not
+            elif isinstance(s, ast.For):
+                given |= self.run(s.body, code, locals_, under | self.read(s.iter, code, locals_))
+        return given
+
+
+def flat_name(e: ast.AST, code: Code) -> str | None:
+    """Return the part's name of ``self.X``, ``self.der.X``, ``self.noise.X`` or ``self.block.X``; None otherwise."""
+    if not isinstance(e, ast.Attribute):
+        return None
+    of = ast.unparse(e.value)
+    if of == "self":
+        return code.flat(e.attr)
+    if of in ("self.der", "self.noise"):
+        return f"{of.removeprefix('self.')}.{code.flat(e.attr)}"
+    return f"{code.flat(of.removeprefix('self.'))}_{e.attr}" if of.startswith("self.") else None
+
+
+def reached(code: Code, source: Source) -> Iterator[Code]:
+    """Yield a piece of code and all that it calls."""
+    seen: list[Code] = [code]
+    for c in seen:
+        yield c
+        for n in c.nodes():
+            callee = called(n, c, source)
+            if callee is not None and all(
+                callee.function is not s.function or callee.placed is not s.placed for s in seen
+            ):
+                seen.append(callee)
+
+
+def read_names(code: Code, source: Source) -> set[str]:
+    """Return every variable that is named in a piece of code and in what it calls."""
+    return {name for c in reached(code, source) for n in c.nodes() if (name := flat_name(n, c)) is not None}
+
+
+def written_names(code: Code, source: Source) -> set[str]:
+    """Return every variable that a piece of code, or what it calls, writes."""
+    names: set[str] = set()
+    for c in reached(code, source):
+        for n in c.nodes():
+            if isinstance(n, ast.Assign | ast.AugAssign | ast.AnnAssign):
+                base: ast.AST = n.targets[0] if isinstance(n, ast.Assign) else n.target
+                while isinstance(base, ast.Subscript):
+                    base = base.value
+                name = flat_name(base, c)
+                if name is not None:
+                    names.add(name)
+    return names
+
+
+def dependencies(source: Source, kind: str = "outputs") -> dict[str, set[str]]:
+    """Return output (declared name) -> the inputs that it follows without delay."""
+    reach = Dependencies(source, kind).reach
+    return {n: reach.get(n, set()) for n, d in source.cls.declarations.items() if isinstance(d, Output)}
+
+
+def written(source: Source) -> set[str]:
+    """Return the discretes that a sampled method writes; the others keep what ``start`` gave them."""
+    names: set[str] = set()
+    for _, code in source.equations["sampled"]:
+        names |= written_names(code, source)
+    return {n for n in names if isinstance(source.cls.declarations.get(n), Discrete)}
+
+
+def followed(source: Source) -> list[str] | None:
+    """Return the inputs and changing discretes that ``outputs`` reads, discretes first.
+
+    None where it reads states, noise or time, with which it changes at every step, and where it is too short (no loop,
+    no product of arrays) to be worth looking.
+    """
+    codes = [c for _, code in source.equations["outputs"] for c in reached(code, source)]
+    if not any(isinstance(n, ast.For | ast.MatMult) for c in codes for n in c.nodes()):
+        return None
+    read = set().union(*(read_names(code, source) for _, code in source.equations["outputs"]))
+    declared = source.cls.declarations
+    if any(n in ("t", "h") or n.startswith(("der.", "noise.")) or isinstance(declared.get(n), State) for n in read):
+        return None
+    changing = written(source)
+    return [n for n in declared if n in read & changing] + [
+        n for n in declared if n in read and isinstance(declared[n], Input)
+    ]
