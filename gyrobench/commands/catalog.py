@@ -12,10 +12,11 @@ from typing import Any
 from gyrobench.bench import ROOMS, Bench, BenchError, nearest
 
 
-def _class_text(file: Path, base: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
-    """(first sentence of the docstring, literal class attributes) of the one class derived from one of ``base``."""
+def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
+    """Return (docstring, literal class attributes) of the class that a file is about: its last one with a docstring."""
+    found: tuple[str, dict[str, Any]] = ("", {})
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ClassDef) and any(ast.unparse(b).endswith(base) for b in node.bases):
+        if isinstance(node, ast.ClassDef) and node.bases and (doc := ast.get_docstring(node)):
             attributes: dict[str, Any] = {}
             for s in node.body:
                 if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name):
@@ -23,13 +24,12 @@ def _class_text(file: Path, base: tuple[str, ...]) -> tuple[str, dict[str, Any]]
                         attributes[s.targets[0].id] = ast.literal_eval(s.value)
                     except ValueError:
                         continue
-            doc = ast.get_docstring(node) or ""
-            return doc, attributes
-    return "", {}
+            found = doc, attributes
+    return found
 
 
-def _entry(name: str, file: Path, *base: str) -> dict[str, Any]:
-    doc, attributes = _class_text(file, base)
+def _entry(name: str, file: Path) -> dict[str, Any]:
+    doc, attributes = _class_text(file)
     first = doc.splitlines()[0] if doc else ""
     marks = re.search(r"\[([A-Z][A-Z0-9-]+(?:[,;] *[A-Z][A-Z0-9-]+)*)", first)
     spec = list(attributes.get("spec", ())) or (re.split(r"[,;] *", marks.group(1)) if marks else [])
@@ -49,8 +49,8 @@ def listing(bench: Bench) -> dict[str, list[dict[str, Any]]]:
     from gyrobench.system.sockets import SOCKETS
 
     return {
-        "parts": [_entry(n, f / "model.py", "Component") for n, f in bench.parts().items()],
-        "systems": [_entry(n, f / "system.py", "System", "Suite") for n, f in bench.systems().items()],
+        "parts": [_entry(n, f / "model.py") for n, f in bench.parts().items()],
+        "systems": [_entry(n, f / "system.py") for n, f in bench.systems().items()],
         "sockets": [{"name": s.name, "what": s.meaning} for s in SOCKETS.values()],
         "specifications": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.specifications().items()],
     }
