@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.math import cos, floor, index, log, pi, sin, sqrt
+from gyrobench.component.math import Number, Vector, cos, floor, index, log, pi, sin, sqrt, vector
 
 DEG = pi / 180.0
 LINES = 8  # sines of a preset, for each angle and for the heave
@@ -124,32 +124,25 @@ class BaseMotion(Component):
                 if self.profile_t[k] <= self.t:
                     self.piece = k
 
-    def slope(self, k, i):
-        """Of the parabola through point k and its neighbours; 0 at both ends."""
-        found = 0.0
-        if k > 0.0 and k < self.points - 1.0:
-            before = self.profile_t[index(k)] - self.profile_t[index(k - 1.0)]
-            after = self.profile_t[index(k + 1.0)] - self.profile_t[index(k)]
-            left = (self.profile[index(k)][index(i)] - self.profile[index(k - 1.0)][index(i)]) / before
-            right = (self.profile[index(k + 1.0)][index(i)] - self.profile[index(k)][index(i)]) / after
-            found = (left * after + right * before) / (before + after)
-        return found
+    def parabola(self, k: Number) -> Vector:
+        """Return slope and curvature (rows) of the parabolas through point k and its neighbours; 0 at both ends."""
+        if k <= 0.0 or k >= self.points - 1.0:
+            return vector([vector(ZEROS), vector(ZEROS)])
+        before = self.profile_t[index(k)] - self.profile_t[index(k - 1.0)]
+        after = self.profile_t[index(k + 1.0)] - self.profile_t[index(k)]
+        left = (self.profile[index(k)] - self.profile[index(k - 1.0)]) / before
+        right = (self.profile[index(k + 1.0)] - self.profile[index(k)]) / after
+        return vector([(left * after + right * before) / (before + after), 2.0 * (right - left) / (before + after)])
 
-    def curvature(self, k, i):
-        """Second derivative of the same parabola; 0 at both ends."""
-        found = 0.0
-        if k > 0.0 and k < self.points - 1.0:
-            before = self.profile_t[index(k)] - self.profile_t[index(k - 1.0)]
-            after = self.profile_t[index(k + 1.0)] - self.profile_t[index(k)]
-            left = (self.profile[index(k)][index(i)] - self.profile[index(k - 1.0)][index(i)]) / before
-            right = (self.profile[index(k + 1.0)][index(i)] - self.profile[index(k)][index(i)]) / after
-            found = 2.0 * (right - left) / (before + after)
-        return found
+    def wave(self, amplitude: Number, rate: Number, phase: Number) -> Vector:
+        """Return a sine at the present instant and its two derivatives."""
+        s = amplitude * sin(rate * self.t + phase)
+        return vector([s, rate * (amplitude * cos(rate * self.t + phase)), -(rate * rate * s)])
 
     def outputs(self) -> None:
-        q = [0.0, 0.0, 0.0]  # pitch, roll, heading; rates; accelerations
-        v = [0.0, 0.0, 0.0]
-        a = [0.0, 0.0, 0.0]
+        q = vector(ZEROS)  # pitch, roll, heading; rates; accelerations
+        v = vector(ZEROS)
+        a = vector(ZEROS)
         w = 1.0  # onset, and its derivatives
         wv = 0.0
         wa = 0.0
@@ -160,55 +153,40 @@ class BaseMotion(Component):
             wa = 0.5 * turn * turn * cos(turn * self.t)
         heave = 0.0
         for i in range(3):
-            y = 0.0
-            yv = 0.0
-            ya = 0.0
+            y = vector(ZEROS)  # sum of the sines and its derivatives
             if self.own > 0.0:
                 for k in range(4):
-                    rate = 2.0 * pi * self.frequency[i][k]
-                    s = self.amplitude[i][k] * sin(rate * self.t + self.phase[i][k])
-                    c = self.amplitude[i][k] * cos(rate * self.t + self.phase[i][k])
-                    y = y + s
-                    yv = yv + rate * c
-                    ya = ya - rate * rate * s
+                    y = y + self.wave(self.amplitude[i][k], 2.0 * pi * self.frequency[i][k], self.phase[i][k])
             if self.lines > 0.0:
                 for k in range(LINES):
-                    rate = self.line_w[i][k]
-                    s = self.line_a[i][k] * sin(rate * self.t + self.line_p[i][k])
-                    c = self.line_a[i][k] * cos(rate * self.t + self.line_p[i][k])
-                    y = y + s
-                    yv = yv + rate * c
-                    ya = ya - rate * rate * s
-            q[i] = self.motion_angle[i] + w * y
-            v[i] = self.motion_rate[i] + wv * y + w * yv
-            a[i] = self.motion_acceleration[i] + wa * y + 2.0 * wv * yv + w * ya
+                    y = y + self.wave(self.line_a[i][k], self.line_w[i][k], self.line_p[i][k])
+            q[i] = self.motion_angle[i] + w * y[0]
+            v[i] = self.motion_rate[i] + wv * y[0] + w * y[1]
+            a[i] = self.motion_acceleration[i] + wa * y[0] + 2.0 * wv * y[1] + w * y[2]
         if self.lines > 0.0:
             for k in range(LINES):
                 heave = heave + w * self.line_a[3][k] * sin(self.line_w[3][k] * self.t + self.line_p[3][k])
         if self.preset == PROFILE:
             if self.piece < 0.0 or self.piece >= self.points - 1.0:
                 end = self.piece if self.piece >= 0.0 else 0.0
-                for i in range(3):
-                    q[i] = q[i] + self.scale * self.profile[index(end)][i]
-            else:
+                q = q + self.scale * self.profile[index(end)]
+            else:  # quintic between two points, of their slopes and curvatures
                 d = self.profile_t[index(self.piece + 1.0)] - self.profile_t[index(self.piece)]
                 x = (self.t - self.profile_t[index(self.piece)]) / d
-                for i in range(3):
-                    p0 = self.profile[index(self.piece)][i]
-                    p1 = self.slope(self.piece, i) * d
-                    p2 = 0.5 * self.curvature(self.piece, i) * d * d
-                    rise = self.profile[index(self.piece + 1.0)][i] - p0 - p1 - p2
-                    bend = self.slope(self.piece + 1.0, i) * d - p1 - 2.0 * p2
-                    kink = 0.5 * self.curvature(self.piece + 1.0, i) * d * d - p2
-                    p3 = 10.0 * rise - 4.0 * bend + kink
-                    p4 = -15.0 * rise + 7.0 * bend - 2.0 * kink
-                    p5 = 6.0 * rise - 3.0 * bend + kink
-                    y = p0 + x * (p1 + x * (p2 + x * (p3 + x * (p4 + x * p5))))
-                    yv = p1 + x * (2.0 * p2 + x * (3.0 * p3 + x * (4.0 * p4 + x * 5.0 * p5)))
-                    ya = 2.0 * p2 + x * (6.0 * p3 + x * (12.0 * p4 + x * 20.0 * p5))
-                    q[i] = q[i] + self.scale * y
-                    v[i] = v[i] + self.scale * yv / d
-                    a[i] = a[i] + self.scale * ya / (d * d)
+                here = self.parabola(self.piece)
+                there = self.parabola(self.piece + 1.0)
+                p0 = vector(self.profile[index(self.piece)])
+                p1 = here[0] * d
+                p2 = 0.5 * here[1] * d * d
+                rise = self.profile[index(self.piece + 1.0)] - p0 - p1 - p2
+                bend = there[0] * d - p1 - 2.0 * p2
+                kink = 0.5 * there[1] * d * d - p2
+                p3 = 10.0 * rise - 4.0 * bend + kink
+                p4 = -15.0 * rise + 7.0 * bend - 2.0 * kink
+                p5 = 6.0 * rise - 3.0 * bend + kink
+                q = q + self.scale * (p0 + x * (p1 + x * (p2 + x * (p3 + x * (p4 + x * p5)))))
+                v = v + self.scale * (p1 + x * (2.0 * p2 + x * (3.0 * p3 + x * (4.0 * p4 + x * 5.0 * p5)))) / d
+                a = a + self.scale * (2.0 * p2 + x * (6.0 * p3 + x * (12.0 * p4 + x * 20.0 * p5))) / (d * d)
         sp = sin(q[0])
         cp = cos(q[0])
         sr = sin(q[1])
@@ -219,14 +197,9 @@ class BaseMotion(Component):
         north = self.earth_rate * cos(self.latitude)
         up = self.earth_rate * sin(self.latitude)
         # C = R2(roll) R1(pitch) R3(heading): its columns N and U
-        earth = [0.0, 0.0, 0.0]
-        earth[0] = (cr * sh + sr * sp * ch) * north - sr * cp * up
-        earth[1] = cp * ch * north + sp * up
-        earth[2] = (sr * sh - cr * sp * ch) * north + cr * cp * up
-        rel = [0.0, 0.0, 0.0]
-        rel[0] = cr * v[0] - sr * cp * v[2]
-        rel[1] = v[1] + sp * v[2]
-        rel[2] = sr * v[0] + cr * cp * v[2]
+        east = (cr * sh + sr * sp * ch) * north - sr * cp * up
+        earth = vector([east, cp * ch * north + sp * up, (sr * sh - cr * sp * ch) * north + cr * cp * up])
+        rel = vector([cr * v[0] - sr * cp * v[2], v[1] + sp * v[2], sr * v[0] + cr * cp * v[2]])
         self.alpha[0] = cr * a[0] - sr * cp * a[2] - v[1] * rel[2] + sr * sp * v[0] * v[2]
         self.alpha[1] = a[1] + sp * a[2] + cp * v[0] * v[2]
         self.alpha[2] = sr * a[0] + cr * cp * a[2] + v[1] * rel[0] - cr * sp * v[0] * v[2]
@@ -234,9 +207,6 @@ class BaseMotion(Component):
         self.alpha[0] = self.alpha[0] - rel[1] * earth[2] + rel[2] * earth[1]
         self.alpha[1] = self.alpha[1] - rel[2] * earth[0] + rel[0] * earth[2]
         self.alpha[2] = self.alpha[2] - rel[0] * earth[1] + rel[1] * earth[0]
-        for i in range(3):
-            self.angle[i] = q[i]
-            self.omega[i] = rel[i] + earth[i]
-        self.f[0] = -sr * cp * g
-        self.f[1] = sp * g
-        self.f[2] = cr * cp * g
+        self.angle = q
+        self.omega = rel + earth
+        self.f = vector([-sr * cp * g, sp * g, cr * cp * g])

@@ -20,6 +20,7 @@ from gyrobench.component.blocks.platform import (
     gimbal_z,
     motor_current,
     motor_slope,
+    rigid,
     with_unbalance,
 )
 from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt
@@ -111,13 +112,9 @@ class PlatformThreeAxis(Component):
     pitch = Discrete(0.0, "rad", "pitch, for messages")
 
     def start(self) -> None:
-        for k in range(3):
-            j = self.I_r[k] > 0.5 * (self.I_r[X] + self.I_r[Y] + self.I_r[Z])
-            self.refuse(j, "I_r is of no rigid body: each of its three must be <= the sum of the other two")
-            j = self.I_f[k] > 0.5 * (self.I_f[X] + self.I_f[Y] + self.I_f[Z])
-            self.refuse(j, "I_f is of no rigid body: each of its three must be <= the sum of the other two")
-            j = self.I_a[k] > 0.5 * (self.I_a[X] + self.I_a[Y] + self.I_a[Z])
-            self.refuse(j, "I_a is of no rigid body: each of its three must be <= the sum of the other two")
+        self.refuse(not rigid(self.I_r), "I_r is of no rigid body: no moment may exceed the sum of the others")
+        self.refuse(not rigid(self.I_f), "I_f is of no rigid body: no moment may exceed the sum of the others")
+        self.refuse(not rigid(self.I_a), "I_a is of no rigid body: no moment may exceed the sum of the others")
         least = [0.0, 0.0, 0.0]
         inner = minimum(self.I_a[X], self.I_a[Y])
         least[PITCH] = self.I_f[X] + inner

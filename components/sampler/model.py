@@ -77,6 +77,18 @@ class Sampler(Component):
     r_phase = Discrete(0.0, "1", "phase")
     r_flagged = Discrete(0.0, "1", "flagged samples")
 
+    def begin(self) -> None:
+        """A window begins with this sample."""
+        self.t_0 = self.t
+        self.angle_0 = self.angle
+        self.x_0 = self.x
+        self.before = 0.0
+        self.area = 0.0
+        self.total = 0.0
+        self.squares = 0.0
+        self.steps = 0.0
+        self.suspect = 0.0
+
     @sampled(every=1)
     def tick(self) -> None:
         if self.gate == 0.0:
@@ -96,15 +108,7 @@ class Sampler(Component):
             self.number = 1.0
             self.t_open = self.t
             self.angle_open = self.angle
-            self.t_0 = self.t
-            self.angle_0 = self.angle
-            self.x_0 = self.x
-            self.before = 0.0
-            self.area = 0.0
-            self.total = 0.0
-            self.squares = 0.0
-            self.steps = 0.0
-            self.suspect = 0.0
+            self.begin()
         else:
             d = self.x - self.x_0
             self.area = self.area + 0.5 * self.h * (self.before + d)
@@ -133,15 +137,7 @@ class Sampler(Component):
                 self.r_phase = self.part
                 self.r_flagged = self.suspect
                 self.number = self.number + 1.0
-                self.t_0 = self.t
-                self.angle_0 = self.angle
-                self.x_0 = self.x
-                self.before = 0.0
-                self.area = 0.0
-                self.total = 0.0
-                self.squares = 0.0
-                self.steps = 0.0
-                self.suspect = 0.0
+                self.begin()
 
     def outputs(self) -> None:
         self.count = self.r_count

@@ -91,7 +91,7 @@ class Expressions:
             if (x := self.code.constant(e.id)) is not None:
                 return Place(repr(x), "constant")
             raise self.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
-        if isinstance(e, ast.Attribute) and (e.attr != "T" or ast.unparse(e.value) == "self"):
+        if isinstance(e, ast.Attribute) and not self.transposes(e):
             return self.attribute(e)
         found = self.value(e)
         if not found.shape:
@@ -175,7 +175,7 @@ class Expressions:
             if abs(e.value) > 1.7e308:
                 raise self.refuse(e, f"{e.value!r} is not finite")
             return self.number(f"d_con({float(e.value)!r})" if d else repr(float(e.value)), plain=True)
-        if isinstance(e, ast.Attribute) and e.attr == "T" and ast.unparse(e.value) != "self":
+        if isinstance(e, ast.Attribute) and self.transposes(e):
             return self.transposed(e)
         if isinstance(e, ast.Name | ast.Attribute | ast.Subscript):
             return self.of_place(self.place(e))
@@ -281,6 +281,14 @@ class Expressions:
     def times(self, x: str, y: str) -> str:
         return f"d_mul({x}, {y})" if self.dual else f"({x} * {y})"
 
+    def transposes(self, e: ast.expr) -> bool:
+        """Return whether ``x.T`` is a transpose, not a quantity called T."""
+        if not isinstance(e, ast.Attribute) or e.attr != "T":
+            return False
+        blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
+        of = ast.unparse(e.value)
+        return of not in ("self", "self.der", "self.noise") and of.removeprefix("self.") not in blocks
+
     def transposed(self, e: ast.Attribute) -> Value:
         of = self.operand(e.value)
         if len(of.shape) != 2:
@@ -376,6 +384,8 @@ class Expressions:
     def array_function(self, e: ast.Call, name: str) -> Value:
         self.count(e, name, ARGUMENTS.get(name, 1))
         if name == "vector":
+            if isinstance(e.args[0], ast.Name) and (constant := self.code.array(e.args[0].id)) is not None:
+                return self.literal(constant)
             if not isinstance(e.args[0], ast.List):
                 found = self.value(e.args[0])
                 if not found.shape:

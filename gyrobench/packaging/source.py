@@ -14,6 +14,7 @@ from typing import Any
 from gyrobench.component import Block, Component
 from gyrobench.component import math as language
 from gyrobench.component.composition import EQUATIONS, Piece, Placed
+from gyrobench.component.declarations import floats
 from gyrobench.errors import GyrobenchError
 
 KEYWORDS = {
@@ -78,6 +79,11 @@ class Code:
         if x is None and not of_self:
             x = self.function.__globals__.get(name)
         return float(x) if isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) else None
+
+    def array(self, name: str) -> ast.List | None:
+        """Return the list of numbers that the module gives a name to; None where it gives none."""
+        x = self.function.__globals__.get(name)
+        return ast.parse(repr(floats(x)), mode="eval").body if isinstance(x, list) else None  # type: ignore[return-value]
 
     def nodes(self) -> Iterator[ast.AST]:
         """Yield every node of the body."""

@@ -237,9 +237,7 @@ class Method(Expressions):
 
         True for an input or a parameter, which does not change: a local that only reads it is the same in both.
         """
-        if isinstance(value, ast.Name | ast.Attribute | ast.Subscript) and not (
-            isinstance(value, ast.Attribute) and value.attr == "T"
-        ):
+        if isinstance(value, ast.Name | ast.Attribute | ast.Subscript) and not self.transposes(value):
             before = len(self.pre), self.temporaries
             at = self.place(value)
             del self.pre[before[0] :]

@@ -49,6 +49,12 @@ def gimbal_z(c: Number, s: Number, dq: Number, ddq: Number, w: Vector, a: Vector
     return vector([[v[X], v[Y], v[Z] + dq], [b[X] + v[Y] * dq, b[Y] - v[X] * dq, b[Z] + ddq]])
 
 
+def rigid(inertia: Vector) -> Number:
+    """Return 1 where three moments can be those of a rigid body: none above the sum of the other two."""
+    half = 0.5 * (inertia[X] + inertia[Y] + inertia[Z])
+    return 1.0 if inertia[X] <= half and inertia[Y] <= half and inertia[Z] <= half else 0.0
+
+
 def euler_torque(inertia: Vector, a: Vector, w: Vector) -> Vector:
     """Return I a + w x I w of a body with principal inertias."""
     x = inertia[X] * a[X] + (inertia[Z] - inertia[Y]) * w[Y] * w[Z]
