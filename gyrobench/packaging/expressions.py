@@ -287,7 +287,9 @@ class Expressions:
             return False
         blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
         of = ast.unparse(e.value)
-        return of not in ("self", "self.der", "self.noise") and of.removeprefix("self.") not in blocks
+        block = of.removeprefix("self.")
+        named = block in blocks and self.code.flat(block) not in self.declared  # not a block that is one array
+        return of not in ("self", "self.der", "self.noise") and not named
 
     def transposed(self, e: ast.Attribute) -> Value:
         of = self.operand(e.value)
