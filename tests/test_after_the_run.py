@@ -21,8 +21,15 @@ SYSTEM = '''
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Coefficient, Result, Series
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.record.run_document import RunDocument
+from gyrobench.result import Coefficient, Result, Series
+from gyrobench.system.system import MeasuredData, Option, Slot, System
+
+
+def read(system, file, values):
+    for name, value in values.items():
+        system.set(name, value)
+    return Record({"t": np.zeros(2)}, {}, RunDocument(system="own", options=dict(system.values), measured=True))
 
 
 class Own(System):
@@ -31,23 +38,16 @@ class Own(System):
     title = "Own test"
     slots = {"site": Slot("Site", "site")}
     options = {"raises": Option("nothing", str, "what goes wrong")}
+    measured_data = MeasuredData("time [s]\\n", read)
     channels = ("site.f[3]",)
     stop = 3.0
     step = 0.1
 
-    def template(self):
-        return "time [s]\\n"
-
-    def measured(self, file, values):
-        for name, value in values.items():
-            self.set(name, value)
-        return Record({"t": np.zeros(2)}, {}, {"system": "own", "options": dict(self.values), "measured": True})
-
     def reduce(self, record, specification=None):
-        raises = record.meta["options"]["raises"]
+        raises = record.run.options["raises"]
         gravity = 9.8
         if raises == "key":
-            record.meta["nothing"]
+            record.run.options["nothing"]
         if raises == "zero":
             gravity / 0
         if raises == "singular":
@@ -65,11 +65,11 @@ class Own(System):
 '''
 LINES = {
     text: number for number, line in enumerate(SYSTEM.splitlines(), 1) for text in (
-        'record.meta["nothing"]', "gravity / 0", "np.linalg.inv",
+        'options["nothing"]', "gravity / 0", "np.linalg.inv",
     ) if text in line
 }  # fmt: skip
 FAILURES = {
-    "key": (LINES['record.meta["nothing"]'], "KeyError: 'nothing'"),
+    "key": (LINES['options["nothing"]'], "KeyError: 'nothing'"),
     "zero": (LINES["gravity / 0"], "ZeroDivisionError: float division by zero"),
     "singular": (LINES["np.linalg.inv"], "LinAlgError: Singular matrix"),
 }
@@ -117,7 +117,7 @@ def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: 
     code, out, err = gyrobench("reduce", "own", "--data", "data.csv", "--set", f"raises={raises}", "--out", "m")
     assert (code, out) == (3, "")
     assert place in err and next_step.format("m") in err
-    assert "Traceback" not in err and Record.load(Path("m")).meta["options"]["raises"] == raises
+    assert "Traceback" not in err and Record.load(Path("m")).run.options["raises"] == raises
 
     # the cause corrected, the same command writes the report
     file = Path("systems/own/system.py")

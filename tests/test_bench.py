@@ -109,14 +109,14 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> engine ->
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
-COMMON = {"errors", "bench", "units", "frames", "drift"}
+COMMON = {"errors", "files", "result", "bench", "units", "frames", "drift"}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
     "component": {"errors"},  # a Python FMU carries a copy of both
     "packaging": COMMON | {"component"},
     "record": COMMON,  # the format: neither the system nor the engine that made it
     "system": COMMON | {"component", "packaging", "record"},
-    "linear": COMMON | {"component", "packaging", "system"},
+    "linear": COMMON | {"component", "packaging", "record", "system"},
     "engine": COMMON | {"component", "packaging", "record", "system", "linear"},
     "exchange": COMMON | {"component", "packaging", "record", "system", "engine"},
     "reduction": COMMON | {"record"},

@@ -98,10 +98,13 @@ def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
         assert Record.load(done / name).complete
         for file in ("result.json", "report.html", "report.pdf"):
             assert (done / name / file).stat().st_size > 1000
-    meta = json.loads((done / "run.json").read_text(encoding="utf-8"))
-    assert meta["complete"] and list(meta["tests"]) == list(PLANS)
-    for name, test in meta["tests"].items():
+    run_schema = json.loads((standard_folder() / "reports" / "run.schema.json").read_text(encoding="utf-8"))
+    document = json.loads((done / "run.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, run_schema)
+    assert document["complete"] and list(document["tests"]) == list(PLANS)
+    for name, test in document["tests"].items():
         assert test["report_id"] == result(done / name)["report_id"]
+        jsonschema.validate(json.loads((done / name / "run.json").read_text(encoding="utf-8")), run_schema)
 
 
 def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Path) -> None:

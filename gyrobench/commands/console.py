@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 NO_VERDICT = "no specification given"
 FAST = 0.01  # rad/s; above it rates are shown in degrees a second
@@ -161,14 +161,14 @@ def _phase(p: Mapping[str, Any]) -> list[str]:
 # ------------------------------------------------------------------------------------------- records
 def lacking(record: Record) -> str:
     """How far an incomplete record goes, phase by phase of its plan."""
+    run = record.run
     done = [int(p) for p in record.windows.get("phase", [])]
-    stopped = record.meta.get("stopped_at")
-    lines = [str(record.meta.get("problem", "the run did not end"))]
-    lines += [f"recorded until t = {stopped:,.9g} s"] if isinstance(stopped, int | float) else []
-    for p in record.meta.get("plan", []):
-        length = p["travel"] if p["mode"] == "rate" else p["dwell"]
-        expected = round(length / p["window"]) if p.get("window") else 0
-        have = done.count(p["phase"])
+    lines = [run.problem or "the run did not end"]
+    lines += [f"recorded until t = {run.stopped_at:,.9g} s"] if run.stopped_at is not None else []
+    for row in run.plan:
+        length = row.travel if row.mode == "rate" else row.dwell
+        expected = round(length / row.window) if row.window else 0
+        have = done.count(row.phase)
         if have < expected:
-            lines.append(f"phase {p['phase']} ({p['label']}): {have} of {expected} windows")
+            lines.append(f"phase {row.phase} ({row.label}): {have} of {expected} windows")
     return "\n".join(f"  - {line}" for line in lines)

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
@@ -22,27 +21,27 @@ from gyrobench.commands.run_system import (
 )
 from gyrobench.commands.user_errors import PostRunError, record_kept
 from gyrobench.errors import GyrobenchError
-from gyrobench.record.record import Record, RecordError
-from gyrobench.reduction.result import Result
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import FILE, DataFile, RecordError, read_run
 from gyrobench.system.suite import Suite
-from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData, System
 
 
-def measuring(name: str) -> Any:
-    system = load(name)
+def measured_data(system: System) -> MeasuredData:
+    """Return how a laboratory's record is read.  Raises UsageError for a system without, naming those that have one."""
     if isinstance(system, Suite):
-        raise UsageError(f"{name} compares runs: reduce each record by its own test, then give it their folders")
-    if not hasattr(system, "measured"):
-        known = [other for other in Bench.find().systems() if hasattr(load(other), "measured")]
+        raise UsageError(f"{system.name} compares runs: reduce each record by its own test, then give it their folders")
+    if system.measured_data is None:
+        known = [other for other in Bench.find().systems() if load(other).measured_data is not None]
         raise UsageError(f"{system.name} has no reduction of measured data; there is one for {', '.join(known)}")
-    return system
+    return system.measured_data
 
 
 def template(name: str) -> str:
-    """An empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
+    """Return an empty CSV with the columns that ``gyrobench reduce`` reads, and what each means."""
     from gyrobench.system.lab_record import explained
 
-    return explained(str(measuring(name).template()))
+    return explained(measured_data(load(name)).template)
 
 
 def reduce(
@@ -59,15 +58,16 @@ def reduce(
         from gyrobench.commands import run_suite
 
         return run_suite.reduce(load(name, values), data, spec, out, force, as_json)
-    system = measuring(name)
+    system = load(name)
+    reader = measured_data(system).read
     if len(data) > 1:
         raise UsageError(f"{name} reduces one record at a time; --data was given {len(data)} times")
     file = specification(spec)
     limits = limits_of(file)
     one = data[0]
     text = one.read_bytes()
-    record = system.measured(one, values)
-    record.meta["data"] = {"file": one.name, "sha256": hashlib.sha256(text).hexdigest()}
+    record = reader(system, one, values)
+    record.run.data = DataFile(file=one.name, sha256=hashlib.sha256(text).hexdigest())
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
     folder = out or Bench.find().out / name / f"measured-{identity}"
 
@@ -76,9 +76,9 @@ def reduce(
         record.save(folder)
 
     with record_kept(folder, save):
-        result: Result = system.reduce(record, limits)
-    result.provenance = dict(record.meta)
+        result = system.reduce(record, limits)
     save()
+    result.provenance = record.run.as_dict()
     with record_kept(folder):
         paths = publish(result, folder, record, file)
     show_paths(paths, None if as_json else console.answer(result))
@@ -90,9 +90,9 @@ def report(folder: Path, spec: str | None, as_json: bool = False) -> str:
 
     Raises RecordError when the folder is no run, and PostRunError naming what an incomplete record lacks.
     """
-    if not (folder / "run.json").is_file():
-        raise RecordError(f"{folder}: no run there (no run.json); runs are in {Bench.find().out}/SYSTEM/")
-    system = load(str(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("system")))
+    if not (folder / FILE).is_file():
+        raise RecordError(f"{folder}: no run there (no {FILE}); runs are in {Bench.find().out}/SYSTEM/")
+    system = load(read_run(folder).system)
     if isinstance(system, Suite):
         from gyrobench.commands import run_suite
 

@@ -11,9 +11,11 @@ from typing import Any
 from gyrobench.bench import Bench, UsageError
 from gyrobench.engine import checkpoint
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import FILE as RUN
+from gyrobench.record.run_document import RecordError, read_run
 from gyrobench.system.system import System
 
-RECORD = ("run.json", "record.parquet", "record.csv", "channels.parquet", "channels.csv", checkpoint.FILE)
+RECORD = (RUN, "record.parquet", "record.csv", "channels.parquet", "channels.csv", checkpoint.FILE)
 REPORT = ("result.json", "report.html", "report.pdf")
 
 
@@ -66,10 +68,10 @@ def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"--out {folder}: is a file; name a folder")
     old = None
-    if (folder / "run.json").is_file():
+    if (folder / RUN).is_file():
         try:
-            old = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        except ValueError:
+            old = read_run(folder).as_dict()
+        except RecordError:
             old = {}
     elif (folder / checkpoint.FILE).is_file():  # of a process that was killed
         try:
@@ -106,8 +108,8 @@ def keep(record: Record, folder: Path) -> Path:
 def whole_record(folder: Path) -> bool:
     """Whether a complete record is there."""
     try:
-        return bool(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("complete", True))
-    except (OSError, ValueError):
+        return read_run(folder).complete
+    except RecordError:
         return False
 
 

@@ -34,14 +34,14 @@ from gyrobench.commands.run_system import (
 from gyrobench.commands.run_system import specification as named
 from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 from gyrobench.engine import checkpoint
-from gyrobench.record.record import RecordError
-from gyrobench.reduction.result import Result
+from gyrobench.files import sha256
+from gyrobench.record.run_document import FILE as RUN
+from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
 from gyrobench.report import NAMES
+from gyrobench.result import Result
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import InvalidConfigurationError, System
 from gyrobench.system.values import InvalidValueError, parse
-
-RUN = "run.json"
 
 
 class SuiteError(PostRunError):
@@ -102,8 +102,9 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
     if job.resume and not (folder / RUN).is_file():
         raise UsageError(f"--resume: nothing to continue in {folder}: no suite with these tests, parts and values")
     claim(folder, identity, job.force)
-    meta = _meta(suite, identity)
-    _write(folder, {**meta, "complete": False})
+    document = _document(suite, identity)
+    document.complete = False
+    _write(folder, document)
     failed: dict[str, str] = {}
     for number, (name, system) in enumerate(members.items(), 1):
         there = folder / name
@@ -134,12 +135,12 @@ def run(job: Job, suite: Suite, as_json: bool = False) -> str:
             failed[name] = "it has no reduction"
             continue
         note(f"{about}: {done.result.summary[0] if done.result.summary else done.result.verdict}")
-    found = {n: folder / n for n in members if n not in failed}
-    meta |= {"tests": {n: {"folder": n} for n in found}, "failed": failed, "complete": not failed}
-    if not found:
-        _write(folder, meta)
+    document.tests = {n: SuiteTestRun(folder=n) for n in members if n not in failed}
+    document.failed, document.complete = failed, not failed
+    if not document.tests:
+        _write(folder, document)
         raise SuiteError(f"no test of the suite has a result; what each left is in {short(folder)}")
-    verdict = _finish(suite, folder, meta, spec, as_json)
+    verdict = _finish(suite, folder, document, spec, as_json)
     if failed:
         raise SuiteError(
             f"{', '.join(failed)} failed; the report in {short(folder)} is of the others. After correcting the cause: "
@@ -169,7 +170,7 @@ def _identity(
 ) -> dict[str, Any]:
     """What makes this suite another one.  Raises InvalidConfigurationError with all that its tests refuse."""
     from gyrobench.system.parameters import defaults, resolve
-    from gyrobench.system.part_files import resolve_parts, sha256
+    from gyrobench.system.part_files import resolve_parts
     from gyrobench.system.wiring import assemble
 
     problems: list[str] = []
@@ -199,25 +200,24 @@ def _identity(
     return {"system": suite.name, "seed": job.seed, "identity": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def _meta(suite: Suite, identity: Mapping[str, Any]) -> dict[str, Any]:
-    from gyrobench.engine.session import _versions
+def _document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
+    """Return what run.json says of a suite before its tests."""
+    from gyrobench.engine.session import package_versions
 
-    return {
+    return SuiteDocument(
         **identity,
-        "title": suite.title,
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "options": dict(suite.values),
-        "changed": {n: str(suite.passed.get(n, suite.values.get(n))) for n in (*suite.given, *suite.passed)},
-        "versions": dict(_versions()),
+        title=suite.title,
+        date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        options=dict(suite.values),
+        changed={n: str(suite.passed.get(n, suite.values.get(n))) for n in (*suite.given, *suite.passed)},
+        versions=dict(package_versions()),
         **{n: suite[n] for n in suite.about if n in suite.options and suite[n]},
-    }
+    )
 
 
-def _write(folder: Path, meta: Mapping[str, Any]) -> None:
-    from gyrobench.report.report_files import replace as write_whole
-
+def _write(folder: Path, document: SuiteDocument) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RUN, (json.dumps(meta, indent=1, ensure_ascii=False) + "\n").encode())
+    document.write(folder)
 
 
 # -------------------------------------------------------------------------------------- from what is there
@@ -246,42 +246,45 @@ def reduce(suite: System, runs: Sequence[Path], spec: str | None, out: Path | No
     digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
     identity = {"system": suite.name, "runs": names}
     folder = claim(out or Bench.find().out / suite.name / f"runs-{digest}", identity, force)
-    tests = {n: {"folder": os.path.relpath(f.resolve(), folder.resolve())} for n, f in zip(names, runs, strict=True)}
-    return _finish(suite, folder, {**_meta(suite, identity), "tests": tests, "complete": True}, file, as_json)
+    document = _document(suite, identity)
+    document.tests = {
+        n: SuiteTestRun(folder=os.path.relpath(f.resolve(), folder.resolve())) for n, f in zip(names, runs, strict=True)
+    }
+    document.complete = True
+    return _finish(suite, folder, document, file, as_json)
 
 
 def report(folder: Path, suite: Suite, spec: str | None, as_json: bool = False) -> str:
     """The report of a suite again, from the results of its tests; returns the verdict."""
-    meta = json.loads((folder / RUN).read_text(encoding="utf-8"))
-    if not meta.get("tests"):
+    document = read_run(folder)
+    if not isinstance(document, SuiteDocument) or not document.tests:
         raise RecordError(f"{folder}: the suite did not end; the same run command with --resume goes on")
     for name in suite.options:
-        if name in meta.get("options", {}):
-            suite.set(name, meta["options"][name])
-    return _finish(suite, folder, meta, named(spec), as_json)
+        if name in document.options:
+            suite.set(name, document.options[name])
+    return _finish(suite, folder, document, named(spec), as_json)
 
 
-def _finish(suite: Suite, folder: Path, meta: dict[str, Any], spec: Path | None, as_json: bool) -> str:
+def _finish(suite: Suite, folder: Path, document: SuiteDocument, spec: Path | None, as_json: bool) -> str:
     """Writes run.json and the report, prints the answer; returns the verdict."""
     from gyrobench.reduction.suite.method_comparison import together
 
-    members = {n: _member(folder / t["folder"], t["folder"]) for n, t in meta["tests"].items()}
-    for name, member in members.items():
-        meta["tests"][name] = {"folder": member.folder, "report_id": member.report_id, **member.facts}
+    members = {n: _member(folder / test.folder, test.folder) for n, test in document.tests.items()}
+    document.tests = {n: member.test for n, member in members.items()}
     for name in suite.about:  # what the suite is not told the tests may say
-        said = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
-        if text := suite[name] or "; ".join(filter(None, said)):
-            meta[name] = text
+        texts = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
+        if text := suite[name] or "; ".join(filter(None, texts)):
+            setattr(document, name, text)
     limits = limits_of(spec)
-    with record_kept(folder, lambda: _write(folder, meta)):
+    with record_kept(folder, lambda: _write(folder, document)):
         result = together(
             members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
             conventions=suite.conventions, shared=suite.shared, specification=limits,
-            failed=meta.get("failed"), provenance=meta,
+            failed=document.failed, provenance=document.as_dict(),
         )  # fmt: skip
         if suite["instrument"]:
             result.instrument = suite["instrument"]
-    _write(folder, meta)
+    _write(folder, document)
     with record_kept(folder):
         paths = publish(result, folder, None, spec)
     show_paths(paths, None if as_json else console.suite_answer(result))
@@ -302,22 +305,22 @@ def _member(folder: Path, shown: str) -> Any:
         raise RecordError(f"{file}: no result that can be read: {error}") from None
     if result.suite:
         raise RecordError(f"{folder}: is a suite itself; name its tests")
-    run = result.provenance
-    facts = {
-        "date": run.get("date"), "operator": run.get("operator"), "seed": run.get("seed"), "step": run.get("step"),
-        "engine": run.get("engine"), "phases": len(run.get("plan") or []), "duration": _duration(run, result),
-        "changed": list(run.get("changed") or []), "result_sha256": hashlib.sha256(text.encode()).hexdigest(),
-        "record_sha256": _record_hash(folder), "data": run.get("data"), "versions": run.get("versions"),
-        "parts": {s: {k: p.get(k) for k in ("name", "version", "sha256")} for s, p in (run.get("parts") or {}).items()},
-        "step_check": (result.step_check or {}).get("worst"), "complete": run.get("complete", True),
-    }  # fmt: skip
-    return Member(result, report_id, shown, facts)
+    run = RunDocument.model_validate(result.provenance)
+    test = SuiteTestRun(
+        folder=shown, report_id=report_id, date=run.date or None, operator=run.operator or None, seed=run.seed,
+        step=run.step or None, engine=run.engine or None, phases=len(run.plan), duration=_duration(run, result),
+        changed=run.changed, result_sha256=hashlib.sha256(text.encode()).hexdigest(),
+        record_sha256=_record_hash(folder), data=run.data, versions=run.versions or None,
+        parts={s: PartInfo(name=p.name, version=p.version, sha256=p.sha256) for s, p in run.parts.items()},
+        step_check=(result.step_check or {}).get("worst"), complete=run.complete,
+    )  # fmt: skip
+    return Member(result, test)
 
 
-def _duration(run: Mapping[str, Any], result: Result) -> float | None:
+def _duration(run: RunDocument, result: Result) -> float | None:
     """Time of the test, s: of the run, else from first to last window."""
-    if isinstance(run.get("stopped_at"), int | float):
-        return float(run["stopped_at"])
+    if run.stopped_at is not None:
+        return run.stopped_at
     times = [t for s in result.series for t in s.t]
     return max(times) - min(times) if times else None
 

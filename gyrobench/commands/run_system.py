@@ -16,13 +16,12 @@ from gyrobench.commands.progress_display import Meter
 from gyrobench.commands.run_folders import keep, labels, run_folder
 from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System, load_system
 from gyrobench.system.values import InvalidValueError, parse
 
 HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
-Limits = Mapping[str, tuple[float | None, float | None]]
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def specification(spec: str | None) -> Path | None:
     return known[spec]
 
 
-def limits_of(spec: Path | None) -> Limits | None:
+def limits_of(spec: Path | None) -> Specification | None:
     from gyrobench.report import load_specification
 
     return load_specification(spec) if spec else None
@@ -211,18 +210,20 @@ def reduces(system: System) -> bool:
 
 def no_reduction(record: Record, folder: Path, as_json: bool) -> str:
     print(
-        json.dumps(record.meta, indent=1, ensure_ascii=False) if as_json else f"no reduction; record: {short(folder)}"
+        json.dumps(record.run.as_dict(), indent=1, ensure_ascii=False)
+        if as_json
+        else f"no reduction; record: {short(folder)}"
     )
     return console.NO_VERDICT
 
 
-def reduced(system: System, record: Record, limits: Limits | None) -> Result:
+def reduced(system: System, record: Record, limits: Specification | None) -> Result:
     """The system's own reduction, with the run's circumstances attached."""
     from gyrobench.system.wiring import parse_wires
 
-    result: Result = system.reduce(record, limits)  # type: ignore[call-arg]
+    result: Result = system.reduce(record, limits)
     wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
-    result.provenance = {**record.meta, "wires": wires}
+    result.provenance = {**record.run.as_dict(), "wires": wires}
     return result
 
 
@@ -230,11 +231,11 @@ def step_check(session: Any, system: System, result: Result, seed: int, step: fl
     """Change of each coefficient when the step is halved, noise off, against its standard uncertainty."""
     bindings = session.assembly.bindings
     known = {f"{slot}.{name}" for slot, binding in bindings.items() for name in binding.parameters}
-    quiet = {name: 0.0 for name in getattr(system, "noises", ()) if name in known}
+    quiet = {name: 0.0 for name in system.noises if name in known}
     found = []
     for h in (step, step / 2.0):
         with Meter(f"step check, {h:g} s") as meter:
-            found.append(system.reduce(session.run(quiet, seed, h, None, meter), None))  # type: ignore[call-arg]
+            found.append(system.reduce(session.run(quiet, seed, h, None, meter), None))
     rows: list[dict[str, Any]] = []
     whole, half = ({c.name: c.estimate for c in r.coefficients} for r in found)
     for c in result.coefficients:

@@ -26,7 +26,7 @@ from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave, Slave
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import Array, Progress, take
 from gyrobench.errors import GyrobenchError
-from gyrobench.record.record import _replace
+from gyrobench.files import write_whole
 
 FILE = "checkpoint.npz"
 FORMAT = 1
@@ -286,7 +286,7 @@ class Keeper:
                 assert isinstance(slave, LocalSlave)
                 arrays[f"state.{slot}"] = np.frombuffer(save_state(slave), np.uint8)
             self.folder.mkdir(parents=True, exist_ok=True)
-            _replace(self.folder / FILE, save)
+            write_whole(self.folder / FILE, save)
         except (FmuCallError, OSError) as error:
             return str(error)
         return ""

@@ -21,9 +21,11 @@ from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import ReferenceEngine, initialize, start
 from gyrobench.engine.run_driver import EngineStopped, Status, drive
 from gyrobench.errors import GyrobenchError
+from gyrobench.files import sha256
 from gyrobench.record.record import Record, rows_to_columns
+from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
 from gyrobench.system.parameters import defaults, resolve
-from gyrobench.system.part_files import resolve_parts, sha256
+from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
@@ -161,11 +163,13 @@ class Session:
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
         if problems := system.check_parameters(parameters):
             raise InvalidConfigurationError(system.name, problems)
-        linear = self._linear(system, parameters, notes) if system.loops else {}
-        meta = {**self._meta(system, seed, parameters, notes), **linear}
+        linear = self._linear(system, parameters, notes) if system.loops else None
+        document = self._document(system, seed, parameters, notes)
+        if linear is not None:
+            document.linear = linear
         every = max(1, round(system.channel_period / system.step))
         if keeper is not None:
-            job = {k: meta[k] for k in ("system", "seed", "step", "options", "parameters")}
+            job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
             keeper.check({**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.slaves)
         self.program.out[:] = 0.0
@@ -199,10 +203,10 @@ class Session:
         if state is None:
             said = isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status
             raise (ParameterRefusedError if said else RunError)(str(problem))
-        return self._finish(state, system, meta, out, problem, keeper)
+        return self._finish(state, system, document, out, problem, keeper)
 
-    def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-        """The linear model for run.json; what it warns about goes to the log at once, and into the notes."""
+    def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
+        """Return the linear models for run.json; its warnings go to the log immediately, and into the notes."""
         import logging
 
         from gyrobench.linear.linear_model import LinearizationError, loops
@@ -215,17 +219,17 @@ class Session:
                 )
             return load_part(self.names[slot], self.bench)
 
-        found, said = loops(self.assembly, parameters, part_of, system.step)
-        for text in said:
+        models, warnings = loops(self.assembly, parameters, part_of, system.step)
+        for text in warnings:
             logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
-        notes += said
-        return {"linear": found}
+        notes += warnings
+        return models
 
     def _finish(
         self,
         state: Any,
         system: System,
-        meta: dict[str, Any],
+        document: RunDocument,
         out: Path | None,
         problem: Exception | None,
         keeper: Keeper | None,
@@ -233,18 +237,18 @@ class Session:
         windows = system.windows
         names = list(windows.columns) if windows else []
         scale = state.k / state.timed if state.timed else 0.0
-        meta["timing"] = {slot: s * scale for slot, s in state.timed_seconds.items()}
-        meta["complete"] = problem is None
-        meta["steps"] = state.k
-        meta["stopped_at"] = state.k * system.step
+        document.timing = {slot: s * scale for slot, s in state.timed_seconds.items()}
+        document.complete = problem is None
+        document.steps = state.k
+        document.stopped_at = state.k * system.step
         if keeper is not None and keeper.resumed_at:
-            meta["resumed_at"] = keeper.resumed_at
+            document.resumed_at = keeper.resumed_at
         if problem is not None:
-            meta["problem"] = str(problem)
+            document.problem = str(problem)
         record = Record(
             rows_to_columns(state.window_rows, names, time=False),
             rows_to_columns(state.channel_rows, self.program.channel.names, time=True),
-            meta,
+            document,
         )
         if out is not None:
             record.save(out)
@@ -265,37 +269,39 @@ class Session:
             found[name] = connector.unit if connector is not None and connector.unit else bound.unit
         return found
 
-    def _meta(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-        parts = {}
-        for slot, d in self.assembly.descriptions.items():
-            parts[slot] = {
-                "name": d.modelName,
-                "version": d.version or "",
-                "target": self.built.get(slot, "foreign"),
-                "fmi": d.fmiVersion,
-                "sha256": self.hashes[slot],
-            }
-        item = next((s for s in ("gyro", "accelerometer") if s in parts), None)  # what the test is about
-        return {
-            "system": system.name,
-            "title": system.title,
-            "instrument": f"{parts[item]['name']} {parts[item]['version']}, simulated" if item else "",
-            "spec": list(system.spec),
-            "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-            "seed": seed,
-            "step": system.step,
-            "engine": self.engine,
-            "isolated": list(self.isolate),
-            **self.assembly.order.as_dict(system.step),
-            "parts": parts,
-            "parameters": parameters,
-            "changed": [*(f"{s}: part" for s in self.swapped), *system.given],
-            "options": dict(system.values),
-            "units": self._units(),
-            "plan": system.plan().rows(),
-            "versions": dict(_versions()),
-            "notes": [*self.notes, *notes, *system.warnings()],
+    def _document(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> RunDocument:
+        """Return what run.json says of a run before its end."""
+        parts = {
+            slot: PartInfo(
+                name=d.modelName,
+                version=d.version or "",
+                target=self.built.get(slot, "foreign"),
+                fmi=d.fmiVersion,
+                sha256=self.hashes[slot],
+            )
+            for slot, d in self.assembly.descriptions.items()
         }
+        item = next((parts[s] for s in ("gyro", "accelerometer") if s in parts), None)  # what the test is about
+        return RunDocument(
+            system=system.name,
+            title=system.title,
+            instrument=f"{item.name} {item.version}, simulated" if item else "",
+            spec=list(system.spec),
+            date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            seed=seed,
+            step=system.step,
+            engine=self.engine,
+            isolated=list(self.isolate),
+            **self.assembly.order.as_dict(system.step),
+            parts=parts,
+            parameters=parameters,
+            changed=[*(f"{s}: part" for s in self.swapped), *system.given],
+            options=dict(system.values),
+            units=self._units(),
+            plan=[PlanRow(**row) for row in system.plan().rows()],
+            versions=dict(package_versions()),
+            notes=[*self.notes, *notes, *system.warnings()],
+        )
 
 
 def run(
@@ -336,7 +342,7 @@ def run(
 
 
 @functools.cache
-def _versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.record import WHOLE, Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.system.system import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def record_from_series(system: System, series: Mapping[str, Array], meta: Mapping[str, Any] | None = None) -> Record:
+def record_from_series(system: System, series: Mapping[str, Array], run: RunDocument | None = None) -> Record:
     """The windows of a run that another tool did.
 
     series: "slot.output" -> samples at every communication step, for the watched output and all columns of
@@ -31,4 +32,4 @@ def record_from_series(system: System, series: Mapping[str, Array], meta: Mappin
     for name, source in system.windows.columns.items():
         column = np.asarray(series[source], dtype=float)[at]
         columns[name] = column.astype(np.int64) if name in WHOLE else column
-    return Record(columns, {}, dict(meta or {}))
+    return Record(columns, {}, run or RunDocument())

@@ -33,6 +33,7 @@ from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import Step, sampled_step
+from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
 from gyrobench.system.sockets import socket
 from gyrobench.system.values import flatten
 from gyrobench.system.wiring import Assembly, Connection
@@ -166,7 +167,7 @@ class Linear:
         return self.inputs.index(break_at)
 
     # ------------------------------------------------------------------ models
-    def continuous(self, break_at: str | None = None) -> dict[str, Any]:
+    def continuous(self, break_at: str | None = None) -> LinearModel:
         """A, B, C, D: from the excitations to the channels, or of the loop L opened at an input ("slot.variable")."""
         from scipy.linalg import block_diag
 
@@ -188,7 +189,7 @@ class Linear:
         rows = [self.outputs.index(n) for n in self.shown]
         return _model(a + b @ uk, b @ uw, cy[rows], dy[rows], self.outside, self.shown, self.states, 0.0)
 
-    def discrete(self, break_at: str | None = None) -> dict[str, Any]:
+    def discrete(self, break_at: str | None = None) -> LinearModel:
         """The same for the macro step of the co-simulation; states: those of the parts and the values over cuts."""
         names_of = {s: self.sampled[s].names if s in self.sampled else self.blocks[s].states for s in self.order}
         all_states = [f"{s}.{v}" for s in self.order for v in names_of[s]]
@@ -229,68 +230,60 @@ class Linear:
 
 def _model(
     a: Array, b: Array, c: Array, d: Array, inputs: list[str], outputs: list[str], states: list[str], step: float
-) -> dict[str, Any]:
-    """JSON-able; step: s, 0 for a continuous model."""
-    matrices = {"A": a.tolist(), "B": b.tolist(), "C": c.tolist(), "D": d.tolist()}
-    return {**matrices, "inputs": list(inputs), "outputs": list(outputs), "states": list(states), "step": step}
+) -> LinearModel:
+    """Return the model in the form of run.json; step: s, 0 for a continuous model."""
+    return LinearModel(
+        A=a.tolist(), B=b.tolist(), C=c.tolist(), D=d.tolist(), inputs=inputs, outputs=outputs, states=states, step=step
+    )
 
 
-def poles(model: Mapping[str, Any]) -> list[complex]:
+def poles(model: LinearModel) -> list[complex]:
     """Poles in the s plane, rad/s; of a discrete model ln(z) / step, without those at z = 0 (pure delays)."""
-    found = np.linalg.eigvals(np.asarray(model["A"], float)) if model["A"] else np.zeros(0)
-    if not model["step"]:
-        return [complex(p) for p in found]
-    return [cmath.log(complex(z)) / model["step"] for z in found if abs(z) > 1e-12]
+    eigenvalues = np.linalg.eigvals(np.asarray(model.A, float)) if model.A else np.zeros(0)
+    if not model.step:
+        return [complex(p) for p in eigenvalues]
+    return [cmath.log(complex(z)) / model.step for z in eigenvalues if abs(z) > 1e-12]
 
 
-def unstable(model: Mapping[str, Any]) -> list[complex]:
+def unstable(model: LinearModel) -> list[complex]:
     """Poles in the right half plane, the fastest growing first; those nearer to 0 than 0.01 rad/s do not count.
 
     Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
     at z = 1, by the third root of 1e-16.
     """
-    slow = max(SLOW, 1e-5 / model["step"]) if model["step"] else SLOW
+    slow = max(SLOW, 1e-5 / model.step) if model.step else SLOW
     right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > slow and p.real > 1e-6 * abs(p)]
     return sorted(right, key=lambda p: -p.real)
 
 
 def loops(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float
-) -> tuple[dict[str, Any], list[str]]:
-    """What run.json keeps of the linear system, and what the user should be told before the run.
+) -> tuple[LinearModels, list[str]]:
+    """Return the linear models that run.json keeps, and the warnings to give before the run.
 
-        {"closed": {"continuous": model, "discrete": model},
-         "loops": {name: {"break": "slot.input", "continuous": model, "discrete": model}}}
-
-    or {"missing": why} where there is none; a model is A, B, C, D with names and step.
+    Where there is no linear model, ``missing`` says why.
     """
     from gyrobench.component import ComponentError
 
     try:
         parts = operating_point(assembly, parameters, part_of)
         linear = Linear(assembly, parts, step)
-        kinds: list[tuple[str, Callable[..., dict[str, Any]]]] = [("discrete", linear.discrete)]
-        if not linear.sampled:
-            kinds.insert(0, ("continuous", linear.continuous))
-        found: dict[str, Any] = {
-            "closed": {kind: model() for kind, model in kinds},
-            "loops": {
-                name: {"break": at, **{kind: model(at) for kind, model in kinds}}
-                for name, at in assembly.system.loops.items()
-            },
-        }
+        kinds = {"discrete": linear.discrete} | ({} if linear.sampled else {"continuous": linear.continuous})
+        loops_: dict[str, OpenLoop] = {}
+        for name, at in assembly.system.loops.items():
+            loops_[name] = OpenLoop.model_validate({"break": at, **{kind: model(at) for kind, model in kinds.items()}})
+        models = LinearModels(closed=LinearPair(**{kind: model() for kind, model in kinds.items()}), loops=loops_)
     except ComponentError as error:  # the run will say it too
-        return {"missing": str(error)}, []
+        return LinearModels(missing=str(error)), []
     except LinearizationError as error:
-        return {"missing": str(error)}, [f"no margins from linearized parts: {error}"]
-    said = []
-    for kind, text in (("continuous", "the linear loop"), ("discrete", f"the loop with its step of {step:g} s")):
-        bad = unstable(found["closed"][kind]) if kind in found["closed"] else []
-        if bad:
-            others = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-            said.append(f"{text} is unstable: pole {_written(bad[0])}{others}; the run will show it growing")
-            break
-    return found, said
+        return LinearModels(missing=str(error)), [f"no margins from linearized parts: {error}"]
+    pair = models.closed
+    for model, text in ((pair.continuous, "the linear loop"), (pair.discrete, f"the loop with its step of {step:g} s")):
+        growing = unstable(model) if model is not None else []
+        if growing:
+            others = f" and {len(growing) - 1} more" if len(growing) > 1 else ""
+            return models, [f"{text} is unstable: pole {_written(growing[0])}{others}; the run will show it growing"]
+    return models, []
 
 
 def _written(p: complex) -> str:

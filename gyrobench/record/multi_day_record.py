@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from gyrobench.record.csv_reader import DataError, read_lines
-from gyrobench.record.record import Record, RecordError
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import Day, RecordError
 
 DAY = 86400.0  # s
 FREE = ("seed", "date", "operator", "note")  # may differ from day to day
@@ -36,36 +36,34 @@ def combine(records: Sequence[Record], names: Sequence[str], source: Path | str 
         if "t_end" not in w or not len(w["t_end"]):
             problems.append(f"{name}: holds no windows")
             continue
-        rows = [{**r, "phase": int(r["phase"]) + phase, "day": str(r.get("day") or name)} for r in record.meta["plan"]]
+        rows = [row.model_copy(update={"phase": row.phase + phase, "day": row.day or name}) for row in record.run.plan]
         moved = {n: np.asarray(v) + start if n in ("t_start", "t_end") else np.asarray(v) for n, v in w.items()}
         blocks.append({**moved, "phase": np.asarray(w["phase"]) + phase})
         plan += rows
-        phase = max(r["phase"] for r in rows)
+        phase = max(row.phase for row in rows)
         start = DAY * np.ceil((float(np.max(moved["t_end"])) + 1.0) / DAY)
     if problems:
         raise DataError(source, problems)
     common = [n for n in blocks[0] if all(n in b for b in blocks)]
     windows = {n: np.concatenate([b[n] for b in blocks]) for n in common}
-    runs = [{k: r.meta[k] for k in FREE if k in r.meta} | {"run": n} for r, n in zip(records, names, strict=True)]
-    return Record(windows, {}, {**first.meta, "plan": plan, "days": runs})
+    days = [
+        Day(run=name, **{k: getattr(r.run, k) for k in FREE if k in r.run.model_fields_set})
+        for r, name in zip(records, names, strict=True)
+    ]
+    return Record(windows, {}, first.run.model_copy(update={"plan": plan, "days": days}))
 
 
 def _differences(first: Record, other: Record) -> list[str]:
-    a, b = first.meta, other.meta
-    if a.get("system") != b.get("system"):
-        return [f"is a run of {b.get('system')}, the first is one of {a.get('system')}"]
+    a, b = first.run, other.run
+    if a.system != b.system:
+        return [f"is a run of {b.system}, the first is one of {a.system}"]
     found = [] if other.complete else ["the run is not complete"]
-    for kind in ("options", "parameters"):
-        x, y = _flat(a.get(kind)), _flat(b.get(kind))
+    for kind, x, y in (("options", a.options, b.options), ("parameters", a.parameters, b.parameters)):
         names = [n for n in sorted(x.keys() | y.keys()) if x.get(n) != y.get(n) and not n.endswith(".seed")]
         if names:
             shown = ", ".join(f"{n} = {y.get(n)} (first: {x.get(n)})" for n in names[:4])
             found.append(f"other {kind}: {shown}" + (f" and {len(names) - 4} more" if len(names) > 4 else ""))
     return found
-
-
-def _flat(values: Any) -> dict[str, Any]:
-    return dict(values) if isinstance(values, dict) else {}
 
 
 def read_runs(file: Path, system: str) -> Record | None:
@@ -89,8 +87,8 @@ def read_runs(file: Path, system: str) -> Record | None:
         except RecordError as error:
             problems.append(str(error))
             continue
-        if records[-1].meta.get("system") != system:
-            problems.append(f"{n}: is a run of {records[-1].meta.get('system')}, not of {system}")
+        if records[-1].run.system != system:
+            problems.append(f"{n}: is a run of {records[-1].run.system}, not of {system}")
     if problems:
         raise DataError(file, problems)
     return combine(records, [Path(n).name for n in names], file)

@@ -2,7 +2,8 @@
 
 ``record.parquet``   one row for each completed window (columns in SI, see the Sampler socket)
 ``channels.parquet`` decimated signals: ``time`` and "slot.variable" columns
-``run.json``         system, parts with SHA-256, parameters, seed, versions, order, step, complete, stopped_at
+``run.json``         system, parts with SHA-256, parameters, seed, versions, order, step, complete, stopped_at,
+                     SHA-256 of the tables: :mod:`gyrobench.record.run_document`
 
 Without pyarrow the tables are CSV files of the same names; numbers are written so that they read back bit for bit.
 Every file is written under a temporary name and renamed, run.json last: a folder with run.json is whole.
@@ -11,40 +12,18 @@ Every file is written under a temporary name and renamed, run.json last: a folde
 from __future__ import annotations
 
 import csv
-import json
-import math
-import os
-import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gyrobench.errors import GyrobenchError
+from gyrobench.files import sha256, write_whole
+from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocument, read_run
 
 Array = np.ndarray[Any, Any]
-#: what a record may say of its circumstances, beside instrument and operator, for a report that is signed
-ABOUT = ("laboratory", "customer", "conditions", "equipment")
 WHOLE = ("phase", "n", "flagged")  # integer columns
-
-
-class RecordError(GyrobenchError):
-    """A record that cannot be read; the text says which file and why."""
-
-
-def _replace(path: Path, write: Callable[[Path], object]) -> None:
-    """Writes a file under a temporary name beside ``path`` and renames it."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        write(temporary)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+SUFFIXES = (".parquet", ".csv")
 
 
 def _have_parquet() -> bool:
@@ -62,7 +41,7 @@ def write_table(stem: Path, columns: dict[str, Array]) -> Path:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        _replace(parquet, lambda p: pq.write_table(pa.table(columns), p))
+        write_whole(parquet, lambda p: pq.write_table(pa.table(columns), p))
         text.unlink(missing_ok=True)
         return parquet
 
@@ -72,9 +51,15 @@ def write_table(stem: Path, columns: dict[str, Array]) -> Path:
             writer.writerow(columns)
             writer.writerows(zip(*([repr(x) for x in c.tolist()] for c in columns.values()), strict=True))
 
-    _replace(text, write)
+    write_whole(text, write)
     parquet.unlink(missing_ok=True)
     return text
+
+
+def remove_table(stem: Path) -> None:
+    """Remove ``stem``.parquet and ``stem``.csv."""
+    for suffix in SUFFIXES:
+        stem.with_suffix(suffix).unlink(missing_ok=True)
 
 
 def read_table(stem: Path) -> dict[str, Array] | None:
@@ -93,51 +78,46 @@ def read_table(stem: Path) -> dict[str, Array] | None:
     return None
 
 
-def _plain(value: Any) -> Any:
-    """The same without numbers that JSON lacks: an infinite bound or parameter of a foreign FMU becomes text."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value
-
-
 @dataclass
 class Record:
-    """What a run left: windows, channels and where they come from."""
+    """What a run left: windows, channels and where they come from (run.json)."""
 
     windows: dict[str, Array] = field(default_factory=dict)
     channels: dict[str, Array] = field(default_factory=dict)
-    meta: dict[str, Any] = field(default_factory=dict)
+    run: RunDocument = field(default_factory=lambda: RunDocument())
     folder: Path | None = None
 
     def save(self, folder: Path) -> Path:
-        """Writes the folder (see the module) and returns it."""
+        """Write the folder (see the module) and return it."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        write_table(folder / "record", self.windows)
+        files = [write_table(folder / "record", self.windows)]
         if self.channels:
-            write_table(folder / "channels", self.channels)
-        text = json.dumps(_plain(self.meta), indent=1, ensure_ascii=False, allow_nan=False)
-        _replace(folder / "run.json", lambda p: p.write_text(text + "\n", encoding="utf-8"))
+            files.append(write_table(folder / "channels", self.channels))
+        else:
+            remove_table(folder / "channels")
+        self.run.tables = {file.name: sha256(file) for file in files}
+        self.run.write(folder)
         self.folder = folder
         return folder
 
     @classmethod
     def load(cls, folder: Path) -> Record:
-        """Reads a folder.  Raises RecordError when it is not a record."""
+        """Read a folder.  Raises RecordError when it is not a record, or when a table is not the one that was saved."""
         folder = Path(folder)
+        run = read_run(folder)
+        if isinstance(run, SuiteDocument):
+            tests = ", ".join(str(folder / test.folder) for test in run.tests.values()) or "none yet"
+            raise RecordError(f"{folder}: the run of a suite; its tests have a record each: {tests}")
+        _check_tables(folder, run)
         try:
-            meta = json.loads((folder / "run.json").read_text("utf-8"))
             windows = read_table(folder / "record")
             channels = read_table(folder / "channels")
         except (OSError, ValueError, IndexError) as error:
             raise RecordError(f"{folder}: not a readable record: {error}") from None
         if windows is None:
             raise RecordError(f"{folder}: has run.json but neither record.parquet nor record.csv")
-        return cls(windows, channels or {}, meta, folder)
+        return cls(windows, channels or {}, run, folder)
 
     def same_data(self, other: Record) -> bool:
         """True when windows and channels are equal bit for bit."""
@@ -149,7 +129,26 @@ class Record:
     @property
     def complete(self) -> bool:
         """False when the run was interrupted or failed."""
-        return bool(self.meta.get("complete", True))
+        return self.run.complete
+
+
+def _check_tables(folder: Path, run: RunDocument) -> None:
+    """Raise RecordError for a table that is missing, was changed or was added after the record was saved.
+
+    An old run.json names no tables: then none is checked.
+    """
+    if not run.tables:
+        return
+    remedy = "restore it from a copy, or repeat the run; your own data are reduced by gyrobench reduce"
+    for name, digest in run.tables.items():
+        file = folder / name
+        if not file.is_file():
+            raise RecordError(f"{file}: missing, but named in run.json; {remedy}")
+        if sha256(file) != digest:
+            raise RecordError(f"{file}: changed after it was saved (its SHA-256 is not the one in run.json); {remedy}")
+    for file in (folder / (stem + suffix) for stem in ("record", "channels") for suffix in SUFFIXES):
+        if file.is_file() and file.name not in run.tables:
+            raise RecordError(f"{file}: not a table of this record (run.json does not name it); remove it")
 
 
 def rows_to_columns(rows: list[Array], names: list[str], time: bool) -> dict[str, Array]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 
 def merge(

@@ -1,8 +1,8 @@
 """What the run.json of a record says about a test: site, scale factor, truth, phases, sizes of the uncertainties.
 
-site = Site.of(meta)
-k = number(meta, "k", "gyro.k")                   # the option, else the parameter of the part
-truth = truth_of(meta, drift.NAMES)               # None for measured data
+site = Site.of(record.run)
+k = number(record.run, "k", "gyro.k")             # the option, else the parameter of the part
+truth = truth_of(record.run, drift.NAMES)         # None for measured data
 return finish(result, record)
 """
 
@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.reduction.result import Result
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Result
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,9 @@ class Site:
     earth_rate: float = frames.EARTH_RATE
 
     @classmethod
-    def of(cls, meta: Mapping[str, Any]) -> Site:
+    def of(cls, run: RunDocument) -> Site:
         """From the options latitude, gravity and height and the site part; without gravity: WGS84 normal gravity."""
-        options, parameters = meta.get("options", {}), meta.get("parameters", {})
+        options, parameters = run.options, run.parameters
         if "latitude" not in options:
             raise ReductionError("the record does not say the latitude (option latitude)")
         latitude = float(options["latitude"])
@@ -52,45 +54,41 @@ class Site:
         }
 
 
-def number(meta: Mapping[str, Any], option: str, parameter: str, what: str = "") -> float:
-    """The option, where it is given and not 0, else the parameter "slot.name" of a part, SI.
+def number(run: RunDocument, option: str, parameter: str, what: str = "") -> float:
+    """Return the option, where it is given and not 0, else the parameter "slot.name" of a part, SI.
 
     Raises ReductionError, calling it ``what``, when there is neither.
     """
-    value = meta.get("options", {}).get(option) or meta.get("parameters", {}).get(parameter)
+    value = run.options.get(option) or run.parameters.get(parameter)
     if value is None:
         slot, _, name = parameter.partition(".")
         raise ReductionError(f"{what or option} unknown: the {slot} has no parameter {name}; give the option {option}")
     return float(value)
 
 
-def truth_of(meta: Mapping[str, Any], names: Iterable[str], slot: str = "gyro") -> dict[str, float] | None:
-    """Those of ``names`` that are parameters of the part in ``slot``, SI; None where there are none."""
-    parameters = meta.get("parameters", {})
-    return {n: float(parameters[f"{slot}.{n}"]) for n in names if f"{slot}.{n}" in parameters} or None
+def truth_of(run: RunDocument, names: Iterable[str], slot: str = "gyro") -> dict[str, float] | None:
+    """Return those of ``names`` that are parameters of the part in ``slot``, SI; None where there are none."""
+    return {n: float(run.parameters[f"{slot}.{n}"]) for n in names if f"{slot}.{n}" in run.parameters} or None
 
 
-def sizes(meta: Mapping[str, Any], names: Iterable[str]) -> dict[str, float]:
-    """Options that are sizes of uncertainties, SI; 0 where not given."""
-    options = meta.get("options", {})
+def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, float]:
+    """Return the options that are sizes of uncertainties, SI; 0 where not given."""
     return {n: float(options.get(n, 0.0)) for n in names}
 
 
-def phases(meta: Mapping[str, Any], known: Iterable[str], what: str = "mount") -> dict[int, dict[str, Any]]:
-    """The rows of the plan by number.  Raises ReductionError for a ``face`` that is none of ``known``."""
-    plan = meta.get("plan", [])
+def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[int, PlanRow]:
+    """Return the rows of the plan by number.  Raises ReductionError for a ``face`` that is not one of ``known``."""
     known = list(known)
-    unknown = sorted({str(r["face"]) for r in plan} - set(known))
+    unknown = sorted({row.face for row in run.plan} - set(known))
     if unknown:
         raise ReductionError(f"{what} {', '.join(unknown)} unknown; there are {', '.join(known)}")
-    return {int(r["phase"]): dict(r) for r in plan}
+    return {row.phase: row for row in run.plan}
 
 
-def finish(result: Result, record: Any) -> Result:
-    """``result`` with the run.json of a gyrobench.record.record.Record as provenance, and a word if it is not whole."""
-    result.provenance = dict(record.meta)
-    if not record.meta.get("complete", True):
-        result.warnings.insert(
-            0, f"The run stopped at {record.meta.get('stopped_at', 0.0):.6g} s, before its plan was done."
-        )
+def finish(result: Result, record: Record) -> Result:
+    """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete."""
+    result.provenance = record.run.as_dict()
+    if not record.run.complete:
+        stopped = record.run.stopped_at or 0.0
+        result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before its plan was done.")
     return result

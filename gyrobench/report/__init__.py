@@ -1,6 +1,6 @@
 """Reports: what was found, whether it meets its specification, and why to believe it.
 
-A :class:`gyrobench.reduction.result.Result` goes in; ``result.json``, ``report.html`` and ``report.pdf``
+A :class:`gyrobench.result.Result` goes in; ``result.json``, ``report.html`` and ``report.pdf``
 come out, rendered from one document, so that a number is the same number everywhere.  Nothing heavy is
 imported before a report is written.
 """
@@ -17,7 +17,7 @@ from gyrobench.report.result_json import ResultError, load, report_id
 from gyrobench.report.specification import SpecificationError, check_units, load_specification
 
 if TYPE_CHECKING:
-    from gyrobench.reduction.result import Result
+    from gyrobench.result import Result
 
 FORMATS = ("json", "html", "pdf")
 NAMES = {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}

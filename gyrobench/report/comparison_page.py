@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.reduction.result import Result
 from gyrobench.report import plots, ranking_section, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
@@ -26,6 +25,7 @@ from gyrobench.report.page_model import (
 from gyrobench.report.result_json import content_hash, document
 from gyrobench.report.style import HALF, figure, styled, svg
 from gyrobench.report.tables import compact
+from gyrobench.result import Result
 
 Json = dict[str, Any]
 SCHEMA = "gyrobench-comparison-1"

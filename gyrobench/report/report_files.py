@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gyrobench.reduction.result import Result
+from gyrobench.files import write_whole
 from gyrobench.report import FORMATS, ReportError
 from gyrobench.report.page_model import Page
 from gyrobench.report.result_json import document
+from gyrobench.result import Result
 
 
 def write_all(
@@ -77,23 +76,10 @@ def _write(
 
     for kind in sorted(formats, key=FORMATS.index):
         try:
-            replace(folder / names[kind], make(kind))
+            write_whole(folder / names[kind], make(kind))
             written[kind] = folder / names[kind]
         except Exception as error:  # the other formats must still be written
             failures[names[kind]] = error
     if failures:
         raise ReportError(failures, written) from next(iter(failures.values()))
     return written
-
-
-def replace(path: Path, content: bytes) -> None:
-    """Write a file whole: to a temporary name in the same folder, then renamed."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

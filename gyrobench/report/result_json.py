@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gyrobench.errors import GyrobenchError
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 SCHEMA = "gyrobench-result-1"
 MODES = {0: "hold", 1: "index", 2: "rate", 3: "servo"}

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import ABOUT
+from gyrobench.record.run_document import ABOUT
 from gyrobench.report import diagnostics_section, method_section, plots, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (

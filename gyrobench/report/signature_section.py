@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.record.record import ABOUT
+from gyrobench.record.run_document import ABOUT
 from gyrobench.report.page_model import Signatures
 
 Json = dict[str, Any]

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.errors import GyrobenchError
-
-Limits = dict[str, tuple[float | None, float | None]]
+from gyrobench.result import Specification
 
 _UNITS = {"deg/h": "°/h", "deg/h/g": "°/h/g", "deg/h/g2": "°/h/g²", "deg/h/g^2": "°/h/g²"}
 
@@ -31,8 +30,8 @@ def surface_unit(unit: str) -> str:
     return _UNITS.get(unit, unit)
 
 
-def load_specification(path: str | Path) -> Limits:
-    """Limits by coefficient name, ``(low, high)`` in surface units; None where a side is open.
+def load_specification(path: str | Path) -> Specification:
+    """Return the limits by coefficient name, ``(low, high)`` in surface units; None where a side is open.
 
     Raises SpecificationError for a file that is no TOML, an unknown key, a missing unit, a limit that
     is no finite number, limits in the wrong order or an entry without a limit; FileNotFoundError when

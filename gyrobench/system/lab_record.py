@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError, read_measured
-from gyrobench.record.record import ABOUT, Record
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
@@ -60,7 +61,7 @@ def read_record(
             problems.append(
                 f"'{name}' is not given: write '# {name} = {example}' in the file or --set {name}={example}"
             )
-    plan: list[dict[str, Any]] = []
+    plan: list[PlanRow] = []
     if attitudes is not None:
         plan, unclear = _plan(windows["phase"], said, attitudes())
         problems += unclear
@@ -71,23 +72,27 @@ def read_record(
         windows.setdefault("std", np.full(count, np.nan))
         windows.setdefault("n", np.ones(count, dtype=np.int64))
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
-    meta = {
-        "system": system.name,
-        "title": system.title,
-        "spec": list(system.spec),
-        "measured": True,
-        "complete": True,
-        "options": dict(system.values),
-        "parameters": {},
-        "plan": plan,
-        **{n: said[n] for n in texts if n in said},
-    }
-    return Record(windows, {}, meta)
+    return Record(windows, {}, measured_run(system, plan, {n: said[n] for n in texts if n in said}))
+
+
+def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, str]) -> RunDocument:
+    """Return the run.json of measured data; ``texts``: circumstances, which may replace the title of the system."""
+    circumstances: dict[str, Any] = {"title": system.title, **texts}
+    return RunDocument(
+        system=system.name,
+        spec=list(system.spec),
+        measured=True,
+        complete=True,
+        options=dict(system.values),
+        parameters={},
+        plan=list(plan),
+        **circumstances,
+    )
 
 
 def _plan(
     phase: np.ndarray[Any, Any], said: Mapping[str, str], modes: Mapping[str, str]
-) -> tuple[list[dict[str, Any]], list[str]]:
+) -> tuple[list[PlanRow], list[str]]:
     plan, problems = [], []
     for p in sorted({int(p) for p in phase}):
         face = said.get(f"phase {p}", "")
@@ -95,5 +100,5 @@ def _plan(
             there = f"{face!r} is no attitude" if face else "its attitude is not given"
             problems.append(f"phase {p}: {there}: write '# phase {p} = ...' with one of {', '.join(modes)}")
             continue
-        plan.append({"phase": p, "label": face, "mode": modes[face], "face": face})
+        plan.append(PlanRow(phase=p, label=face, mode=modes[face], face=face))
     return plan, problems

@@ -14,11 +14,13 @@
         windows = Windows("sampler.count", {"mean": "sampler.mean", ...})
         done = "sequencer.done"
         channels = ["gyro.u", "rebalance.i"]
+        noises = ("gyro.white", "rebalance.meter")          # set to 0 by --check-step
+        measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
         def parameters(self): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
         def check(self): return [...]
-        def reduce(self, record): ...
+        def reduce(self, record, specification=None): ...
 
 An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``system.set("gyro.H", 0.3)``.
 """
@@ -29,12 +31,12 @@ import importlib.util
 import math
 import sys
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from gyrobench.bench import Bench
+from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
@@ -43,6 +45,7 @@ from gyrobench.system.values import InvalidValueError, flatten, parse
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
+    from gyrobench.result import Result, Specification
 
 
 class InvalidConfigurationError(GyrobenchError):
@@ -111,6 +114,18 @@ class Windows:
         return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}, **more})
 
 
+@dataclass(frozen=True)
+class MeasuredData:
+    """How a laboratory's record of a test is written and read.
+
+    template: an empty record with its explanations, printed by ``gyrobench reduce SYSTEM --template``.
+    read: (system, file, values) -> record; see gyrobench.system.lab_record for one that fits most tests.
+    """
+
+    template: str
+    read: Callable[[System, Path, Mapping[str, str]], Record]
+
+
 class System:
     """Base class of the systems; see the module for how to declare one."""
 
@@ -126,9 +141,9 @@ class System:
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
     channel_period: float = 1.0  # s
-    loops: ClassVar[
-        Mapping[str, str]
-    ] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear.linear_model
+    loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
+    noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
+    measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
     name: str = ""
@@ -194,9 +209,26 @@ class System:
         """What the user should know about these values, as sentences."""
         return []
 
-    def reduce(self, record: Record) -> Any:
-        """record -> gyrobench.reduction.result.Result"""
-        raise NotImplementedError(f"{self.name} has no reduction")
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+        """Return the result of a record, judged by the limits of ``specification`` where it has any.
+
+        Raises UsageError for a system without a reduction.
+        """
+        raise UsageError(f"{self.name} has no reduction")
+
+    @property
+    def has_reduction(self) -> bool:
+        """False for a system whose runs end with the record."""
+        return type(self).reduce is not System.reduce
+
+    def read_measured(self, data: Path, values: Mapping[str, str]) -> Record:
+        """Return a laboratory's file as a record; ``values``: options, and comments of the file, which they replace.
+
+        Raises UsageError for a system that declares no measured data, and what the reader raises.
+        """
+        if self.measured_data is None:
+            raise UsageError(f"{self.name} has no reduction of measured data")
+        return self.measured_data.read(self, data, values)
 
     # ------------------------------------------------------------ used by the bench
     def refuse(self) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.frames import G0
+from gyrobench.result import Specification
 
 from . import closed
 from .geometry import CROSS, specific_force
@@ -34,7 +35,7 @@ class Setup:
     mounts: Mapping[int, str]
     truth: Mapping[str, float] | None = None
     zeros: Mapping[str, float] | None = None
-    specification: Mapping[str, tuple[float | None, float | None]] | None = None
+    specification: Specification | None = None
     u_scale: float = 0.0
     u_current: float = 0.0
     u_gravity: float = 0.0

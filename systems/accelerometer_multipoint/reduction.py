@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.frames import G0
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation.fit_result import (
     Effect,
@@ -30,8 +32,8 @@ from gyrobench.reduction.estimation.fit_result import (
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Result, Specification
 
 from . import closed
 from .geometry import zero_angle
@@ -304,34 +306,32 @@ def _summary(result: Result, found: Findings) -> list[str]:
     ]
 
 
-def setup_of(
-    meta: Mapping[str, Any], specification: Mapping[str, tuple[float | None, float | None]] | None = None
-) -> Setup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
     """The setup a run.json describes.  Truth only where the accelerometer has the coefficients."""
-    options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = run_metadata.Site.of(meta)
-    measured = bool(meta.get("measured", False))
-    plan = run_metadata.phases(meta, ("a", "b"))
-    mounts = {p: str(r["face"]) for p, r in plan.items()}
-    truth = run_metadata.truth_of(meta, KS, "accelerometer")
+    options, parameters = run.options, run.parameters
+    site = run_metadata.Site.of(run)
+    measured = run.measured
+    plan = run_metadata.phases(run, ("a", "b"))
+    mounts = {p: row.face for p, row in plan.items()}
+    truth = run_metadata.truth_of(run, KS, "accelerometer")
     zeros = None
     if truth is not None and set(truth) == set(KS):
         axes = parameters.get("accelerometer.mount", np.eye(3))
         zeros = {m: zero_angle(m, axes) for m in sorted(set(mounts.values()))}
     return Setup(
         gravity=site.gravity,
-        scale=run_metadata.number(meta, "scale", "accelerometer.scale", "scale λ"),
+        scale=run_metadata.number(run, "scale", "accelerometer.scale", "scale λ"),
         mounts=mounts,
         truth=truth if zeros is not None else None,
         zeros=zeros,
         specification=specification,
         quantum=float(parameters.get("accelerometer.resolution", 0.0)),
-        instrument=str(meta.get("instrument", "")),
+        instrument=run.instrument,
         site={"gravity / (m/s²)": site.gravity} if measured else site.shown(),
-        **run_metadata.sizes({"options": options}, ("u_scale", "u_current", "u_gravity", "u_angle")),
+        **run_metadata.sizes(options, ("u_scale", "u_current", "u_gravity", "u_angle")),
     )
 
 
-def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

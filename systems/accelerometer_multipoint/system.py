@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import geometry, measured
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
 STATIONS = 24  # of the indexing head
@@ -75,6 +73,7 @@ class AccelerometerMultipoint(System):
     noises = (
         "accelerometer.turn_on", "accelerometer.markov", "accelerometer.white", "accelerometer.meter", "table.repeat",
     )  # fmt: skip
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "accelerometer.i", "accelerometer.theta")
@@ -153,9 +152,3 @@ class AccelerometerMultipoint(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench.record.csv_reader import Column, DataError
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import TEXTS, read_record
 
 from . import positions
@@ -79,15 +80,15 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     keys = list(zip(day.tolist(), rows.pop("cycle").tolist(), rows.pop("position").tolist(), strict=True))
     phases = {key: k for k, key in enumerate(dict.fromkeys(keys), 1)}
     plan = [
-        {
-            "phase": phase,
-            "label": f"cycle {c}, {positions.NAMES[p]}",
-            "mode": "hold",
-            "face": positions.NAMES[p],
-            "cycle": c,
+        PlanRow(
+            phase=phase,
+            label=f"cycle {c}, {positions.NAMES[p]}",
+            mode="hold",
+            face=positions.NAMES[p],
+            cycle=c,
             **({"day": str(d)} if several else {}),
-        }
+        )
         for (d, c, p), phase in phases.items()
     ]
     windows = {"phase": np.array([phases[k] for k in keys], dtype=np.int64), **rows}
-    return Record(windows, {}, {**record.meta, "plan": plan})
+    return Record(windows, {}, record.run.replace(plan=plan))

@@ -29,11 +29,11 @@ from gyrobench import frames, units
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.fit_result import Findings, Quantity, ReductionError
 from gyrobench.reduction.estimation.linear_fit import Estimates
+from gyrobench.result import Specification
 
 from . import positions
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 MEANING = {
     "k_x": "scale factor of the torquer about x",
     "k_y": "scale factor of the torquer about y",
@@ -68,7 +68,7 @@ class Setup:
     terms: int = 6
     sigma: bool = True
     truth: Mapping[str, float] | None = None
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_attitude: float = 0.0
     u_mount: float = 0.0
     u_latitude: float = 0.0

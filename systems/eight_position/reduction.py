@@ -13,18 +13,25 @@ otherwise than as noise, motion between the positions.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import repeatability, residual_series
-from gyrobench.reduction.estimation.fit_result import Group, Limits, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.fit_result import (
+    Group,
+    ReductionError,
+    fit,
+    linear_result,
+    plus_minus,
+)
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.result import Coefficient, Result
 from gyrobench.reduction.window_checks import window_problems
+from gyrobench.result import Coefficient, Result, Specification
 
 from . import budget, model, positions, refusals, tables
 from .model import Setup
@@ -217,10 +224,10 @@ def _shown(c: Coefficient) -> str:
     return f"{c.estimate:.6g} {c.unit}" if ideal else plus_minus(c)
 
 
-def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Setup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
     """The setup that a run.json describes: options and the parameters of the parts (slot.name, SI)."""
-    options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = run_metadata.Site.of(meta)
+    options, parameters = run.options, run.parameters
+    site = run_metadata.Site.of(run)
     known = all(f"gyro.{n}" in parameters for n in ("Dx_0", "Dy_0"))
     return Setup(
         latitude=site.latitude,
@@ -228,26 +235,26 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Se
         earth_rate=site.earth_rate,
         terms=int(options.get("terms", 6)),
         sigma=bool(options.get("sigma", True)),
-        truth=run_metadata.truth_of(meta, model.TRUE) if known else None,
+        truth=run_metadata.truth_of(run, model.TRUE) if known else None,
         specification=specification,
         quantum={c: float(parameters.get(f"rebalance_{c}.resolution", 0.0)) for c in "xy"},
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, ("u_attitude", "u_mount", "u_latitude", "u_current", "u_nonlinearity")),
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, ("u_attitude", "u_mount", "u_latitude", "u_current", "u_nonlinearity")),
     )
 
 
-def days_of(record: Any) -> dict[str, dict[str, Array]]:
+def days_of(record: Record) -> dict[str, dict[str, Array]]:
     """Readings of each day: day -> columns of :func:`reduce`; a plan row names the position as its face.
 
     Raises ReductionError for a face that is no position.
     """
-    plan = run_metadata.phases(record.meta, positions.NUMBERS)
+    plan = run_metadata.phases(record.run, positions.NUMBERS)
     day, place, turn = {}, {}, {}
     seen: dict[tuple[str, int], int] = {}
-    for phase, r in plan.items():
-        number, name = positions.NUMBERS[r["face"]], str(r.get("day", ""))
+    for phase, row in plan.items():
+        number, name = positions.NUMBERS[row.face], row.day
         seen[name, number] = seen.get((name, number), 0) + 1
-        day[phase], place[phase], turn[phase] = name, number, int(r.get("cycle") or seen[name, number])
+        day[phase], place[phase], turn[phase] = name, number, row.cycle or seen[name, number]
     phases = np.asarray(record.windows["phase"]).astype(int).tolist()
     stray = sorted(set(phases) - set(day))
     if stray:
@@ -261,9 +268,9 @@ def days_of(record: Any) -> dict[str, dict[str, Array]]:
     return out
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
-    setup = setup_of(record.meta, specification)
+    setup = setup_of(record.run, specification)
     days = days_of(record)
     if not days:
         raise ReductionError("the record holds no windows")

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import measured, positions, refusals
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 
 
@@ -87,6 +85,7 @@ class EightPosition(System):
         "gyro.turn_on_x", "gyro.turn_on_y", "gyro.markov_x", "gyro.markov_y", "gyro.white_x", "gyro.white_y",
         "gyro.pickoff_x", "gyro.pickoff_y", "rebalance_x.meter", "rebalance_y.meter",
     )  # fmt: skip
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows(
         "sampler_x.count",
         {
@@ -149,9 +148,3 @@ class EightPosition(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.reduction.estimation import repeatability as repeats
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 from . import model, positions
 

@@ -10,35 +10,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import estimator_result
 from gyrobench.reduction.loops.estimator_result import Measures, Signals
-from gyrobench.reduction.result import Response, Result, Series
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Response, Result, Series, Specification
 
 from .benchmarks import BENCHMARKS
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 SHOWN, COMPARED = 400, 1000  # readings in the pictures
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """The result of a record; raises ReductionError where it cannot be reduced."""
-    meta = record.meta
-    known = BENCHMARKS.get(str(meta.get("options", {}).get("benchmark")))
+    run = record.run
+    known = BENCHMARKS.get(str(run.options.get("benchmark")))
     if known is None:
         raise ReductionError(f"the record does not say which benchmark it is of: one of {', '.join(BENCHMARKS)}")
-    options, p = meta["options"], meta.get("parameters", {})
+    options, p = run.options, run.parameters
     skip = int(options["skip"]) if options.get("skip", -1) >= 0 else known.skip
     s = signals(record.channels, skip, known.Ts)
     sine = float(p.get("source.amplitude", 0.0)) != 0.0
     random = any(float(p.get(f"source.{n}", 0.0)) != 0.0 for n in ("p", "walk", "markov"))
     frequency = float(p["source.frequency"]) if sine and not random else None
     m = estimator_result.measure(s, frequency, true_variance(p, s.time))
-    name = str(meta.get("parts", {}).get("estimator", {}).get("name", ""))
+    name = run.parts["estimator"].name if "estimator" in run.parts else ""
     return run_metadata.finish(_result(m, s, known.title, name, specification or {}), record)
 
 
@@ -74,7 +74,7 @@ def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
     return (float(p["source.white"]) * (factor if time[0] >= after else 1.0)) ** 2
 
 
-def _result(m: Measures, s: Signals, title: str, name: str, limits: Limits) -> Result:
+def _result(m: Measures, s: Signals, title: str, name: str, limits: Specification) -> Result:
     for c in m.coefficients:
         c.limit = limits.get(c.name)
         c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)

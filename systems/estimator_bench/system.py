@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.connectors import Socket, out
 from gyrobench.system.system import Option, Slot, System
 from gyrobench.system.values import InvalidValueError
 
 from .benchmarks import BENCHMARKS, Benchmark
-
-Specification = Mapping[str, tuple[float | None, float | None]]
 
 SOURCE = Socket(
     "SignalSource",

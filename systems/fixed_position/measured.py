@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench.record.csv_reader import Column
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ TEMPLATE = """\
 # Instead: one column `run` with the folders of runs, one a day: they are reduced together.
 t_start [s],t_end [s],mean [mA]
 """
+ATTITUDE = "service attitude"
 COLUMNS = (
     Column("t_start", "s", "start of the reading"),
     Column("t_end", "s", "end of the reading"),
@@ -59,8 +61,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     days = np.unique(day)
     several = days.size > 1
     plan = [
-        {"phase": int(d), "label": "service attitude", "mode": "hold", "face": "service attitude",
-         **({"day": str(d)} if several else {})}
+        PlanRow(phase=int(d), label=ATTITUDE, mode="hold", face=ATTITUDE, **({"day": str(d)} if several else {}))
         for d in days
-    ]  # fmt: skip
-    return Record({"phase": day, **windows}, {}, {**record.meta, "plan": plan})
+    ]
+    return Record({"phase": day, **windows}, {}, record.run.replace(plan=plan))

@@ -19,21 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.estimation import repeatability
 from gyrobench.reduction.estimation.fit_result import (
     Effect,
     Group,
-    Limits,
     Quantity,
     ReductionError,
     fit,
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import window_problems
+from gyrobench.result import Result, Specification
 
 from . import refusals
 
@@ -59,7 +60,7 @@ class Setup:
     attitude: Array = field(default_factory=lambda: np.eye(3))
     earth_rate: float = frames.EARTH_RATE
     truth: Mapping[str, float] | None = None
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_attitude: float = 0.0
     u_latitude: float = 0.0
     u_scale_factor: float = 0.0
@@ -188,10 +189,10 @@ def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, A
     }
 
 
-def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Setup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
     """The setup that a run.json describes."""
-    options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = run_metadata.Site.of(meta)
+    options, parameters = run.options, run.parameters
+    site = run_metadata.Site.of(run)
     try:
         attitude = parse(str(options.get("attitude", "")), site.latitude)
     except ValueError as error:
@@ -201,19 +202,19 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Se
         gravity=site.gravity,
         earth_rate=site.earth_rate,
         attitude=attitude,
-        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
-        truth=run_metadata.truth_of(meta, drift.NAMES),
+        k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
+        truth=run_metadata.truth_of(run, drift.NAMES),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
     )
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
-    setup = setup_of(record.meta, specification)
-    day = {int(r["phase"]): str(r.get("day", "")) for r in record.meta["plan"]}
+    setup = setup_of(record.run, specification)
+    day = {row.phase: row.day for row in record.run.plan}
     phases = np.asarray(record.windows["phase"]).astype(int).tolist()
     names = np.array([day.get(p, "") for p in phases])
     each = {}

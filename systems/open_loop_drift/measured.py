@@ -10,6 +10,7 @@ import numpy as np
 
 from gyrobench.record.csv_reader import Column
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
 
 if TYPE_CHECKING:
@@ -50,7 +51,5 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     angle = windows.pop("angle")
     windows["mean"] = windows.pop("u", np.zeros(angle.size))
     windows |= {"angle_start": angle, "angle_end": angle, "phase": np.arange(1, angle.size + 1)}
-    plan = [
-        {"phase": n, "label": f"reading {n}", "mode": "hold", "face": "input axis"} for n in windows["phase"].tolist()
-    ]
-    return Record(windows, {}, {**record.meta, "plan": plan})
+    plan = [PlanRow(phase=n, label=f"reading {n}", mode="hold", face="input axis") for n in windows["phase"].tolist()]
+    return Record(windows, {}, record.run.replace(plan=plan))

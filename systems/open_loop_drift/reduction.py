@@ -27,20 +27,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.estimation.fit_result import (
     Effect,
     Group,
-    Limits,
     Quantity,
     ReductionError,
     fit,
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import window_problems
+from gyrobench.result import Result, Specification
 
 from . import refusals
 
@@ -70,7 +71,7 @@ class Setup:
     wait: float | None = None
     reach: float | None = None
     truth: Mapping[str, float] | None = None
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_attitude: float = 0.0
     u_latitude: float = 0.0
     u_angle: float = 0.0
@@ -251,20 +252,20 @@ def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: 
     return {"title": "From angle to drift", "caption": "What the drift is made of", "columns": head, "rows": rows}
 
 
-def _float_gain(meta: Mapping[str, Any]) -> float:
+def _float_gain(run: RunDocument) -> float:
     """The option, else H/C of the gyro, else 1."""
-    given, parameters = float(meta.get("options", {}).get("float_gain", 0.0)), meta.get("parameters", {})
+    given, parameters = float(run.options.get("float_gain", 0.0)), run.parameters
     if given > 0.0 or not {"gyro.H", "gyro.C"} <= set(parameters):
         return given or 1.0
     return float(parameters["gyro.H"]) / float(parameters["gyro.C"])
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a record with its run.json as provenance."""
-    meta = record.meta
-    site = run_metadata.Site.of(meta)
+    run = record.run
+    site = run_metadata.Site.of(run)
     try:
-        attitude = parse(str(meta.get("options", {}).get("attitude", "")), site.latitude)
+        attitude = parse(str(run.options.get("attitude", "")), site.latitude)
     except ValueError as error:
         raise ReductionError(str(error)) from None
     setup = Setup(
@@ -272,12 +273,12 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         gravity=site.gravity,
         earth_rate=site.earth_rate,
         attitude=attitude,
-        float_gain=_float_gain(meta),
-        wait=next((float(r["settle"]) for r in meta.get("plan", []) if "settle" in r), None),
-        reach=refusals.case_range(meta.get("parameters", {})),
-        truth=run_metadata.truth_of(meta, drift.NAMES),
+        float_gain=_float_gain(run),
+        wait=None if run.measured else next((row.settle for row in run.plan), None),
+        reach=refusals.case_range(run.parameters),
+        truth=run_metadata.truth_of(run, drift.NAMES),
         specification=specification,
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
     )
     return run_metadata.finish(reduce(record.windows, setup), record)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,12 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.attitude_parser import parse
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import measured, refusals
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 MOUNT = "input axis on table axis"
 ACCELERATION, RATE = 1e-3, 0.01  # rad/s2, rad/s: a gentle hand; the float sees the rate in steps, off by some a h^2
@@ -81,6 +79,7 @@ class OpenLoopDrift(System):
         "u_float_gain": Option(0.0, "1", "standard uncertainty of H/C", 0.0),
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     open = ("gyro.i",)
     done = "sequencer.done"
@@ -136,9 +135,3 @@ class OpenLoopDrift(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

@@ -18,7 +18,7 @@ from scipy import special
 
 from gyrobench import units
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.result import Coefficient, Series
+from gyrobench.result import Coefficient, Series
 
 Array = NDArray[np.float64]
 ARCMIN = units.factor("arcmin")

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from gyrobench import drift as drift_model
 from gyrobench import units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import (
@@ -34,8 +36,8 @@ from gyrobench.reduction.estimation.fit_result import (
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.result import Coefficient, Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Coefficient, Result, Specification
 
 from .levels import Levels
 from .refusals import drift_problems, record_problems
@@ -43,7 +45,6 @@ from .refusals import drift_problems, record_problems
 __all__ = ["PickoffSetup", "ReductionError", "from_record", "reduce"]
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH, ARCSEC, ARCMIN = units.factor("deg/h"), units.factor("arcsec"), units.factor("arcmin")
 TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is estimated
 
@@ -57,7 +58,7 @@ class PickoffSetup:
     gain: float
     drift: float
     truth: Mapping[str, float] | None = None
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_gain: float = 0.0
     u_angle: float = 0.0
     u_voltage: float = 0.0
@@ -193,18 +194,18 @@ def _warnings(both: bool, bound: float, span: float) -> list[str]:
     ]
 
 
-def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> PickoffSetup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> PickoffSetup:
     """The setup a run.json describes: options and the parameters of the gyro."""
-    options = meta.get("options", {})
-    site = run_metadata.Site.of(meta)
-    known = run_metadata.truth_of(meta, ("H", "C", "K_sg"))
+    options = run.options
+    site = run_metadata.Site.of(run)
+    known = run_metadata.truth_of(run, ("H", "C", "K_sg"))
     gain = float(options.get("gain") or 0.0)
     truth: dict[str, float] | None = None
     if known is not None and set(known) == {"H", "C", "K_sg"}:
         own = known["H"] / known["C"]
         gain = gain or own
         truth = {"S": known["K_sg"] * own, "K_sg": known["K_sg"]}
-        static = run_metadata.truth_of(meta, drift_model.NAMES)
+        static = run_metadata.truth_of(run, drift_model.NAMES)
         if static is not None:
             # output axis on the pole, spin axis on east x pole: X = 0, Y = -g sin, Z = -g cos of the latitude
             xyz = np.array([0.0, -site.g * math.sin(site.latitude), -site.g * math.cos(site.latitude)])
@@ -212,18 +213,18 @@ def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> Pi
             truth["drift"] = float(sum(r * v for r, v in zip(row, static.values(), strict=True)))
     if not gain:
         raise ReductionError("gain H/C unknown: the gyro has no parameters H and C; give the option gain")
-    measured = bool(meta.get("measured", False))
+    measured = run.measured
     return PickoffSetup(
         gain=gain,
         drift=float(options["drift"]),
         truth=truth,
         specification=specification,
-        instrument=str(meta.get("instrument", "")),
+        instrument=run.instrument,
         site={} if measured else site.shown(),
-        **run_metadata.sizes(meta, ("u_gain", "u_angle", "u_voltage")),
+        **run_metadata.sizes(run.options, ("u_gain", "u_angle", "u_voltage")),
     )
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

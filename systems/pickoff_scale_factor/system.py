@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import measured
 from .refusals import drift_problems, points_problems, range_problems
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 FACE = "input axis on the table axis"
 #: rows I, O, S in table axes at angle 0: input axis on the table axis, output axis on the first
@@ -89,6 +87,7 @@ class PickoffScaleFactor(System):
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
     step = 1e-4  # s: the rate of a move of 0.2 s reaches the gyro as held values, wrong by acceleration step2/4 at most
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     open = ("gyro.i",)
     done = "sequencer.done"
@@ -158,9 +157,3 @@ class PickoffScaleFactor(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

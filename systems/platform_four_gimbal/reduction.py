@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
@@ -21,7 +20,7 @@ KEPT = 0.01  # deg: up to this the inner element counts as kept
 PITCH, INNER, AZIMUTH, OUTER = "platform.theta[1]", "platform.theta[2]", "platform.theta[3]", "platform.theta_4"
 
 
-def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     holds = [g for g in found.of("hold") if g.label == REST]
@@ -53,7 +52,7 @@ def from_record(record: Record, specification: Mapping[str, tuple[float | None, 
 def _flight(found: LoopFindings, flight: Flight) -> list[str]:
     error, travel = flight.error / DEG, float(np.ptp(flight[OUTER])) / DEG
     g2 = np.abs(flight[INNER]) / DEG
-    u = flight.u(float(found.record.meta["step"])) / DEG
+    u = flight.u(found.record.run.step) / DEG
     found.measure("platform error", "largest in the flight, drift taken off", "°", float(error.max()), u)
     found.measure("error at the end", "of the flight", "°", float(error[-1]), flight.noise / DEG)
     found.measure(
@@ -85,7 +84,7 @@ def _flight(found: LoopFindings, flight: Flight) -> list[str]:
         found.warnings.append("A pickoff of the gyros was saturated in the flight: the platform has left them.")
     fast = max(float(np.abs(flight[f"platform.theta_dot[{k}]"]).max()) for k in (1, 2, 3))
     fast = max(fast, float(np.abs(flight["platform.theta_4_dot"]).max()))
-    top = found.record.meta["parameters"].get("platform.rate_max")
+    top = found.record.run.parameters.get("platform.rate_max")
     if top and fast >= float(top) * (1.0 - 1e-9):
         found.warnings.append(f"A gimbal was at its largest rate, {float(top) / DEG:.4g}°/s, in the flight.")
     return _said(flight, error, travel, steep & (held < 0.5))
@@ -93,7 +92,7 @@ def _flight(found: LoopFindings, flight: Flight) -> list[str]:
 
 def _moved(found: LoopFindings, rate: np.ndarray) -> float:
     """Standard uncertainty of a ring's angle, deg: what it moves in a step at its fastest, rectangular."""
-    return float(np.abs(rate).max()) * float(found.record.meta["step"]) / math.sqrt(12.0) / DEG
+    return float(np.abs(rate).max()) * found.record.run.step / math.sqrt(12.0) / DEG
 
 
 def _held(flight: Flight) -> np.ndarray:
@@ -149,8 +148,8 @@ def _legs(flight: Flight) -> dict[str, object]:
 
 def _loads(found: LoopFindings) -> None:
     """The servo yields by M / (drag feedback), drag being the platform's; at rest both have the same axes."""
-    p = found.record.meta["parameters"]
-    feedback = found.record.meta["options"].get("feedback")
+    p = found.record.run.parameters
+    feedback = found.record.run.options.get("feedback")
     drag = p.get("platform.drag")
     holds = [g for g in found.of("hold") if g.label == REST]
     for gate in found.of("torque", shape="step"):

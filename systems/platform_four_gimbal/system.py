@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
 from .flights import FLIGHTS
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 AXES = ("pitch", "roll", "azimuth")  # the A order: gimbals 3, 2, 1
 LAWS = ("secant", "sign", "constant")  # the part's gain 0, 1, 2

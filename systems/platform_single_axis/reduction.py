@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,8 +10,8 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import Value, rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.run_metadata import number
+from gyrobench.result import Result, Specification
 
 MRAD = 1e-3
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
@@ -34,7 +33,7 @@ def level(y: np.ndarray, stretches: int = 10) -> Value:
     return Value(whole, u, stretches - 1)
 
 
-def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = _ride(found)
@@ -73,7 +72,7 @@ def _ride(found: LoopFindings) -> list[str]:
     meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
-    k = number(found.record.meta, "k", "gyro.k")
+    k = number(found.record.run, "k", "gyro.k")
     if k is not None:
         _estimator(found, ride, k)
     base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
@@ -125,7 +124,7 @@ def _drift(found: LoopFindings) -> None:
     hold = [g for g in found.of("hold") if g.label == "drift"]
     if not hold:
         return
-    parameters = found.record.meta.get("parameters", {})
+    parameters = found.record.run.parameters
     names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
     truth = None
     if all(n in parameters for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1) at standard gravity

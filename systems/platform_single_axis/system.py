@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
 PICKOFF = 10.0  # V/rad
 PICKOFF_NOISE = 5e-8  # V/sqrt(Hz)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,14 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
 AXES = ("pitch", "roll", "azimuth")
 XYZ = "xyz"
 ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 
 
-def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = [_coupling(found), _isolation(found), _ride(found)]
@@ -162,7 +161,7 @@ def _drift(found: LoopFindings) -> None:
     """Each axis turns with the drift of its gyro, for the specific force that the element sees at rest."""
     for gate in (g for g in found.of("hold") if g.label == "drift"):
         up = _up([gate[f"platform.theta[{k}]"].mean() for k in (1, 2, 3)])  # the commands have turned it
-        parameters = found.record.meta.get("parameters", {})
+        parameters = found.record.run.parameters
         for name, axis in zip(ANGLES, XYZ, strict=True):
             truth, slot = None, f"gyro_{axis}"
             named = {n: parameters.get(f"{slot}.{n}") for n in static.NAMES}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import Gate, cross_axis, drift, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
@@ -20,7 +19,7 @@ COUPLING = 4.0  # Hz, where the coupling between the axes is shown
 DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z of the platform
 
 
-def from_record(record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = _flight(found)
@@ -54,7 +53,7 @@ def _rest(found: LoopFindings) -> list[Gate]:
 
 def _loads(found: LoopFindings) -> None:
     """The servo yields by M / (drag feedback) when the channel has no integral; drag and lag are the platform's."""
-    p = found.record.meta["parameters"]
+    p = found.record.run.parameters
     drag, gain = p.get("platform.drag"), p.get("platform.rate_gain", 1.0)
     feedback = float(p["gyro_a.K_sg_x"]) * float(p["pitch.K"]) * gain if "pitch.K" in p else None
     for gate in found.of("torque", shape="step"):
@@ -92,7 +91,7 @@ def _command(found: LoopFindings) -> None:
         y = gate[f"platform.attitude[{gate.axis}]"][late]
         got = drift(gate.t[late], y)
         share, u = (got.rate - own) / gate.amplitude, got.u / abs(gate.amplitude)
-        truth = 1.0 + float(found.record.meta["options"].get("torquer", 0.0))
+        truth = 1.0 + float(found.record.run.options.get("torquer", 0.0))
         found.measure("rate gain", "rate of the platform over rate commanded", "1", share, u, truth=truth)
 
 
@@ -106,7 +105,7 @@ def _drift(found: LoopFindings) -> None:
             if axis == "x":
                 scale = {k: [v / DPH for v in got.allan[k]] for k in ("dev", "lo", "hi") if k in got.allan}
                 found.allan = {**got.allan, **scale, "unit": "°/h"} if got.allan else {}
-        scale = float(found.record.meta["parameters"].get("gyro_a.K_sg_y", 10.0))
+        scale = float(found.record.run.parameters.get("gyro_a.K_sg_y", 10.0))
         apart = drift(gate.t, (gate["gyro_b.u_x"] - gate["gyro_a.u_y"]) / scale)
         truth = float(np.mean(gate["gyro_a.drift_y"] - gate["gyro_b.drift_x"])) / DPH
         meaning = "the fourth axis against the third, both about z: difference of two drifts"
@@ -119,10 +118,10 @@ def _flight(found: LoopFindings) -> list[str]:
     if not legs:
         return []
     flight = Flight(legs, "platform.attitude", next(iter(_rest(found)), None))
-    mount = int(found.record.meta["options"].get("mount", 1))
+    mount = int(found.record.run.options.get("mount", 1))
     middle = flight[f"platform.theta[{2 if mount else 1}]"]
     end, most = float(flight.error[-1]), float(flight.error.max())
-    u = flight.u(float(found.record.meta["step"]))
+    u = flight.u(found.record.run.step)
     found.measure("platform error", "largest in the flight, drift taken off", "°", most / DEG, u / DEG)
     found.measure("error at the end", "of the flight", "°", end / DEG, flight.noise / DEG)
     found.tables.append(_legs(flight, middle))

@@ -10,13 +10,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 DPH = DEG / 3600.0
 AXES = ("pitch", "roll", "azimuth")  # the A order

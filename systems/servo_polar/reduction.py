@@ -19,29 +19,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.fit_result import Findings, Group, ReductionError, fit, linear_result, plus_minus
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.families.servo_stand import ATTITUDES, POLAR, attitude
 
 from . import closed, refusals
 from .model import Model
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
-    meta, windows = record.meta, record.windows
-    options = dict(meta.get("options", {}))
-    site = run_metadata.Site.of(meta)
+    run, windows = record.run, record.windows
+    options = dict(run.options)
+    site = run_metadata.Site.of(run)
     route, which = str(options.get("route", "dwells")), int(options.get("terms", 9))
-    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
     if route != "dwells" or len({n for n in labels.values() if n in POLAR}) == 1:
         labels = {p: n for p, n in labels.items() if n in POLAR or n not in ATTITUDES}
     wrong = refusals.latitude_problems(site.latitude)
@@ -58,9 +58,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     )
     wrong = refusals.record_problems(start, end, phase, labels)
     limit = float(options.get("tracking", servo_regression.TRACKING))
-    wrong += servo_regression.tracking_problems(
-        windows, np.isin(every, list(labels)), meta.get("parameters", {}), limit
-    )
+    wrong += servo_regression.tracking_problems(windows, np.isin(every, list(labels)), run.parameters, limit)
     mounts = [n for n in labels.values() if n in POLAR]
     dwells = {n for n in labels.values() if n not in POLAR}
     if route == "dwells" and len(set(mounts)) > 1 and dwells != {"x east, y up", "x east, y down"}:
@@ -78,7 +76,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     y, X = servo_regression.drift_rate(held, site), model.columns(held, site)
     groups = {n: np.isin(phase, [p for p, m in labels.items() if m == n]) for n in labels.values()}
     book, fits, why = closed.reduce(start, end, t1 - t0, groups, site.latitude, site.g, site.earth_rate, route)
-    truth = run_metadata.truth_of(meta, drift.NAMES)
+    truth = run_metadata.truth_of(run, drift.NAMES)
     fitted, reported = model.quantities(site, truth, book)
     shown = [_group(labels, p, phase, held, site, model) for p in labels]
     found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
@@ -86,7 +84,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     turns.test()
     found = model.report(found, reported)
     statistics = _composite(found, labels, phase, held, site)
-    sizes = run_metadata.sizes(meta, SIZES)
+    sizes = run_metadata.sizes(run.options, SIZES)
     effects = servo_regression.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
     together = {n: model.words(n, book=True) for n in model.fitted}
     warnings = refusals.unseen(route, mounts, which)
@@ -113,7 +111,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         effects=effects,
         specification=specification,
         site=site.shown(),
-        instrument=str(meta.get("instrument", "")),
+        instrument=run.instrument,
         simulated=truth is not None,
         no_closed=why,
         closed_caption="From the same windows; the formulas: harmonics of each mount, means of the dwells",

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
-Specification = Mapping[str, tuple[float | None, float | None]]
+from . import measured
+
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
 
@@ -60,6 +60,7 @@ class ServoPolar(System):
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
     noises = servo_stand.NOISES
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "gyro.drift")
@@ -106,13 +107,3 @@ class ServoPolar(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        from .measured import TEMPLATE
-
-        return TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        from .measured import read
-
-        return read(self, data, values)

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation.fit_result import (
@@ -31,7 +33,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
 from . import budget, closed, geometry, refusals
 from .windows import ANGLES, Track, track
@@ -39,17 +41,16 @@ from .windows import ANGLES, Track, track
 __all__ = ["ReductionError", "from_record"]
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH = units.factor("deg/h")
 REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Coefficients of both channels of a record (gyrobench.record.record.Record).  Raises ReductionError."""
-    meta = record.meta
-    options, site = dict(meta.get("options", {})), run_metadata.Site.of(meta)
+    run = record.run
+    options, site = dict(run.options), run_metadata.Site.of(run)
     terms = int(options.get("terms", 9))
-    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
     known = {f"mount {m}": m for m in geometry.MOUNTS}
     wrong = [f"phase {p}: '{n}' is none of the mounts {', '.join(known)}" for p, n in labels.items() if n not in known]
     wrong = wrong or servo_regression.window_problems(
@@ -64,13 +65,13 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     mount = np.array([known[labels[p]] for p in phase.tolist()])
     seen = track(w, phase, np.array([geometry.base(m, site.latitude) for m in mount.tolist()]))
     X = {c: seen.design(site, drift.terms_2dof(c, terms)) for c in "xy"}
-    wrong = _problems(record.windows, held, w, meta, X, terms, sorted(set(mount.tolist())), site)
+    wrong = _problems(record.windows, held, w, run, X, terms, sorted(set(mount.tolist())), site)
     if wrong:
         raise ReductionError(wrong)
     rates = seen.inertial(site)
     middle = seen.middle()
     book = closed.reduce(*middle, mount, site.latitude, site.g, site.earth_rate, terms)
-    truth = run_metadata.truth_of(meta, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
+    truth = run_metadata.truth_of(run, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
     results: dict[str, Result] = {}
     found: dict[str, Findings] = {}
     for j, c in enumerate("xy"):
@@ -80,7 +81,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
             DPH, noise="readings", limit=1e6,
         )  # fmt: skip
         _mount_test(found[c], phase)
-        results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, meta, terms, truth, specification)
+        results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, run, terms, truth, specification)
     tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]
     k = refusals.condition(X)
     warnings = []
@@ -100,7 +101,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
 
 
 def _problems(
-    windows: Mapping[str, Array], held: NDArray[np.bool_], w: Mapping[str, Array], meta: Mapping[str, Any],
+    windows: Mapping[str, Array], held: NDArray[np.bool_], w: Mapping[str, Array], run: RunDocument,
     X: Mapping[str, Array], terms: int, mounts: list[int], site: run_metadata.Site,
 ) -> list[str]:  # fmt: skip
     """Why the rows cannot be reduced: gimbal lock, tracking, rank."""
@@ -112,9 +113,9 @@ def _problems(
             f"gimbal lock: the inner angle reaches {math.degrees(worst):.4g}°, "
             f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; leave out the windows beyond"
         )
-    limit = float(meta.get("options", {}).get("tracking", servo_regression.TRACKING))
+    limit = float(run.options.get("tracking", servo_regression.TRACKING))
     for a in "xy":
-        gain = meta.get("parameters", {}).get(f"gyro.K_sg_{a}", 0.0)
+        gain = run.parameters.get(f"gyro.K_sg_{a}", 0.0)
         part = {k: windows[f"{k}_{a}"] for k in ("mean", "std") if f"{k}_{a}" in windows}
         if len(part) == 2:
             known = {"gyro.K_sg": gain, "gyro.H": 1.0, "gyro.C": 1.0}  # a pickoff reads the angle itself
@@ -133,7 +134,7 @@ def _problems(
 
 def _channel(
     c: str, j: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: run_metadata.Site,
-    meta: Mapping[str, Any], terms: int, truth: Mapping[str, float] | None, specification: Limits | None,
+    run: RunDocument, terms: int, truth: Mapping[str, float] | None, specification: Specification | None,
 ) -> Result:  # fmt: skip
     names = drift.terms_2dof(c, terms)
     warnings = []
@@ -154,10 +155,10 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=CONVENTIONS,
-        effects=budget.effects(j, found, seen, phase, site, names, run_metadata.sizes(meta, budget.SIZES)),
+        effects=budget.effects(j, found, seen, phase, site, names, run_metadata.sizes(run.options, budget.SIZES)),
         specification=specification,
         site=site.shown(),
-        instrument=str(meta.get("instrument", "")),
+        instrument=run.instrument,
         simulated=truth is not None,
         closed_caption="The formulas of Hu 1981 at the middles of the same windows, ordinary least squares",
         warnings=warnings,

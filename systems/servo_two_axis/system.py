@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 from gyrobench.system.values import parse
 
-from . import setup
+from . import measured, setup
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 
 
@@ -67,6 +65,7 @@ class ServoTwoAxis(System):
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
     noises = setup.NOISES
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows("sampler_x.count", setup.COLUMNS)
     done = "sequencer.done"
     channels = ("outer.angle", "inner.angle", "gyro.u_x", "gyro.u_y", "gyro.drift_x", "gyro.drift_y")
@@ -107,13 +106,3 @@ class ServoTwoAxis(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        from .measured import TEMPLATE
-
-        return TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        from .measured import read
-
-        return read(self, data, values)

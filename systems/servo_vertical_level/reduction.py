@@ -19,26 +19,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.fit_result import Group, Quantity, ReductionError, fit, linear_result, plus_minus
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.families.servo_stand import ATTITUDES, attitude
 
 from . import closed, refusals
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
-    meta, windows = record.meta, record.windows
-    options = dict(meta.get("options", {}))
-    site = run_metadata.Site.of(meta)
-    labels = {int(r["phase"]): str(r["label"]) for r in meta.get("plan", []) if r.get("mode") == "servo"}
+    run, windows = record.run, record.windows
+    options = dict(run.options)
+    site = run_metadata.Site.of(run)
+    labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
     wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(ATTITUDES)}" for p, n in labels.items()
              if n not in ATTITUDES or n.startswith("polar")]  # fmt: skip
     wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
@@ -52,7 +52,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     )
     limit = float(options.get("tracking", servo_regression.TRACKING))
     wrong = refusals.record_problems(start, end, phase, labels)
-    wrong += servo_regression.tracking_problems(windows, mine, meta.get("parameters", {}), limit)
+    wrong += servo_regression.tracking_problems(windows, mine, run.parameters, limit)
     if wrong:
         raise ReductionError(wrong)
     held = servo_regression.Held(
@@ -66,7 +66,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     y, X = servo_regression.drift_rate(held, site), columns(held)
     means = _class_means(y, t1 - t0, phase, labels)
     book = closed.formulas(means, site.g)
-    truth = run_metadata.truth_of(meta, drift.NAMES)
+    truth = run_metadata.truth_of(run, drift.NAMES)
     quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
     found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings")
     statistics: dict[str, composite.Composite | str] = {}
@@ -76,7 +76,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
         bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
         statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
-    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(meta, SIZES)}
+    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(run.options, SIZES)}
     effects = [
         e for e in servo_regression.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source
     ]
@@ -103,7 +103,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         effects=effects,
         specification=specification,
         site=site.shown(),
-        instrument=str(meta.get("instrument", "")),
+        instrument=run.instrument,
         simulated=truth is not None,
         no_closed="" if book else "Hu 1981 has formulas for class 1, for the three-term route and for complete pairs",
         closed_caption="From the same windows; the formulas take every attitude as at angle 0",

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
-Specification = Mapping[str, tuple[float | None, float | None]]
+from . import measured
+
 DEG = math.pi / 180.0
 THREE = "x down; x up; x east, z down"
 SIX = "x down; x up; x east, y up; x east, y down; x east, z up; x east, z down"
@@ -63,6 +63,7 @@ class ServoVerticalLevel(System):
         "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
     }
     noises = servo_stand.NOISES
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "gyro.drift")
@@ -112,13 +113,3 @@ class ServoVerticalLevel(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        from .measured import TEMPLATE
-
-        return TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        from .measured import read
-
-        return read(self, data, values)

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
 from .closed import Loop
 from .system import loop_of
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 MRAD = 1e-3
 ENOUGH = 45.0  # degrees of phase margin that GSP ch. 5 asks for
@@ -33,10 +33,10 @@ CONVENTIONS = [
 ]
 
 
-def from_record(record: Any, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """The Result.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    parameters = record.meta["parameters"]
+    parameters = record.run.parameters
     loop = loop_of(parameters)
     if loop is None:
         found.warnings.append("The closed forms are those of the lag-lead network: the figures stand alone.")
@@ -215,7 +215,7 @@ def _blow(found: LoopFindings) -> list[str]:
     grows = bool(late.max() > 0.5 * early.max())
     found.step(rest, ANGLE, scale=math.radians(1.0), unit="°", y_name="platform θ")
     found.responses[-1] = replace(
-        found.responses[-1], caption=f"After a blow of {blow.amplitude:g} N·m for {blow.row['dwell']:g} s.", curves=[]
+        found.responses[-1], caption=f"After a blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s.", curves=[]
     )
     rows = [
         ["largest angle", math.degrees(float(np.abs(y).max())), "°"],
@@ -225,7 +225,7 @@ def _blow(found: LoopFindings) -> list[str]:
     found.tables.append(
         {
             "title": "Large disturbance",
-            "caption": f"{blow.amplitude:g} N·m for {blow.row['dwell']:g} s and {rest.row['dwell']:g} s after it.",
+            "caption": f"{blow.amplitude:g} N·m for {blow.row.dwell:g} s and {rest.row.dwell:g} s after it.",
             "columns": ["of the platform", "value", "unit"],
             "rows": rows,
         }
@@ -234,8 +234,8 @@ def _blow(found: LoopFindings) -> list[str]:
         found.warnings.append("After the blow the pickoff of the gyro was beyond its range.")
     if grows:
         found.warnings.append("After the blow the loop did not come to rest: the motor's limit made it unstable.")
-        return [f"A blow of {blow.amplitude:g} N·m for {blow.row['dwell']:g} s throws the loop into a growing swing."]
-    return [f"After a blow of {blow.amplitude:g} N·m for {blow.row['dwell']:g} s the loop comes back to rest."]
+        return [f"A blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s throws the loop into a growing swing."]
+    return [f"After a blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s the loop comes back to rest."]
 
 
 def _summary(result: Result) -> list[str]:

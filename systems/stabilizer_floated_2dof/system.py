@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
 from .closed import Loop
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 K_SG = 10.0  # V/rad, pickoffs
 RANGE = 0.1  # rad, of the pickoffs
 K_Y = 0.0832909904  # rad/s/A, torquer about y (17.180 deg/h/mA): it turns the platform about x

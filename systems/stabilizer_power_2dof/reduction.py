@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DPH = math.pi / 648000.0
 BASE = "motion.angle[1]"  # of the base, to be added to what the gyro reads against it
 EQUATION = (
@@ -69,10 +69,10 @@ def steady(M: float, H: float, K_m: float, C_y: float) -> float:
     return C_y * M / (H * K_m)
 
 
-def from_record(record: Any, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """The Result.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    p = record.meta["parameters"]
+    p = record.run.parameters
     gyro = {n: float(p[f"gyro.{n}"]) for n in ("H", "J_x", "J_y", "C_x", "C_y")}
     K_m, H = k_m(p), gyro["H"]
     holds = found.of("hold")
@@ -180,7 +180,7 @@ def _servo(found: LoopFindings, gate: Gate, H: float, own: Drift | None) -> None
 
 def _drift(found: LoopFindings, gate: Gate) -> None:
     """Truth: the static drift of the gyro at rest, where f = (0, 0, g): X = Y = 0, Z = -1."""
-    p = found.record.meta["parameters"]
+    p = found.record.run.parameters
     truth = None
     if "gyro.Dx_zz" in p and not p.get("motion.preset"):
         truth = float(p["gyro.Dx_0"]) - float(p["gyro.Dx_z"]) + float(p["gyro.Dx_zz"])

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 #: of the gyro where the user gives nothing else [STAB-POWER-2DOF], and what the stabilizer is told of it
 GYRO = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0, "K_sg_y": 10.0, "u_max": 5.0}
 TOLD = {"H": "H_g", "J_x": "J_x", "J_y": "J_y", "C_x": "C_x", "C_y": "C_y", "K_sg_y": "k_u"}

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import ReductionError
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import DPH, LoopFindings
-from gyrobench.reduction.result import Response, Result
+from gyrobench.result import Response, Result, Specification
 
 from . import closed
 from .closed import Axis
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 ARCMIN = math.pi / 10800.0
 SHOWN = 500  # points of a drawn curve
 EQUATIONS = {
@@ -31,10 +31,10 @@ EQUATIONS = {
 }
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """The result of a record.  Raises ReductionError where the load phase is not whole."""
-    meta = record.meta
-    kind = str(meta.get("options", {}).get("kind"))
+    run = record.run
+    kind = str(run.options.get("kind"))
     if kind not in closed.FORMS:
         raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
     found = LoopFindings(record)
@@ -43,19 +43,19 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
         raise ReductionError("the phase 'load' is not whole in this record: the run ended before (the float's stop?)")
     gate = loads[0]
     held = float(np.mean(np.cos(gate["gyro.b"])))
-    p = plant(meta, held)
+    p = plant(run, held)
     t = gate.t - gate.t[0]
-    free = not meta["options"].get("offload") and not meta["options"].get("viscous")
+    free = not run.options.get("offload") and not run.options.get("viscous")
     found.tables.append(_derived(p, kind, held))
     if free:
-        _closed_forms(found, p, kind, str(meta["options"].get("form")), gate, t, float(meta["step"]))
+        _closed_forms(found, p, kind, str(run.options.get("form")), gate, t, run.step)
     else:
         found.step(gate, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
         found.warnings.append("The closed forms know neither motor nor friction: the figures are of the run alone.")
-        end = coupling(p, t[-1], float(meta["step"])) / 3**0.5 / ARCMIN
+        end = coupling(p, t[-1], run.step) / 3**0.5 / ARCMIN
         found.measure("a(T)", "platform angle at the end of the load", "arcmin",
                       gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
-    late = math.degrees(p.M * float(meta["step"]) / p.H) / 3**0.5
+    late = math.degrees(p.M * run.step / p.H) / 3**0.5
     found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
     if free:  # a motor brings a slow pole in that is not in the fit beside the nutation
         _drift(found, p, kind)
@@ -99,15 +99,15 @@ SAID = {
 }
 
 
-def plant(meta: Mapping[str, Any], held: float = 1.0) -> Axis:
+def plant(run: RunDocument, held: float = 1.0) -> Axis:
     """The axis as the parts had it, with H times the cos(b) that the closed forms hold."""
-    q = meta.get("parameters", {})
+    q = run.parameters
     names = ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K")
     missing = [n for n in names if n not in q]
     if missing:
         raise ReductionError([f"the record does not say {n}" for n in missing])
     j0, j, spin, c, k = (float(q[n]) for n in names)
-    return Axis(j0, j, spin * held, c, k, float(meta["options"]["M"]))
+    return Axis(j0, j, spin * held, c, k, float(run.options["M"]))
 
 
 def coupling(p: Axis, t: Array | float, step: float) -> Any:
@@ -225,7 +225,7 @@ def _slope(p: Axis, t: Array, a: Array) -> tuple[float, float]:
 
 def _drift(found: LoopFindings, p: Axis, kind: str) -> None:
     """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
-    q = found.record.meta["parameters"]
+    q = found.record.run.parameters
     names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
     for gate in found.of("hold") if kind != "rate" else ():
         r, u = _slope(p, gate.t, gate["platform.attitude"])
@@ -242,7 +242,7 @@ def _command(found: LoopFindings, p: Axis, kind: str) -> None:
     Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
     da'/(k i) = H2 c / (H2 c2 + J0 (K + H a' sin b)).
     """
-    spin = float(found.record.meta["parameters"]["gyro.H"])
+    spin = float(found.record.run.parameters["gyro.H"])
     for gate in found.of("command", 1, "step"):
         angle = found.record.channels["platform.attitude"]
         before, u_before = _slope(p, found.record.channels["time"][gate.before], angle[gate.before])

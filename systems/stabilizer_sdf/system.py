@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
 from .closed import Axis
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 KINDS = ("integrating", "rate-integrating", "rate")
 TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
 LIGHT = 0.3  # damping up to which 5-34 may be taken

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 
 Array = NDArray[np.float64]
 SHARED = 0.5  # of the range turned, least part that both senses must cover
 
 
-def rows(windows: Mapping[str, Array], plan: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+def rows(windows: Mapping[str, Array], plan: Sequence[PlanRow]) -> dict[str, Array]:
     """current (A), rate_plus, rate_minus (rad/s, magnitudes), range_plus, range_minus (rad), by rising current.
 
     plan: rows of run.json; the target of a servo phase is its current.  Raises ReductionError for flagged windows, a
@@ -56,16 +56,16 @@ def rows(windows: Mapping[str, Array], plan: Sequence[Mapping[str, Any]]) -> dic
     return dict(zip(names, np.array(found, dtype=float).reshape(-1, 5).T, strict=True))
 
 
-def _pairs(plan: Sequence[Mapping[str, Any]]) -> dict[float, dict[int, int]]:
+def _pairs(plan: Sequence[PlanRow]) -> dict[float, dict[int, int]]:
     """Magnitude of a current -> sense -> phase."""
     pairs: dict[float, dict[int, int]] = {}
-    for p in plan:
-        if p["mode"] == "servo" and p["target"]:
-            pairs.setdefault(abs(float(p["target"])), {})[int(math.copysign(1, p["target"]))] = int(p["phase"])
+    for row in plan:
+        if row.mode == "servo" and row.target:
+            pairs.setdefault(abs(row.target), {})[int(math.copysign(1, row.target))] = row.phase
     return pairs
 
 
-def senses(plan: Sequence[Mapping[str, Any]]) -> dict[int, int]:
+def senses(plan: Sequence[PlanRow]) -> dict[int, int]:
     """Phase -> number of its current, by rising current."""
     pairs = _pairs(plan)
     return {phase: k for k, size in enumerate(sorted(pairs)) for phase in pairs[size].values()}

@@ -26,17 +26,17 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import regression, uncertainty
-from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import BudgetLine, Coefficient, Result, Series, Specification, Test
 
 from . import marks
 from .estimates import Estimates, Number, of_table, of_windows
 from .precession import Precession, precession
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH, MA, KU = units.factor("deg/h"), 1e-3, units.factor("deg/h/mA")
 UNIT = "°/h/mA"
 
@@ -48,7 +48,7 @@ class TorquerSetup:
     """
 
     u_current: float = 0.0
-    specification: Limits | None = None
+    specification: Specification | None = None
     instrument: str = ""
     simulated: bool = False
     truth: Mapping[str, float] | None = None
@@ -283,21 +283,21 @@ def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float]
     return truth | ({"K_LS": k / KU} if k3 == 0.0 else {})
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
-    options, measured = record.meta.get("options", {}), bool(record.meta.get("measured", False))
-    plan = record.meta.get("plan", [])
+    options, measured = record.run.options, record.run.measured
+    plan = record.run.plan
     rows = record.windows if measured else marks.rows(record.windows, plan)
     truth, found = None, None
     if not measured and not problems(rows):
         found = precession(record.windows, marks.senses(plan), np.asarray(rows["current"]))
-        truth = truth_of(record.meta.get("parameters", {}), np.asarray(rows["current"]))
+        truth = truth_of(record.run.parameters, np.asarray(rows["current"]))
     setup = TorquerSetup(
         u_current=float(options.get("u_current", 0.0)),
         specification=specification,
-        instrument=str(record.meta.get("instrument", "")),
+        instrument=record.run.instrument,
         simulated=truth is not None,
         truth=truth,
-        site={} if measured else run_metadata.Site.of(record.meta).shown(),
+        site={} if measured else run_metadata.Site.of(record.run).shown(),
     )
     return run_metadata.finish(reduce(rows, setup, found), record)

@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import frames, units
-from gyrobench.record.csv_reader import Column, read_measured
-from gyrobench.record.record import ABOUT, Record
-from gyrobench.reduction.result import Result
+from gyrobench.record.record import Record
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.sockets import SOCKETS, Connector, Socket
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
-TEMPLATE = """\
-# Torquer of a gyro on a servo table: one row for each current, both senses over the same angle range.
-# instrument = type and number of the gyro
-# operator = who took the data
-#
-# current: magnitude.  rate_plus, rate_minus: magnitudes of the table rate with positive and negative current.
-# range_plus, range_minus: angle ranges; optional, they weigh the rows.  Units may be others of the same kind.
-current [mA],rate_plus [deg/h],rate_minus [deg/h],range_plus [deg],range_minus [deg]
-"""
-COLUMNS = (
-    Column("current", "A", "magnitude of the torquer current"),
-    Column("rate_plus", "rad/s", "table rate with positive current, magnitude"),
-    Column("rate_minus", "rad/s", "table rate with negative current, magnitude"),
-    Column("range_plus", "rad", "angle range with positive current", required=False),
-    Column("range_minus", "rad", "angle range with negative current", required=False),
-)
-TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report")
+from . import measured
+
 DEG = math.pi / 180.0
 FACE = "input axis on the table axis"
 #: rows I, O, S in table axes at angle 0: input axis on the table axis, output axis on the first
@@ -118,6 +101,7 @@ class TorquerScaleFactor(System):
         "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "table.rumble", "source.meter")
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "source.i", "gyro.u", "table.motor")
@@ -195,25 +179,7 @@ class TorquerScaleFactor(System):
             )
         return found
 
-    def template(self) -> str:
-        return TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        """The CSV as a record.  Raises DataError, and InvalidValueError for an option that does not fit."""
-        rows, comments = read_measured(data, COLUMNS, time=None)
-        for name, value in {**{k: v for k, v in comments.items() if k in self.options}, **values}.items():
-            if name not in TEXTS:
-                self.set(name, value)
-        said = {**comments, **values}
-        meta = {
-            "system": self.name, "title": self.title, "spec": list(self.spec), "measured": True, "complete": True,
-            "options": dict(self.values), "parameters": {}, "plan": [], **{n: said[n] for n in TEXTS if n in said},
-        }  # fmt: skip
-        return Record(rows, {}, meta)
-
-    def reduce(
-        self, record: Record, specification: Mapping[str, tuple[float | None, float | None]] | None = None
-    ) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
         from .reduction import from_record
 
         return from_record(record, specification)

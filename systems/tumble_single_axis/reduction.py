@@ -14,19 +14,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise_mixture_fit, regression
 from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
-from gyrobench.reduction.result import Coefficient, Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Coefficient, Result, Specification
 
 from . import budget, closed
 from .refusals import plan_problems, refusals, setup_problems
@@ -221,6 +221,6 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
     ]
 
 
-def from_record(record: Any, specification: Mapping[str, tuple[float | None, float | None]] | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
+from gyrobench.result import Specification
 
 Array = NDArray[np.float64]
 SIZES = (
@@ -44,7 +45,7 @@ class TumbleSetup:
     terms: int = 9
     fold: bool = False
     tilt: bool = False
-    specification: Mapping[str, tuple[float | None, float | None]] | None = None
+    specification: Specification | None = None
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_wobble: float = 0.0
@@ -74,32 +75,30 @@ class TumbleSetup:
         return bool(abs(output[2]) >= abs(output @ (np.asarray(self.base) @ frames.U)))
 
 
-def setup_of(
-    meta: Mapping[str, Any], specification: Mapping[str, tuple[float | None, float | None]] | None = None
-) -> TumbleSetup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> TumbleSetup:
     """The setup a run.json describes: options, plan and the parameters of the parts (slot.name, SI).
 
     Scale factor: option ``k``, else the gyro's parameter ``k``.  Truth only where the gyro part has the coefficients.
     """
-    options, parameters = dict(meta.get("options", {})), dict(meta.get("parameters", {}))
-    site = run_metadata.Site.of(meta)
+    options, parameters = dict(run.options), dict(run.parameters)
+    site = run_metadata.Site.of(run)
     ideal = frames.tumble_faces(site.latitude)
-    plan = run_metadata.phases(meta, ideal)
+    plan = run_metadata.phases(run, ideal)
     return TumbleSetup(
         latitude=site.latitude,
         gravity=site.gravity,
-        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
-        faces={p: ideal[r["face"]] for p, r in plan.items()},
+        k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
+        faces={p: ideal[row.face] for p, row in plan.items()},
         earth_rate=site.earth_rate,
-        labels={p: str(r["label"]) for p, r in plan.items()},
-        modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
-        truth=run_metadata.truth_of(meta, drift.NAMES),
+        labels={p: row.label for p, row in plan.items()},
+        modes={p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
+        truth=run_metadata.truth_of(run, drift.NAMES),
         terms=int(options.get("terms", 9)),
         fold=bool(options.get("fold", False)),
         tilt=bool(options.get("tilt", False)),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
-        polarity=str(meta.get("polarity", "project")),
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, SIZES),
+        polarity=run.polarity or "project",
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, SIZES),
     )

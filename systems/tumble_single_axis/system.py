@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import measured
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
 STEP_MAX = 5e-3  # s
@@ -85,6 +83,7 @@ class TumbleSingleAxis(System):
         "terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9),
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "rebalance.meter")
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channels = ("table.angle", "gyro.u", "rebalance.i", "gyro.drift")
@@ -165,9 +164,3 @@ class TumbleSingleAxis(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

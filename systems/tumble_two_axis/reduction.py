@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.fit_result import (
@@ -31,8 +33,8 @@ from gyrobench.reduction.estimation.fit_result import (
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Result, Specification
 
 from . import closed, geometry
 from .measured import ANGLES
@@ -40,7 +42,6 @@ from .measured import ANGLES
 __all__ = ["ReductionError", "TwoAxisSetup", "from_record", "reduce"]
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 DPH = units.factor("deg/h")
 COLUMNS = ("phase", "t_start", "t_end", *ANGLES, "mean")
 STILL = 1e-4  # rad that a table may move while the current is averaged (20 arcsec: encoders jitter)
@@ -67,7 +68,7 @@ class TwoAxisSetup:
     harmonic: bool = False
     fold: bool = False
     truth: Mapping[str, float] | None = None
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_axis: float = 0.0
     u_square: float = 0.0
     u_mount: float = 0.0
@@ -344,28 +345,28 @@ def _conventions(s: TwoAxisSetup) -> list[str]:
     ]
 
 
-def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoAxisSetup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> TwoAxisSetup:
     """The setup a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
-    options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site = run_metadata.Site.of(meta)
+    options, parameters = run.options, run.parameters
+    site = run_metadata.Site.of(run)
     return TwoAxisSetup(
         latitude=site.latitude,
         gravity=site.gravity,
-        k=run_metadata.number(meta, "k", "gyro.k", "torquer scale factor"),
+        k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
         m=int(options.get("m", 5)),
         n=int(options.get("n", 1)),
         earth_rate=site.earth_rate,
         harmonic=bool(options.get("harmonic", False)),
         fold=bool(options.get("fold", False)),
-        truth=run_metadata.truth_of(meta, drift.NAMES),
+        truth=run_metadata.truth_of(run, drift.NAMES),
         specification=specification,
         quantum=float(parameters.get("rebalance.resolution", 0.0)),
-        polarity=str(meta.get("polarity", "project")),
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, SIZES),
+        polarity=run.polarity or "project",
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, SIZES),
     )
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.meta, specification)), record)
+    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gyrobench import frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import geometry, measured
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 STEP_MAX = 5e-3  # s
 
@@ -90,6 +88,7 @@ class TumbleTwoAxis(System):
         "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),
     }
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "rebalance.meter")
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows(
         "sampler.count",
         {
@@ -168,12 +167,3 @@ class TumbleTwoAxis(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        from gyrobench.system.lab_record import read_record
-
-        needed = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
-        return read_record(self, data, values, needed=needed, columns=measured.COLUMNS)

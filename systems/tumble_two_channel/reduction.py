@@ -20,17 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames, units
+from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation.fit_result import Quantity, fit, linear_result, plus_minus
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Result, Specification
 
 from . import closed, evidence, geometry
 from .refusals import plan_problems, setup_problems
-from .setup import OTHER, Limits, TwoChannelSetup, design, setup_of
+from .setup import OTHER, TwoChannelSetup, design, setup_of
 
 __all__ = ["ReductionError", "TwoChannelSetup", "from_record", "reduce", "setup_of"]
 
@@ -235,7 +236,7 @@ def _conventions(s: TwoChannelSetup) -> list[str]:
     ]
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    result = reduce(record.windows, setup_of(record.meta, specification))
+    result = reduce(record.windows, setup_of(record.run, specification))
     return run_metadata.finish(result, record)

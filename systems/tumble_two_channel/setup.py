@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
+from gyrobench.result import Specification
 
 from . import geometry
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 SIZES = ("u_axis", "u_mount", "u_angle1", "u_angle2", "u_scale_factor", "u_nonlinearity", "u_current")
 OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about the other axis
 
@@ -45,7 +45,7 @@ class TwoChannelSetup:
     truth: Mapping[str, float] | None = None
     fold: bool = False
     tilt: bool = False
-    specification: Limits | None = None
+    specification: Specification | None = None
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_angle1: float = 0.0
@@ -81,33 +81,32 @@ def design(s: TwoChannelSetup, channel: str, turning: window_regressors.Turning,
     return np.column_stack([X, -window_regressors.axis_rate(turning, base, s.latitude, s.earth_rate, 2)])
 
 
-def setup_of(meta: Mapping[str, Any], specification: Limits | None = None) -> TwoChannelSetup:
+def setup_of(run: RunDocument, specification: Specification | None = None) -> TwoChannelSetup:
     """The setup a run.json describes: options, plan and the parameters of the parts (slot.name, SI).
 
     Scale factors: options ``k_x``, ``k_y``, else the gyro's parameters.  Truth only where the gyro has coefficients.
     """
-    options, parameters = meta.get("options", {}), meta.get("parameters", {})
-    site, model = run_metadata.Site.of(meta), str(options.get("model", "nine"))
+    options, parameters = run.options, run.parameters
+    site, model = run_metadata.Site.of(run), str(options.get("model", "nine"))
     ideal = geometry.faces(model, site.latitude)
-    plan = run_metadata.phases(meta, ideal)
+    plan = run_metadata.phases(run, ideal)
     return TwoChannelSetup(
         latitude=site.latitude,
         gravity=site.gravity,
         k={
-            a: run_metadata.number(meta, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}")
-            for a in "xy"
+            a: run_metadata.number(run, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}") for a in "xy"
         },
-        faces={p: ideal[r["face"]] for p, r in plan.items()},
-        modes={p: "rate" if r["mode"] == "rate" else "dwell" for p, r in plan.items()},
+        faces={p: ideal[row.face] for p, row in plan.items()},
+        modes={p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
         model=model,
         earth_rate=site.earth_rate,
-        labels={p: str(r["label"]) for p, r in plan.items()},
-        truth=run_metadata.truth_of(meta, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
+        labels={p: row.label for p, row in plan.items()},
+        truth=run_metadata.truth_of(run, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
         fold=bool(options.get("fold", False)),
         tilt=bool(options.get("tilt", False)),
         specification=specification,
         quantum={a: float(parameters.get(f"rebalance_{a}.resolution", 0.0)) for a in "xy"},
-        polarity=str(meta.get("polarity", "project")),
-        instrument=str(meta.get("instrument", "")),
-        **run_metadata.sizes(meta, SIZES),
+        polarity=run.polarity or "project",
+        instrument=run.instrument,
+        **run_metadata.sizes(run.options, SIZES),
     )

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench import frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
 from . import geometry, measured
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
 STEP_MAX = 5e-3  # s
@@ -103,6 +101,7 @@ class TumbleTwoChannel(System):
         "gyro.turn_on_x", "gyro.turn_on_y", "gyro.markov_x", "gyro.markov_y", "gyro.white_x", "gyro.white_y",
         "gyro.pickoff_x", "gyro.pickoff_y", "rebalance_x.meter", "rebalance_y.meter",
     )  # fmt: skip
+    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
     windows = Windows(
         "sampler_x.count",
         {
@@ -194,9 +193,3 @@ class TumbleTwoChannel(System):
         from .reduction import from_record
 
         return from_record(record, specification)
-
-    def template(self) -> str:
-        return measured.TEMPLATE
-
-    def measured(self, data: Path, values: Mapping[str, str]) -> Record:
-        return measured.read(self, data, values)

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.result import Response, Result
+from gyrobench.result import Response, Result, Specification
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 ARCMIN, DEG = math.pi / 10800.0, math.pi / 180.0
 G0 = 9.80665
 SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks
@@ -51,11 +52,11 @@ def erection_time(tilt: float, zone: float, law: str, rate: float, gain: float) 
     return (tilt - bend) / rate + math.log(bend / zone) / gain
 
 
-def from_record(record: Any, specification: Limits | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> Result:
     """The result of a record; raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     found.warnings.clear()  # there is no loop to be linearized here
-    o = record.meta["options"]
+    o = record.run.options
     for gate in found.gates:
         {
             "erection": _erection,
@@ -68,7 +69,7 @@ def from_record(record: Any, specification: Limits | None = None) -> Result:
     whole = record.channels
     tilt = np.hypot(*_lean(whole).T)
     found.measure("max", "largest tilt of the rotor after the erection", "arcmin", _after(found, tilt) / ARCMIN,
-                  chatter(record.meta) / ARCMIN)  # fmt: skip
+                  chatter(record.run) / ARCMIN)  # fmt: skip
     _figure(found, "tilt", "tilt", "arcmin", whole["time"], tilt / ARCMIN,
             "Angle between the rotor axis and the true vertical, over the whole run.")  # fmt: skip
     shown = np.hypot(*_lean(whole, shown=True).T)
@@ -111,9 +112,9 @@ def _after(found: LoopFindings, tilt: Array) -> float:
     return float(tilt[first[-1].inside.stop if first else 0 :].max(initial=0.0))
 
 
-def chatter(meta: Mapping[str, Any]) -> float:
+def chatter(run: RunDocument) -> float:
     """Standard uncertainty of an angle, rad: what the erection moves the rotor in one step, rectangular."""
-    return float(meta["options"]["rate"]) * float(meta["step"]) / math.sqrt(3.0)
+    return float(run.options["rate"]) * run.step / math.sqrt(3.0)
 
 
 def _u_time(gate: Gate) -> float:
@@ -173,30 +174,30 @@ def _acceleration(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None
 
 def _turn(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
     tilt = np.hypot(*_of(gate).T)
-    u = chatter(found.record.meta) / ARCMIN
+    u = chatter(found.record.run) / ARCMIN
     found.measure("turn", "largest tilt in the turn", "arcmin", float(tilt.max()) / ARCMIN, u)
 
 
 def _loop(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
     tilt, pitch = np.hypot(*_of(gate, shown=True).T), np.unwrap(gate["gyro.pitch"])
     found.measure("loop", "largest error of the shown vertical in the loop", "arcmin", float(tilt.max()) / ARCMIN,
-                  chatter(found.record.meta) / ARCMIN)  # fmt: skip
-    step = float(found.record.meta["step"]) / math.sqrt(12.0)
+                  chatter(found.record.run) / ARCMIN)  # fmt: skip
+    step = found.record.run.step / math.sqrt(12.0)
     found.measure("pitch", "pitch shown through the loop", "°", float(pitch[-1] - pitch[0]) / DEG,
                   36.0 * step, closed=36.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
     ring = np.unwrap(gate["gyro.ring_angle"])
     found.measure("ring", "travel of the ring in the loop", "°", float(np.ptp(ring)) / DEG,
-                  chatter(found.record.meta) / DEG)  # fmt: skip
+                  chatter(found.record.run) / DEG)  # fmt: skip
 
 
 def _roll(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
     roll = np.unwrap(gate["gyro.roll"])
-    step = float(found.record.meta["step"]) / math.sqrt(12.0)
+    step = found.record.run.step / math.sqrt(12.0)
     found.measure("roll", "roll shown through the roll", "°", float(roll[-1] - roll[0]) / DEG, 60.0 * step,
                   closed=60.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
-    lag = 60.0 / float(found.record.meta.get("parameters", {}).get("gyro.k_ring", math.inf))
+    lag = 60.0 / float(found.record.run.parameters.get("gyro.k_ring", math.inf))
     found.measure("g2", "largest angle left to the ring's servo in the roll", "°",
-                  float(np.abs(gate["gyro.inner"]).max()) / DEG, chatter(found.record.meta) / DEG,
+                  float(np.abs(gate["gyro.inner"]).max()) / DEG, chatter(found.record.run) / DEG,
                   closed=lag)  # fmt: skip
 
 

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import Option, Slot, System
 
-Specification = Mapping[str, tuple[float | None, float | None]]
 DEG = math.pi / 180.0
 G0 = 9.80665
 PHASES = ("erection", "rest", "acceleration", "turn", "loop", "roll")

@@ -97,7 +97,7 @@ from gyrobench.system.system import load_system
 with Session(load_system("tumble_single_axis", standard_folder()), bench=standard_folder()) as session:
     began = time.process_time()
     record = session.run()
-    print(time.process_time() - began, record.meta["steps"])
+    print(time.process_time() - began, record.run.steps)
 """
 
 
@@ -139,7 +139,7 @@ with Session("platform_three_axis", engine=sys.argv[1]) as s:
     type(s.system).plan = lambda self: LoopPlan([LoopPhase("hold", dwell=float(sys.argv[2]))])
     began, wall = time.process_time(), time.perf_counter()
     record = s.run({"motion.preset": 2})
-    print(time.process_time() - began, time.perf_counter() - wall, record.meta["steps"])
+    print(time.process_time() - began, time.perf_counter() - wall, record.run.steps)
 """
 
 

@@ -35,7 +35,7 @@ def timed(what: str, values: dict[str, str], step: float, out: Path, **how: obje
         what += f" ({str(stopped).splitlines()[0]})"
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    steps = f", {record.meta['steps']} steps" if record is not None else ""
+    steps = f", {record.run.steps} steps" if record is not None else ""
     print(f"{what}: wall {wall:.0f} s, CPU {cpu:.0f} s{steps}, {memory:.0f} MB", flush=True)
     return record
 
@@ -60,7 +60,7 @@ def main() -> None:
         timed("first half", values, asked.step, out / "halves", stop_at=middle)
         again = timed("continued", values, asked.step, out / "halves", resume=True)
         assert again is not None
-        print(f"continued at {again.meta['resumed_at']} s; records bit-equal: {again.same_data(whole)}")
+        print(f"continued at {again.run.resumed_at} s; records bit-equal: {again.same_data(whole)}")
 
 
 if __name__ == "__main__":

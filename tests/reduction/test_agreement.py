@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gyrobench.reduction.result import Coefficient, Result
 from gyrobench.reduction.suite import estimable_combinations
 from gyrobench.reduction.suite.consistency import Value, agree, holm, normalized_error, outlier
 from gyrobench.reduction.suite.method_comparison import Member, compare, together
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Coefficient, Result
 
 NORMAL = 1.959963984540054
 

@@ -8,6 +8,7 @@ import types
 import numpy as np
 import pytest
 
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, scatter, step
 from gyrobench.reduction.window_checks import ReductionError
 
@@ -150,7 +151,7 @@ def record(stop: float | None = None) -> types.SimpleNamespace:
         {"phase": 1, "label": "a", "mode": "torque", "shape": "step", "axis": 1, "dwell": 2.0},
         {"phase": 2, "label": "b", "mode": "hold", "shape": "constant", "axis": 1, "dwell": 1.0},
     ]
-    return types.SimpleNamespace(channels=channels, meta={"plan": rows})
+    return types.SimpleNamespace(channels=channels, run=RunDocument(plan=rows))
 
 
 def test_gates_of_a_record() -> None:

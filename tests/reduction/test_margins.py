@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import control
 import numpy as np
 import pytest
 
+from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.reduction.loops.margins import (
     between,
@@ -112,13 +114,11 @@ def test_deviation() -> None:
     assert deviation(points, np.ones(3, complex), 0.5) == (0.0, 0.0)
 
 
-def model(step: float = 0.0) -> dict:
+def model(step: float = 0.0, **changes: Any) -> LinearModel:
     """x' = -2 x + 3 torque + acceleration of the base; y = x + angle."""
     names = ["exciter.torque[1]", "exciter.motion_angle[2]", "exciter.motion_acceleration[2]"]
-    return {
-        "A": [[-2.0]], "B": [[3.0, 0.0, 1.0]], "C": [[1.0]], "D": [[0.0, 1.0, 0.0]],
-        "inputs": names, "outputs": ["p.y"], "states": ["p.x"], "step": step,
-    }  # fmt: skip
+    matrices = {"A": [[-2.0]], "B": [[3.0, 0.0, 1.0]], "C": [[1.0]], "D": [[0.0, 1.0, 0.0]]}
+    return LinearModel(**{**matrices, "inputs": names, "outputs": ["p.y"], "states": ["p.x"], "step": step, **changes})
 
 
 def test_model_response_and_excitations() -> None:
@@ -134,11 +134,11 @@ def test_model_response_and_excitations() -> None:
 
 def test_discrete_model_is_evaluated_on_the_circle() -> None:
     """x+ = 0.9 x + u: 1/(z - 0.9) at z = e^(j w h)."""
-    m = {**model(0.01), "A": [[0.9]], "B": [[1.0]], "D": [[0.0]], "inputs": ["exciter.torque[1]"]}
+    m = model(0.01, A=[[0.9]], B=[[1.0]], D=[[0.0]], inputs=["exciter.torque[1]"])
     z = np.exp(2j * np.pi * 3.0 * 0.01)
     assert model_response(m, [3.0])[0, 0, 0] == pytest.approx(1.0 / (z - 0.9), rel=1e-14)
 
 
 def test_model_without_states() -> None:
-    m = {**model(), "A": [], "B": [], "C": [[]], "states": []}
+    m = model(A=[], B=[], C=[[]], states=[])
     assert model_response(m, [1.0])[0, 0].tolist() == [0.0, 1.0, 0.0]

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.turns import Turns
@@ -23,8 +24,8 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.result import Result
 from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.result import Result
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
@@ -212,21 +213,25 @@ def test_turns() -> None:
 
 
 def test_what_a_run_says() -> None:
-    meta = {"options": {"latitude": 0.8, "k": 0.0, "u_axis": 1e-4}, "plan": [{"phase": 2, "face": "up"}],
-            "parameters": {"gyro.k": 3.0, "gyro.D_F": 1e-6, "site.gravity": 9.81}}  # fmt: skip
-    site = run_metadata.Site.of(meta)
+    document = RunDocument(
+        options={"latitude": 0.8, "k": 0.0, "u_axis": 1e-4},
+        plan=[PlanRow(phase=2, face="up")],
+        parameters={"gyro.k": 3.0, "gyro.D_F": 1e-6, "site.gravity": 9.81},
+    )
+    site = run_metadata.Site.of(document)
     assert (site.latitude, site.gravity) == (0.8, 9.81) and site.shown()["gravity / (m/s²)"] == 9.81
-    assert run_metadata.Site.of({"options": {"latitude": 0.8}}).gravity == pytest.approx(9.8067, abs=1e-3)
-    assert run_metadata.number(meta, "k", "gyro.k") == 3.0
-    assert run_metadata.truth_of(meta, ("D_F", "D_I")) == {"D_F": 1e-6} and run_metadata.truth_of({}, ("D_F",)) is None
-    assert run_metadata.sizes(meta, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
-    assert run_metadata.phases(meta, ("up", "down")) == {2: {"phase": 2, "face": "up"}}
+    assert run_metadata.Site.of(RunDocument(options={"latitude": 0.8})).gravity == pytest.approx(9.8067, abs=1e-3)
+    assert run_metadata.number(document, "k", "gyro.k") == 3.0
+    assert run_metadata.truth_of(document, ("D_F", "D_I")) == {"D_F": 1e-6}
+    assert run_metadata.truth_of(RunDocument(), ("D_F",)) is None
+    assert run_metadata.sizes(document.options, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
+    assert run_metadata.phases(document, ("up", "down")) == {2: PlanRow(phase=2, face="up")}
     with pytest.raises(ReductionError, match="mount up unknown; there are down"):
-        run_metadata.phases(meta, ("down",))
+        run_metadata.phases(document, ("down",))
     with pytest.raises(ReductionError, match="scale factor unknown: the gyro has no parameter K; give the option K"):
-        run_metadata.number(meta, "K", "gyro.K", "scale factor")
+        run_metadata.number(document, "K", "gyro.K", "scale factor")
     with pytest.raises(ReductionError, match="latitude"):
-        run_metadata.Site.of({})
+        run_metadata.Site.of(RunDocument())
 
 
 def test_windows_of_two_channels() -> None:

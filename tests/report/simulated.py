@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
+from gyrobench.result import BudgetLine, Coefficient, Result, Series, Test
 
 NAMES = ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_IS", "D_OS"]
 MEANINGS = [

@@ -15,7 +15,7 @@ from reading import Written, pdf_text
 from simulated import tumble
 
 from gyrobench import report
-from gyrobench.reduction import result as result_module
+from gyrobench import result as result_module
 from gyrobench.report.assets import read_content
 from gyrobench.report.result_json import document
 

@@ -13,7 +13,6 @@ import pytest
 from reading import Written
 
 from gyrobench import report
-from gyrobench.reduction.result import Coefficient, Response, Result
 from gyrobench.report.assets import read_content
 from gyrobench.report.comparison_page import comparison
 from gyrobench.report.responses import draw
@@ -21,6 +20,7 @@ from gyrobench.report.result_json import document
 from gyrobench.report.result_page import _shown
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
+from gyrobench.result import Coefficient, Response, Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 
 PLAN = LoopPlan(

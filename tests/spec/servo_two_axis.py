@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from gyrobench import frames
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.system.system import load_system
 
 NAME = "servo_two_axis"
@@ -104,12 +105,12 @@ def record(
         for column, part in zip(columns.values(), parts, strict=True):
             column.append(part)
         begin += t[-1] + 500.0
-    meta = {
-        "options": {"latitude": phi, "gravity": g * frames.G0, "terms": terms},
-        "parameters": {},
-        "plan": [{"phase": k, "label": f"mount {m}", "mode": "servo"} for k, m in enumerate(numbers, 1)],
-    }
-    return Record({c: np.concatenate(v) for c, v in columns.items()}, {}, meta)
+    run = RunDocument(
+        options={"latitude": phi, "gravity": g * frames.G0, "terms": terms},
+        parameters={},
+        plan=[PlanRow(phase=k, label=f"mount {m}", mode="servo") for k, m in enumerate(numbers, 1)],
+    )
+    return Record({c: np.concatenate(v) for c, v in columns.items()}, {}, run)
 
 
 def ours(px: Sequence[float], py: Sequence[float]) -> dict[str, float]:

@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import harmonic, servo_regression
 from gyrobench.system.families.servo_stand import ATTITUDES, LEVEL, attitude
@@ -420,4 +421,4 @@ def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
     columns = dict(zip(("phase", "t_start", "t_end", "angle_start", "angle_end"), np.array(rows).T, strict=True))
     columns["phase"] = columns["phase"].astype(int)
     options = {"latitude": phi, "gravity": g * frames.G0, "route": "dwells", "terms": 9}
-    return Record(columns, {}, {"plan": plan, "options": options, "parameters": {}, "complete": True})
+    return Record(columns, {}, RunDocument(plan=plan, options=options, parameters={}, complete=True))

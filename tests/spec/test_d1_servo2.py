@@ -270,10 +270,10 @@ def made() -> Any:
 
 def changed(made: Any, plan: list[str] | None = None, keep: Any = slice(None), **columns: Any) -> Any:
     w = {c: np.array(v)[keep] for c, v in {**made.windows, **columns}.items()}
-    meta = dict(made.meta)
+    run = made.run
     if plan is not None:
-        meta["plan"] = [{"phase": k, "label": m, "mode": "servo"} for k, m in enumerate(plan, 1) if m]
-    return type(made)(w, {}, meta)
+        run = run.replace(plan=[{"phase": k, "label": m, "mode": "servo"} for k, m in enumerate(plan, 1) if m])
+    return type(made)(w, {}, run)
 
 
 def test_refused_records(made: Any) -> None:

@@ -24,7 +24,7 @@ PRINTED_K = (17.184, 17.169, 17.166, 17.160, 17.172, 17.173, 17.170, 17.171)
 
 @pytest.fixture(scope="module")
 def book() -> Any:
-    return system.reduce(system.measured(BOOK, {}))
+    return system.reduce(system.read_measured(BOOK, {}))
 
 
 def named(result: Any) -> dict[str, Any]:
@@ -137,11 +137,11 @@ def test_files(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text(text.replace("rate_plus [deg/h]", "rate_plus [mA]"), "utf-8")
     with pytest.raises(DataError, match=r"'rate_plus': wrong unit \[mA\]"):
-        load_system("torquer_scale_factor").measured(bad, {})
+        load_system("torquer_scale_factor").read_measured(bad, {})
     good = tmp_path / "good.csv"
     good.write_text(text.replace("rate_plus [deg/h]", "rate_plus [arcsec/s]"), "utf-8")
     s = load_system("torquer_scale_factor")
-    r = s.reduce(s.measured(good, {"u_current": "0.01%"}))
+    r = s.reduce(s.read_measured(good, {"u_current": "0.01%"}))
     assert named(r)["K"].estimate == pytest.approx(17.170625, abs=1e-9) and len(r.budget) == 2
     assert r.provenance["title"].startswith("Torquer of a floated gyro")
-    assert "current [mA]" in s.template()
+    assert "current [mA]" in s.measured_data.template

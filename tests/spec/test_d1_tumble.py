@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 sys.path.insert(0, str(Path(__file__).parent))
 import tumble as T
@@ -456,20 +457,16 @@ def test_from_a_run() -> None:
     plan = system.plan().rows()
     faces = frames.tumble_faces(system["latitude"])
     parameters = {"gyro.k": T.K, **{f"gyro.{n}": v for n, v in drift.STANDARD.items()}}
-    meta = {
-        "options": dict(system.values),
-        "plan": plan,
-        "parameters": parameters,
-        "complete": False,
-        "stopped_at": 9.0,
-    }
-    s = T.reduction.setup_of(meta)
+    document = RunDocument(
+        options=dict(system.values), plan=plan, parameters=parameters, complete=False, stopped_at=9.0
+    )
+    s = T.reduction.setup_of(document)
     assert s.gravity == pytest.approx(frames.normal_gravity(system["latitude"]))
     assert {p: s.turns(p) for p in s.faces} == {r["phase"]: r["mode"] == "rate" for r in plan}
     assert s.faces[2] == pytest.approx(faces["mount 1"])
-    r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, meta))
+    r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, document))
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
     assert "before its plan was done" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
-    del meta["parameters"]["gyro.k"]
+    del document.parameters["gyro.k"]
     with pytest.raises(T.reduction.ReductionError, match="scale factor unknown"):
-        T.reduction.setup_of(meta)
+        T.reduction.setup_of(document)

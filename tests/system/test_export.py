@@ -72,8 +72,8 @@ def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path
     # the archive names no windows and no done output, so it runs to its stop time; the channels are comparable
     system = read_ssp(archive, step=1e-3)
     ours, theirs = run(small, values=QUICK), run(system)
-    assert theirs.meta["order"] == ours.meta["order"]
-    assert theirs.meta["delays"].keys() >= {"rebalance.i -> gyro.i"}
+    assert theirs.run.order == ours.run.order
+    assert theirs.run.delays.keys() >= {"rebalance.i -> gyro.i"}
     assert theirs.channels["gyro.u"][0] == ours.channels["gyro.u"][0]
     common = np.searchsorted(ours.channels["time"], theirs.channels["time"])
     inside = common < len(ours.channels["time"])

@@ -40,7 +40,7 @@ def system() -> System:
 @pytest.fixture(scope="module")
 def ours(system: System) -> dict[str, Any]:
     record = run(system, values=VALUES)
-    return {"meta": record.meta, "coefficients": estimates(system, record), "end": record.meta["stopped_at"] + 0.5}
+    return {"run": record.run, "coefficients": estimates(system, record), "end": record.run.stopped_at + 0.5}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def libcosim(system: System, archive: Path, folder: Path, ours: dict[str, Any], 
         execution.step()
         rows.append(observer.last_real_values(slave, wanted))
     series = dict(zip(names(system), np.array(rows).T, strict=True))
-    return estimates(system, record_from_series(system, series, {**ours["meta"], "step": step}))
+    return estimates(system, record_from_series(system, series, ours["run"].replace(step=step)))
 
 
 def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: dict[str, Any]) -> None:
@@ -88,7 +88,7 @@ def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: 
     whole, half = (libcosim(system, archive, tmp_path / str(h), ours, h) for h in (STEP, STEP / 2))
     values = read_ssv(str(archive), "resources/parameters.ssv")
     found = simulate_ssp(str(archive), stop_time=ours["end"], step_size=STEP, parameter_set=values)
-    record = record_from_series(system, {n: found[n] for n in names(system)}, ours["meta"])
+    record = record_from_series(system, {n: found[n] for n in names(system)}, ours["run"])
     fmpy = estimates(system, record)
     assert len(ours["coefficients"]) == 9
     for name, c in ours["coefficients"].items():
@@ -105,5 +105,5 @@ def test_container(system: System, tmp_path: Path, ours: dict[str, Any]) -> None
     path = tmp_path / "tumble.fmu"
     export_container(system, path, values=VALUES)
     found = simulate_fmu(str(path), stop_time=ours["end"], step_size=STEP, output_interval=STEP, output=names(system))
-    record = record_from_series(system, {n: found[n] for n in names(system)}, ours["meta"])
+    record = record_from_series(system, {n: found[n] for n in names(system)}, ours["run"])
     assert estimates(system, record) == ours["coefficients"]

@@ -37,7 +37,7 @@ def test_fault_under_isolation(small: System, make: Make, tmp_path: Path, fault:
     assert caught.value.exit_code == 3
     record = Record.load(tmp_path / "run")
     assert not record.complete
-    assert record.meta["stopped_at"] == pytest.approx(0.15)
+    assert record.run.stopped_at == pytest.approx(0.15)
     assert record.channels["time"].tolist() == [k * 10 * 1e-3 for k in range(16)]
 
 
@@ -64,7 +64,7 @@ def test_isolated_run_is_bit_equal(small: System) -> None:
     inside = run(small, values=values, engine="native", seed=4)
     outside = run(small, values=values, isolate=["gyro"], seed=4)
     assert inside.same_data(outside)
-    assert outside.meta["isolated"] == ["gyro"]
+    assert outside.run.isolated == ["gyro"]
 
 
 def test_undeclared_dependencies_make_an_algebraic_loop(small: System, make: Make) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.linear.linear_model import LinearizationError, loops, poles, unstable
+from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.margins import model_response
 
 NAME = "stabilizer_power_2dof"
@@ -32,9 +33,9 @@ def linear(step: float = 1e-4, **values: Any) -> tuple[dict[str, Any], list[str]
 
 
 def matrices(m: dict[str, Any]) -> list[np.ndarray]:
-    n = len(m["states"])
-    shapes = ((n, n), (n, len(m["inputs"])), (len(m["outputs"]), n), (len(m["outputs"]), len(m["inputs"])))
-    return [np.reshape(m[k], shape) for k, shape in zip("ABCD", shapes, strict=True)]
+    n = len(m.states)
+    shapes = ((n, n), (n, len(m.inputs)), (len(m.outputs), n), (len(m.outputs), len(m.inputs)))
+    return [np.reshape(getattr(m, k), shape) for k, shape in zip("ABCD", shapes, strict=True)]
 
 
 def test_loop_of_the_power_stabilizer_by_hand() -> None:
@@ -43,7 +44,7 @@ def test_loop_of_the_power_stabilizer_by_hand() -> None:
     f = np.geomspace(0.1, 100.0, 30)
     s = 2j * np.pi * f
     by_hand = 1000.0 / (s * (0.01 * s * s + 1.2 * s + 120.0))
-    got = model_response(found["loops"]["stabilizer"]["continuous"], f)[:, 0, 0]
+    got = model_response(found.loops["stabilizer"].continuous, f)[:, 0, 0]
     np.testing.assert_allclose(got, by_hand, rtol=1e-10)
     assert not [t for t in said if "unstable" in t]
 
@@ -52,9 +53,9 @@ def test_closing_the_open_loop_gives_the_closed_one() -> None:
     """1 + L = 0 at the poles of the closed system: python-control's feedback has them all."""
     found, _ = linear()
     for kind in ("continuous", "discrete"):
-        m = found["loops"]["stabilizer"][kind]
-        closed = control.feedback(control.ss(*matrices(m), m["step"]), 1)
-        own = np.sort_complex(np.linalg.eigvals(matrices(found["closed"][kind])[0]))
+        m = found.loops["stabilizer"].of(kind)
+        closed = control.feedback(control.ss(*matrices(m), m.step), 1)
+        own = np.sort_complex(np.linalg.eigvals(matrices(found.closed.of(kind))[0]))
         theirs = np.sort_complex(closed.poles())
         np.testing.assert_allclose(own, theirs, atol=1e-6 * np.max(np.abs(own)))
 
@@ -65,28 +66,28 @@ def test_discrete_model_is_the_co_simulation() -> None:
         system = s.system
         system.channel_period = 1e-3
         record = s.run(SHORT, step=1e-3)
-    m = record.meta["linear"]["closed"]["discrete"]
+    m = record.run.linear.closed.discrete
     a, b, c, d = matrices(m)
-    assert m["step"] == 1e-3
-    drive = {n: record.channels.get(n) for n in m["inputs"]}
+    assert m.step == 1e-3
+    drive = {n: record.channels.get(n) for n in m.inputs}
     time = record.channels["time"]
     stop = int(np.flatnonzero(time > 3.0)[0])  # the load step and part of the servo torque: only torques are at work
     x = np.zeros(a.shape[0])
     rows = []
     for k in range(1, stop):
-        u = np.array([0.0 if drive[n] is None else drive[n][k] for n in m["inputs"]])
+        u = np.array([0.0 if drive[n] is None else drive[n][k] for n in m.inputs])
         rows.append(c @ x + d @ u)
         x = a @ x + b @ u
     got = np.array(rows)
     for name in ("gyro.alpha", "gyro.beta", "stabilizer.e"):
         here = record.channels[name][1:stop]
-        np.testing.assert_allclose(got[:, m["outputs"].index(name)], here, atol=1e-9 * np.ptp(here))
+        np.testing.assert_allclose(got[:, m.outputs.index(name)], here, atol=1e-9 * np.ptp(here))
 
 
 def test_a_loop_that_only_its_step_makes_unstable_is_told_so() -> None:
     """K_m = 1400 of 1440 is stable; with a step of 2 ms, whose delay costs 109 h/2 rad = 6 degrees, it is not."""
     found, said = linear(step=2e-3, K_m=1400.0)
-    assert not unstable(found["closed"]["continuous"]) and unstable(found["closed"]["discrete"])
+    assert not unstable(found.closed.continuous) and unstable(found.closed.discrete)
     assert any("the loop with its step of 0.002 s is unstable: pole +" in t for t in said)
     assert not any("unstable" in t for t in linear(K_m=1400.0)[1])
 
@@ -97,14 +98,15 @@ def test_an_unstable_loop_is_told_with_its_pole() -> None:
     root = max(np.roots([0.01, 1.2, 120.0, 20000.0]), key=lambda p: p.real)
     text = next(t for t in said if "unstable" in t)
     assert f"pole {root.real:+.4g} ± {abs(root.imag):.4g}j rad/s" in text
-    assert unstable(found["closed"]["continuous"])[0] == pytest.approx(complex(root.real, abs(root.imag)), rel=1e-9)
+    assert unstable(found.closed.continuous)[0] == pytest.approx(complex(root.real, abs(root.imag)), rel=1e-9)
 
 
 def test_poles_of_a_model() -> None:
     """z = exp(s h) and back; a pure delay (z = 0) is no pole of the s plane."""
-    m = {"A": np.diag([math.exp(-0.02), 0.0]).tolist(), "step": 0.01}
+    empty: dict[str, list] = {k: [] for k in ("A", "B", "C", "D", "inputs", "outputs", "states")}
+    m = LinearModel(**{**empty, "A": np.diag([math.exp(-0.02), 0.0]).tolist()}, step=0.01)
     assert poles(m) == [pytest.approx(-2.0)]
-    assert poles({"A": [], "step": 0.0}) == []
+    assert poles(LinearModel(**empty, step=0.0)) == []
 
 
 def test_a_break_that_is_no_wired_input() -> None:

@@ -39,7 +39,7 @@ def stop(system: System, out: Path, at: float, **more: Any) -> RunInterrupted:
 def test_stopped_at_many_times_the_record_is_that_of_a_whole_run(small: System, tmp_path: Path, engine: str) -> None:
     """Stops before the first step, in settling, in a window, at the end of one, in the turn, just before the end."""
     whole = run(small, values=QUICK, seed=5, engine=engine)
-    windows, end = whole.windows, whole.meta["stopped_at"]
+    windows, end = whole.windows, whole.run.stopped_at
     inside = [(a + b) / 2 for a, b in zip(windows["t_start"], windows["t_end"], strict=True)]
     times = sorted([0.0, 0.001, 0.05, *inside, windows["t_end"][1], end - 0.001])
     out = tmp_path / "r"
@@ -48,15 +48,15 @@ def test_stopped_at_many_times_the_record_is_that_of_a_whole_run(small: System, 
         assert str(error).startswith("stopped at t = ")
         assert "the same command with --resume continues it" in str(error)
         part = Record.load(out)
-        assert not part.complete and part.meta["stopped_at"] == pytest.approx(t, abs=6e-4)
-        rows = int((windows["t_end"] <= part.meta["stopped_at"] - 1e-3).sum())
+        assert not part.complete and part.run.stopped_at == pytest.approx(t, abs=6e-4)
+        rows = int((windows["t_end"] <= part.run.stopped_at - 1e-3).sum())
         assert rows <= len(part.windows["mean"]) <= rows + 1
         assert (out / FILE).is_file()
     found = run(small, values=QUICK, seed=5, engine=engine, out=out, resume=True)
     assert found.same_data(whole) and Record.load(out).same_data(whole)
-    assert found.complete and found.meta["steps"] == whole.meta["steps"]
-    assert found.meta["resumed_at"] == pytest.approx(times, abs=6e-4)
-    assert set(found.meta["timing"]) == set(whole.meta["timing"])
+    assert found.complete and found.run.steps == whole.run.steps
+    assert found.run.resumed_at == pytest.approx(times, abs=6e-4)
+    assert set(found.run.timing) == set(whole.run.timing)
     assert [p.name for p in out.iterdir() if p.name.startswith(FILE)] == []
 
 
@@ -150,7 +150,7 @@ def test_a_part_that_cannot_save_its_state(small: System, make: Make, tmp_path: 
     setup["values"] = {n: v for n, v in QUICK.items() if not n.startswith("gyro")}
     why = r"gyro: the FMU cannot save its state \(canSerializeFMUstate is not true"
     assert f"it cannot be resumed: {why[:30]}" in str(stop(small, tmp_path, 0.1, **setup))
-    assert not (tmp_path / FILE).exists() and Record.load(tmp_path).meta["stopped_at"] == 0.1
+    assert not (tmp_path / FILE).exists() and Record.load(tmp_path).run.stopped_at == 0.1
     with pytest.raises(ResumeError, match=f"--resume: {why}"):
         run(small, seed=5, out=tmp_path, resume=True, **setup)
 
@@ -252,7 +252,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert (tmp_path / "r-incomplete" / FILE).is_file() and Record.load(tmp_path / "r").complete
     assert command([*WORDS, "--out", "r", "--resume"], capsys, monkeypatch)[0] == 0
     assert not (tmp_path / "r-incomplete" / FILE).exists()
-    assert Record.load(tmp_path / "r").meta["resumed_at"]
+    assert Record.load(tmp_path / "r").run.resumed_at
 
 
 def test_a_killed_process_is_resumed(
@@ -279,7 +279,7 @@ def test_a_killed_process_is_resumed(
     code, _, err = command([*WORDS, "--out", "k", "--resume"], capsys, monkeypatch)  # the native engine goes on
     assert code == 0, err
     found = Record.load(tmp_path / "k")
-    assert 0.0 < found.meta["resumed_at"][0] < found.meta["stopped_at"]
+    assert 0.0 < found.run.resumed_at[0] < found.run.stopped_at
     assert command([*WORDS, "--out", "whole"], capsys, monkeypatch)[0] == 0
     assert found.same_data(Record.load(tmp_path / "whole"))
     assert not file.exists()

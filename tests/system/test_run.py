@@ -15,6 +15,7 @@ import pytest
 
 from gyrobench.engine.session import RunError, RunInterrupted, Session, run
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.system.parameters import slot_seed
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
 from gyrobench.system.system_description import describe
@@ -61,8 +62,8 @@ def test_engines_are_bit_equal(small: System) -> None:
     two = run(small, values=QUICK, engine="reference", seed=5)
     assert len(one.windows["mean"]) > 4
     assert one.same_data(two)
-    assert (one.meta["engine"], two.meta["engine"]) == ("native", "reference")
-    assert one.meta["order"] == two.meta["order"]
+    assert (one.run.engine, two.run.engine) == ("native", "reference")
+    assert one.run.order == two.run.order
 
 
 def test_engines_are_bit_equal_with_a_mapped_fmu(small: System, make: Make) -> None:
@@ -71,14 +72,14 @@ def test_engines_are_bit_equal_with_a_mapped_fmu(small: System, make: Make) -> N
     two = run(small, values=QUICK, engine="reference", **setup)
     assert one.same_data(two)
     assert "gyro.drift" not in one.channels  # optional, not offered
-    assert one.meta["parts"]["gyro"]["target"] == "foreign"
+    assert one.run.parts["gyro"].target == "foreign"
 
 
 def test_integer_and_boolean_connections_against_a_loop_by_hand(make: Make) -> None:
     # order a b c d, d -> a is cut.  y' = (u - y)/T held over h: y += (u - y) (1 - exp(-h/T))
     found = run(Ring(), **ring(make), engine="native")
     assert found.same_data(run(Ring(), **ring(make), engine="reference"))
-    assert found.meta["cuts"] == ["d.y -> a.u: one step delay (no output of a depends on it at once)"]
+    assert found.run.cuts == ["d.y -> a.u: one step delay (no output of a depends on it at once)"]
     y = {"a": 1.0, "b": 0.0, "c": 0.0, "d": 0.0}
     e = {n: -math.expm1(-0.01 / t) for n, t in {"a": 0.2, "b": 0.05, "c": 0.1, "d": 0.1}.items()}
     rows = [list(y.values())]
@@ -110,19 +111,19 @@ def test_windows_times_and_meta(small: System, tmp_path: Path) -> None:
     assert set(w["phase"]) == {1, 2, 3}
     np.testing.assert_allclose(w["t_end"] - w["t_start"], w["n"] * 1e-3, rtol=1e-9)
     np.testing.assert_allclose(w["angle_end"] - w["angle_start"], [0, 0] + [0.05] * 2 + [0], atol=1e-3)
-    meta = record.meta
-    assert meta["complete"]
-    assert meta["changed"] == list(QUICK)
-    assert meta["parameters"]["table.index_rate"] == 1.0
-    assert meta["parameters"]["site.latitude"] == pytest.approx(math.radians(45.75))
-    assert meta["parameters"]["sequencer.modes"][:3] == [0, 2, 1]
-    assert len(meta["parameters"]["gyro.mount"]) == 3
-    assert meta["plan"][1]["label"] == "turn"
-    assert len(meta["parts"]["gyro"]["sha256"]) == 64
-    assert set(meta["timing"]) == set(small.slots)
+    document = record.run
+    assert document.complete
+    assert document.changed == list(QUICK)
+    assert document.parameters["table.index_rate"] == 1.0
+    assert document.parameters["site.latitude"] == pytest.approx(math.radians(45.75))
+    assert document.parameters["sequencer.modes"][:3] == [0, 2, 1]
+    assert len(document.parameters["gyro.mount"]) == 3
+    assert document.plan[1].label == "turn"
+    assert len(document.parts["gyro"].sha256) == 64
+    assert set(document.timing) == set(small.slots)
     again = Record.load(tmp_path / "r")
     assert again.same_data(record)
-    assert again.meta == meta
+    assert again.run == document
     assert [p.name for p in (tmp_path / "r").iterdir() if p.suffix == ".part"] == []
 
 
@@ -141,8 +142,8 @@ def test_seeds(small: System) -> None:
     assert a.same_data(c)
     assert not a.same_data(b)
     assert not a.same_data(fixed)
-    assert a.meta["parameters"]["gyro.seed"] == slot_seed(1, "gyro") != a.meta["parameters"]["rebalance.seed"]
-    assert fixed.meta["parameters"]["gyro.seed"] == 77
+    assert a.run.parameters["gyro.seed"] == slot_seed(1, "gyro") != a.run.parameters["rebalance.seed"]
+    assert fixed.run.parameters["gyro.seed"] == 77
 
 
 def test_values_are_refused_with_a_hint(small: System) -> None:
@@ -170,7 +171,7 @@ def test_values_are_refused_with_a_hint(small: System) -> None:
 def test_per_g_coefficient_and_array_values(small: System) -> None:
     values = {**QUICK, "gyro.D_I": "0.9deg/h/g", "gyro.mount": "[[1,0,0],[0,1,0],[0,0,1]]", "gyro.mount[1,1]": 1.0}
     record = run(small, values=values)
-    assert record.meta["parameters"]["gyro.D_I"] == pytest.approx(math.radians(0.9) / 3600)
+    assert record.run.parameters["gyro.D_I"] == pytest.approx(math.radians(0.9) / 3600)
 
 
 def test_part_refuses_its_parameter(small: System) -> None:
@@ -208,8 +209,8 @@ def test_interrupt_keeps_the_record(make: Make, tmp_path: Path) -> None:
         run(Long(), **ring(make), out=tmp_path, progress=seen.append)
     record = Record.load(tmp_path)
     assert not record.complete
-    assert 0.0 < record.meta["stopped_at"] < 1e6
-    assert len(record.channels["time"]) == int(record.meta["stopped_at"] / 100.0 + 1e-9) + 1
+    assert 0.0 < record.run.stopped_at < 1e6
+    assert len(record.channels["time"]) == int(record.run.stopped_at / 100.0 + 1e-9) + 1
     assert caught.value.exit_code == 3
     assert seen[-1].rate > 0.0
     assert 0.0 < seen[-1].fraction < 1.0
@@ -220,7 +221,7 @@ def test_description_is_what_runs(small: System) -> None:
         shown = describe(session.assembly)
         record = session.run(QUICK)
     for key in ("order", "cuts", "delays"):
-        assert shown[key] == record.meta[key]
+        assert shown[key] == getattr(record.run, key)
     assert [w["wire"] for w in shown["wires"] if w["cut"]] == list(shown["delays"])
 
 
@@ -236,7 +237,7 @@ def test_python_and_native_parts_give_the_same_record(small: System) -> None:
     native = run(small, values=QUICK, seed=3)
     python = run(small, values=QUICK, seed=3, target="python", engine="reference")
     assert native.same_data(python)
-    assert python.meta["parts"]["gyro"]["target"] == "python"
+    assert python.run.parts["gyro"].target == "python"
 
 
 def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, make: Make) -> None:
@@ -247,6 +248,6 @@ def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, make: M
 
 
 def test_infinite_parameter_does_not_cost_the_record(tmp_path: Path) -> None:
-    record = Record({"mean": np.zeros(1)}, {}, {"parameters": {"gyro.limit": math.inf}, "list": [math.nan]})
+    record = Record({"mean": np.zeros(1)}, {}, RunDocument(parameters={"gyro.limit": math.inf}, list=[math.nan]))
     again = Record.load(record.save(tmp_path))
-    assert again.meta == {"parameters": {"gyro.limit": "inf"}, "list": ["nan"]}
+    assert again.run.parameters == {"gyro.limit": "inf"} and again.run.as_dict()["list"] == ["nan"]

@@ -20,7 +20,7 @@ def test_vendor_gyro_gives_the_same_coefficients(make: Make) -> None:
     noise = {f"gyro.{n}": 0.0 for n in ("turn_on", "markov", "white", "pickoff")}
     with Session(system) as session:
         ours = session.run({**SHORT, **QUIET, **noise})
-    p = ours.meta["parameters"]
+    p = ours.run.parameters
     same = {f"gyro.{n}": p[f"gyro.{n}"] for n in (*TERMS, "k")}  # SI; the mapping makes deg/h and deg/h/mA of it
     body = {
         "gyro.GAIN": p["gyro.H"] / p["gyro.C"],

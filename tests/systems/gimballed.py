@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gyrobench.engine.session import Session
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.system import load_system
 

@@ -24,7 +24,7 @@ def module(name: str) -> Any:
 
 
 def quiet(system: System) -> dict[str, Any]:
-    return dict.fromkeys(system.noises, 0.0)  # type: ignore[attr-defined]
+    return dict.fromkeys(system.noises, 0.0)
 
 
 def polynomial(rng: np.random.Generator) -> dict[str, float]:

@@ -43,10 +43,10 @@ def latitude(rng: np.random.Generator) -> float:
 
 def held(record: Any) -> tuple[servo_regression.Held, Array]:
     """Windows of the held phases and which rows of the record they are."""
-    labels = {r["phase"]: r["label"] for r in record.meta["plan"] if r["mode"] == "servo"}
+    labels = {r.phase: r.label for r in record.run.plan if r.mode == "servo"}
     w = record.windows
     rows = np.isin(w["phase"], list(labels))
-    axes = np.array([attitude(labels[p], record.meta["options"]["latitude"]) for p in w["phase"][rows].tolist()])
+    axes = np.array([attitude(labels[p], record.run.options["latitude"]) for p in w["phase"][rows].tolist()])
     return servo_regression.Held(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
 
 
@@ -58,7 +58,7 @@ def expected_rate(record: Any) -> Array:
     The gyro turns in the base that turns with the Earth; what the Earth gives along its output axis changes with theta.
     """
     windows, _ = held(record)
-    site, parameters = run_metadata.Site.of(record.meta), record.meta["parameters"]
+    site, parameters = run_metadata.Site.of(record.run), record.run.parameters
     true = np.array([parameters[f"gyro.{n}"] for n in NAMES])
     omega_d = servo_regression.design(windows, site, NAMES) @ true
     earth = windows.axes @ frames.earth_rate_local(site.latitude, site.earth_rate)

@@ -20,7 +20,7 @@ _room = type(system).__module__
 geometry: Any = importlib.import_module(".geometry", _room)
 windows: Any = importlib.import_module(".windows", _room)
 refusals: Any = importlib.import_module(".refusals", _room)
-NOISES: tuple[str, ...] = system.noises  # type: ignore[assignment]
+NOISES: tuple[str, ...] = system.noises
 
 DPH = math.pi / 180.0 / 3600.0
 NAMES = {c: drift.terms_2dof(c, 9) for c in "xy"}
@@ -49,8 +49,8 @@ def gyro(rng: np.random.Generator) -> dict[str, float]:
 
 def held(record: Any) -> tuple[Any, run_metadata.Site, Array]:
     """Windows of the held phases as the reduction sees them, the site, and which rows of the record they are."""
-    site = run_metadata.Site.of(record.meta)
-    mounts = {r["phase"]: int(r["label"].split()[1]) for r in record.meta["plan"] if r["mode"] == "servo"}
+    site = run_metadata.Site.of(record.run)
+    mounts = {r.phase: int(r.label.split()[1]) for r in record.run.plan if r.mode == "servo"}
     rows = np.isin(record.windows["phase"], list(mounts))
     phase = record.windows["phase"][rows].astype(int)
     columns = {k: np.asarray(v, dtype=float)[rows] for k, v in record.windows.items()}
@@ -61,7 +61,7 @@ def held(record: Any) -> tuple[Any, run_metadata.Site, Array]:
 def left(record: Any) -> Array:
     """Mean inertial rates about x and y less the true drift, of each held window, rad/s (n, 2)."""
     seen, site, _ = held(record)
-    p = record.meta["parameters"]
+    p = record.run.parameters
     true = [seen.design(site, NAMES[c]) @ np.array([p[f"gyro.{n}"] for n in NAMES[c]]) for c in "xy"]
     out: Array = seen.inertial(site)[:, :2] - np.column_stack(true)
     return out
@@ -78,7 +78,7 @@ def stiffness_effect(record: Any) -> Array:
     averaged over each window, rad/s (n, 2); derivatives of the polynomials through the nodes.
     """
     seen, site, _ = held(record)
-    p = record.meta["parameters"]
+    p = record.run.parameters
     half = ((seen.t_end - seen.t_start) / 2.0)[:, None]
     V = np.polynomial.polynomial.polyvander(windows.NODES, 7)
     D = np.linalg.solve(V.T, (V[:, :-1] @ np.polynomial.polynomial.polyder(np.eye(8))).T).T
@@ -109,5 +109,5 @@ def errors(result: Any, values: dict[str, Any]) -> dict[str, float]:
 
 
 def reduced(record: Any, **options: Any) -> Any:
-    meta = {**record.meta, "options": {**record.meta["options"], **options}}
+    meta = record.run.replace(options={**record.run.options, **options})
     return load_system(NAME).reduce(type(record)(record.windows, {}, meta))

@@ -137,8 +137,8 @@ def test_intervals_cover(name: str) -> None:
     for run in range(runs):
         drawn, record = records[run % 3]
         n = benchmark.Noise(*noise.draw(rng, t0, t1, readings), window)
-        read_so = read(record.windows, record.meta["parameters"], rng, n)
-        result = drawn.reduce(Record({**record.windows, **read_so}, {}, record.meta))
+        read_so = read(record.windows, record.run.parameters, rng, n)
+        result = drawn.reduce(Record({**record.windows, **read_so}, {}, record.run))
         ratio.append(
             [2.0 * (c.estimate - c.truth) / (c.interval[1] - c.interval[0]) for c in result.coefficients if c.truth]
         )

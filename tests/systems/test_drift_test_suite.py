@@ -57,11 +57,11 @@ def results(
     """Each test run as the suite runs it: its values, its seed."""
     out = {}
     for name, system in chosen.members().items():
-        quiet = {} if noise else {n: 0.0 for n in system.noises}  # type: ignore[attr-defined]
+        quiet = {} if noise else {n: 0.0 for n in system.noises}
         values = {**SHORT[name], **more.get(name, {}), **chosen.given_to(chosen.members())[name], **quiet}
         record = sessions[name].run(values, seed=chosen.seed_of(seed, name))
         out[name] = system.with_values(values).reduce(record)
-        out[name].provenance = record.meta
+        out[name].provenance = record.run.as_dict()
     return out
 
 

@@ -21,7 +21,7 @@ from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.multi_day_record import combine
 from gyrobench.record.record import Record
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 
@@ -40,7 +40,7 @@ def load() -> System:
     return load_system(NAME)
 
 
-QUIET = {n: 0.0 for n in load().noises}  # type: ignore[attr-defined]
+QUIET = {n: 0.0 for n in load().noises}
 
 
 @pytest.fixture(scope="module")
@@ -148,13 +148,13 @@ def test_dynamic_against_quasi_static_with_noise(session: Session) -> None:
         names = drift.NAMES_2DOF[other]
         D = np.array([values.get(f"gyro.{n}", 0.0) for n in names])
         rates = []
-        for p in record.meta["plan"]:
-            C = np.asarray(faces[p["face"]])
+        for p in record.run.plan:
+            C = np.asarray(faces[p.face])
             w = W * float(C[axis] @ frames.pole(phi))
             rates.append((w - float(drift.regressors(C @ -frames.U * g, names) @ D)) / values[f"gyro.k_{c}"])
         mean[f"mean_{c}"] = np.repeat(rates, 2)
         assert np.max(np.abs(mean[f"mean_{c}"] - record.windows[f"mean_{c}"])) * 17.0 / 1e-3 < LIMIT
-    static = named(load().reduce(Record({**record.windows, **mean}, {}, record.meta)))
+    static = named(load().reduce(Record({**record.windows, **mean}, {}, record.run)))
     noisy = named(reduced(session, values, seed=3))
     for n, c in noisy.items():
         assert abs(c.estimate - static[n].estimate) < 4.0 * c.u, n
@@ -224,7 +224,7 @@ def test_bounds_and_warnings(session: Session) -> None:
     with pytest.raises(InvalidConfigurationError, match="exchange once a step"):
         session.run(SHORT, step=0.01)
     record = session.run({**SHORT, **QUIET, "latitude": math.radians(81.0), "table.tilt": [math.radians(0.5), 0.0]})
-    assert any("beyond 80°" in n for n in record.meta["notes"])
+    assert any("beyond 80°" in n for n in record.run.notes)
 
 
 def test_saturation_is_refused(session: Session) -> None:
@@ -241,7 +241,7 @@ def laboratory(record: Record, extra: str = "", day: dict[int, int] | None = Non
     writer = csv.writer(out, lineterminator="\n")
     head = ["position", "cycle", "t_start [min]", "t_end [min]", "mean_x [uA]", "mean_y [mA]", "remark"]
     writer.writerow([*head, *(["day"] if day else [])])
-    face = {p["phase"]: int(p["face"].split()[1]) for p in record.meta["plan"]}
+    face = {p.phase: int(p.face.split()[1]) for p in record.run.plan}
     w = record.windows
     for j, phase in enumerate(w["phase"].tolist()):
         row = [face[phase], (phase - 1) % 16 // 8 + 1, w["t_start"][j] / 60, w["t_end"][j] / 60]
@@ -298,11 +298,11 @@ def test_bad_laboratory_files(session: Session, tmp_path: Path) -> None:
     ):
         (tmp_path / "bad.csv").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=re.escape(said)):
-            load().measured(tmp_path / "bad.csv", {})
+            load().read_measured(tmp_path / "bad.csv", {})
     missing = "\n".join(t for t in good.splitlines() if not t.startswith("6,"))
     (tmp_path / "six.csv").write_text(missing, encoding="utf-8")
     with pytest.raises(ValueError, match="position 6 missing"):
-        load().reduce(load().measured(tmp_path / "six.csv", {}))
+        load().reduce(load().read_measured(tmp_path / "six.csv", {}))
 
 
 # ------------------------------------------------------------------------------------------ days
@@ -316,7 +316,7 @@ def test_days_of_turn_on(session: Session, command: Command, tmp_path: Path) -> 
         folders.append(tmp_path / f"run{seed}")
         records.append(session.run(values, seed=seed, out=folders[-1]))
     (tmp_path / "days.csv").write_text("# five days\nrun\n" + "\n".join(f.name for f in folders) + "\n", "utf-8")
-    combined = load().measured(tmp_path / "days.csv", {})
+    combined = load().read_measured(tmp_path / "days.csv", {})
     result = load().reduce(combined)
     by = named(result)
     each = [named(load().reduce(r))["R_y"].estimate for r in records]
@@ -329,7 +329,7 @@ def test_days_of_turn_on(session: Session, command: Command, tmp_path: Path) -> 
     assert p["day to day, R_y"] < 1e-6 and p["day to day, u_x"] > 1e-3
     assert len(result.tables[0]["rows"]) == 8
 
-    day = {p["phase"]: 1 + [f.name for f in folders].index(p["day"]) for p in combined.meta["plan"]}
+    day = {p.phase: 1 + [f.name for f in folders].index(p.day) for p in combined.run.plan}
     again = from_file(command, tmp_path / "lab", laboratory(combined, day=day))
     for c in again["coefficients"]:
         assert c["estimate"] == pytest.approx(by[c["name"]].estimate, abs=1e-7), c["name"]
@@ -346,7 +346,7 @@ def test_days_that_do_not_go_together(session: Session, tmp_path: Path) -> None:
     for text, said in (("run\na\n", "at least two"), ("run\na\na\n", "named twice"), ("run\na\nb\n", "not a readable")):
         (tmp_path / "days.csv").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=said):
-            load().measured(tmp_path / "days.csv", {})
+            load().read_measured(tmp_path / "days.csv", {})
 
 
 def test_readme_lists_the_options() -> None:

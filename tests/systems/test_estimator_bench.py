@@ -149,17 +149,17 @@ def test_readings_reach_the_estimator_in_their_own_step() -> None:
     """No estimator at all: the estimate is the reading of the same row."""
     r = run(load_system(NAME), {"estimator": "estimator_none"}, values={"samples": 10000, "skip": 0})
     assert (r.channels["estimator.estimate"] == r.channels["source.z"]).all()
-    assert r.meta["delays"] == {}
+    assert r.run.delays == {}
 
 
 def test_what_is_known_is_set_where_the_part_has_it() -> None:
     values = {"benchmark": "level", "estimator.walk": 1e-9, "samples": 2500, "skip": 0}
-    known = run(load_system(NAME), values=values).meta
-    p = known["parameters"]
+    known = run(load_system(NAME), values=values).run
+    p = known.parameters
     assert p["estimator.Ts"] == 5.0 and p["estimator.R"] == 2.70e-6 and p["estimator.q"] == 0.0
     assert p["estimator.walk"] == 1e-9  # the user's word before the benchmark's
-    none = run(load_system(NAME), {"estimator": "estimator_none"}, values={"benchmark": "level"}).meta
-    assert "estimator.Ts" not in none["parameters"] and none["notes"] == known["notes"] == []
+    none = run(load_system(NAME), {"estimator": "estimator_none"}, values={"benchmark": "level"}).run
+    assert "estimator.Ts" not in none.parameters and none.notes == known.notes == []
 
 
 # --------------------------------------------------------------------------------------- refusals

@@ -20,7 +20,7 @@ from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.estimation import noise
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 
@@ -34,7 +34,7 @@ def load() -> System:
     return load_system(NAME)
 
 
-QUIET = {n: 0.0 for n in load().noises}  # type: ignore[attr-defined]
+QUIET = {n: 0.0 for n in load().noises}
 PACKAGE = type(load()).__module__
 R: Any = importlib.import_module(".reduction", PACKAGE)
 
@@ -211,7 +211,7 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[...
     for missing in ("latitude = 45.75deg", "k = 17.2deg/h/mA", "attitude = U E N"):
         (tmp_path / "bad.csv").write_text(text.replace(f"# {missing}\n", ""), encoding="utf-8")
         with pytest.raises(DataError, match=f"'{missing.split()[0]}' is not given"):
-            load().measured(tmp_path / "bad.csv", {})
+            load().read_measured(tmp_path / "bad.csv", {})
 
 
 def test_days(session: Session, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_days(session: Session, tmp_path: Path) -> None:
         folders.append(f"day{seed}")
         each.append(load().reduce(session.run(values, seed=seed, out=tmp_path / folders[-1])).coefficients[0].estimate)
     (tmp_path / "days.csv").write_text("run\n" + "\n".join(folders), encoding="utf-8")
-    result = load().reduce(load().measured(tmp_path / "days.csv", {}))
+    result = load().reduce(load().read_measured(tmp_path / "days.csv", {}))
     (c,) = result.coefficients
     assert c.estimate == pytest.approx(np.mean(each))
     sigma = float(np.std(each, ddof=1))

@@ -13,7 +13,7 @@ import pytest
 from gimballed import DEG, STILL, measures, session, table
 
 from gyrobench.engine.session import RunError, Session
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import InvalidConfigurationError, load_system
 

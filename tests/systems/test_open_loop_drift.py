@@ -17,7 +17,7 @@ from gyrobench import drift, frames
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
 NAME = "open_loop_drift"
@@ -31,7 +31,7 @@ def load() -> System:
     return load_system(NAME)
 
 
-QUIET = {n: 0.0 for n in load().noises}  # type: ignore[attr-defined]
+QUIET = {n: 0.0 for n in load().noises}
 R: Any = importlib.import_module(".reduction", type(load()).__module__)
 
 
@@ -190,7 +190,7 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[...
     assert result["coefficients"][0]["estimate"] == pytest.approx(expected.estimate, abs=2e-3)  # time of moves unknown
     (tmp_path / "bad.csv").write_text(text.replace("# attitude = E U -N\n", ""), encoding="utf-8")
     with pytest.raises(DataError, match="'attitude' is not given"):
-        load().measured(tmp_path / "bad.csv", {})
+        load().read_measured(tmp_path / "bad.csv", {})
 
 
 def test_hand_that_nulls(tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_hand_that_nulls(tmp_path: Path) -> None:
     rows = "\n".join(f"{10 * n},{10 * n + 1},{(0.4 - 15.041068732) / 360 * n!r}" for n in range(11))
     text = f"# latitude = 90deg\n# attitude = U E\nt_start [s],t_end [s],angle [arcmin]\n{rows}\n"
     (tmp_path / "hand.csv").write_text(text, encoding="utf-8")
-    result = load().reduce(load().measured(tmp_path / "hand.csv", {}))
+    result = load().reduce(load().read_measured(tmp_path / "hand.csv", {}))
     # n steps of (rate / 360) arcmin in 10 s: rate / 360 * 60 arcsec / 10 s = rate / 60 arcsec/s
     assert result.coefficients[0].estimate == pytest.approx((0.4 - 15.041068732) / 60.0 + 15.041068732, abs=1e-6)
 

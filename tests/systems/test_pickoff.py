@@ -37,7 +37,7 @@ def stepping() -> Iterator[Session]:
 
 
 def quiet() -> dict[str, Any]:
-    return dict.fromkeys(load().noises, 0.0)  # type: ignore[attr-defined]
+    return dict.fromkeys(load().noises, 0.0)
 
 
 def named(result: Any) -> dict[str, Any]:

@@ -35,7 +35,7 @@ def closed(session, azimuth, pitch=0.0):
     """Unstable poles of the linear model with step and delays."""
     record = session.run({**SHORT, "hold": 5.0, "azimuth": f"{azimuth}deg", "pitch": f"{pitch}deg", "swing": 0.0,
                           "load_step": 0.0}, step=1e-3)  # fmt: skip
-    return unstable(record.meta["linear"]["closed"]["continuous"])
+    return unstable(record.run.linear.closed.continuous)
 
 
 @pytest.mark.parametrize("azimuth", [40.0, 60.0, 80.0])
@@ -50,7 +50,7 @@ def test_stability_over_azimuth(sessions, azimuth):
             record = error.record
         moved = max(np.abs(record.channels[f"platform.attitude[{k}]"]).max() for k in (1, 2, 3))
         assert (moved < 1e-4) if stable else (moved > 1e-2)
-        assert bool(unstable(record.meta["linear"]["closed"]["discrete"])) is not stable
+        assert bool(unstable(record.run.linear.closed.discrete)) is not stable
 
 
 def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
@@ -60,7 +60,7 @@ def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
     """
     session = sessions[False]
     record = session.run({**SHORT, "pitch": 0.0, "azimuth": 0.0})
-    model = record.meta["linear"]["loops"]["pitch"]["continuous"]
+    model = record.run.linear.loops["pitch"].continuous
     span = m.grid(1.0, 100.0)
     margin = m.margins(span, m.model_response(model, span)[:, 0, 0]).phase
     assert margin == pytest.approx(53.6, abs=1.0)  # PLATFORM-1AXIS; dropping H b' and Y2 move it by tenths
@@ -92,7 +92,7 @@ def test_command_turns_the_platform_its_way(sessions):
     record, _, found = reduced(sessions[True], frequency=0.5)
     for k, axis in enumerate("xyz", 1):
         assert found[f"reached {axis}"].estimate == pytest.approx(1.0, abs=0.02)
-        phase = next(p["phase"] for p in record.meta["plan"] if p["label"].startswith(f"command {axis}"))
+        phase = next(p.phase for p in record.run.plan if p.label.startswith(f"command {axis}"))
         inside = (record.channels["exciter.phase"] == phase) & (record.channels["exciter.gate"] > 0.5)
         rate = np.gradient(record.channels[f"platform.attitude[{k}]"][inside], 1e-3)
         assert found["rate gain"].estimate == pytest.approx(1.0, abs=1e-4)

@@ -14,7 +14,7 @@ from servoing import DPH, NAMES, QUIET
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
 NAME = "servo_vertical_level"

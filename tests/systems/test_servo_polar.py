@@ -30,7 +30,7 @@ def polar() -> Iterator[Session]:
 
 
 def reduced(record: Any, **options: Any) -> Any:
-    meta = {**record.meta, "options": {**record.meta["options"], **options}}
+    meta = record.run.replace(options={**record.run.options, **options})
     return load_system(NAME).reduce(type(record)(record.windows, {}, meta))
 
 
@@ -106,9 +106,9 @@ def test_one_mount_tells_combinations(day: Any) -> None:
     """X = +g s in S and -g s in N all day: five numbers each, called by what they hold; checked against the truth."""
     g, s = frames.normal_gravity(math.radians(45.75)) / frames.G0, math.sin(math.radians(45.75))
     for m, sign in (("S", "+"), ("N", "−")):
-        plan = [r for r in day.meta["plan"] if r["label"].startswith(f"polar {m}")]
-        keep = np.isin(day.windows["phase"], [r["phase"] for r in plan])
-        part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, {**day.meta, "plan": plan})
+        plan = [r for r in day.run.plan if r.label.startswith(f"polar {m}")]
+        keep = np.isin(day.windows["phase"], [r.phase for r in plan])
+        part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, day.run.replace(plan=plan))
         result = load_system(NAME).reduce(part)
         names = [c.name for c in result.coefficients]
         assert names[0] == f"D_F {sign} γ sinφ D_I + γ² sin²φ D_II" and len(names) == 5
@@ -121,16 +121,16 @@ def test_one_mount_tells_combinations(day: Any) -> None:
 
 
 def test_dwells_that_are_missing_are_asked_for(day: Any) -> None:
-    plan = [r for r in day.meta["plan"] if "east" not in r["label"]]
-    keep = np.isin(day.windows["phase"], [r["phase"] for r in plan])
-    part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, {**day.meta, "plan": plan})
+    plan = [r for r in day.run.plan if "east" not in r.label]
+    keep = np.isin(day.windows["phase"], [r.phase for r in plan])
+    part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, day.run.replace(plan=plan))
     with pytest.raises(ReductionError, match="R and K_zx both asked for"):
         load_system(NAME).reduce(part)
 
 
 def test_less_than_a_turn_is_refused(day: Any) -> None:
     keep = np.abs(day.windows["angle_end"]) < 5.0
-    part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, day.meta)
+    part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, day.run)
     with pytest.raises(ReductionError, match=r"\(polar S\) turned .* a whole turn is needed"):
         load_system(NAME).reduce(part)
 
@@ -138,8 +138,8 @@ def test_less_than_a_turn_is_refused(day: Any) -> None:
 def test_table_that_does_not_follow_is_refused(day: Any) -> None:
     windows = {**day.windows, "mean": np.full(day.windows["mean"].size, 10.0 * 3.0 * ARCSEC)}
     with pytest.raises(ReductionError, match="up to 3 arcsec away from the gyro"):
-        load_system(NAME).reduce(type(day)(windows, {}, day.meta))
-    loose = {**day.meta, "options": {**day.meta["options"], "tracking": 0.0}}
+        load_system(NAME).reduce(type(day)(windows, {}, day.run))
+    loose = day.run.replace(options={**day.run.options, "tracking": 0.0})
     load_system(NAME).reduce(type(day)(windows, {}, loose))
 
 
@@ -147,7 +147,7 @@ def test_saturated_pickoff_is_refused(day: Any) -> None:
     windows = {**day.windows, "flagged": day.windows["flagged"].copy()}
     windows["flagged"][-1] = 5
     with pytest.raises(ReductionError, match="flagged windows"):
-        load_system(NAME).reduce(type(day)(windows, {}, day.meta))
+        load_system(NAME).reduce(type(day)(windows, {}, day.run))
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_dynamic_against_quasi_static(polar: Session) -> None:
     windows, rows = held(noisy)
     angle_end = noisy.windows["angle_end"].copy()
     angle_end[rows] = windows.angle_start + expected_rate(noisy) * (windows.t_end - windows.t_start)
-    static = load_system(NAME).reduce(type(noisy)({**noisy.windows, "angle_end": angle_end}, {}, noisy.meta))
+    static = load_system(NAME).reduce(type(noisy)({**noisy.windows, "angle_end": angle_end}, {}, noisy.run))
     for a, b in zip(static.coefficients, load_system(NAME).reduce(noisy).coefficients, strict=True):
         assert abs(a.estimate - b.estimate) < 4.0 * b.u and b.u > 1e-4, a.name
         assert a.estimate == pytest.approx(a.truth, abs=3e-5), a.name  # J/H at 500 Earth rates
@@ -276,11 +276,11 @@ def test_one_step_of_a_tenth_gives_the_same(polar: Session) -> None:
 def test_laboratory_file(tmp_path: Any, day: Any) -> None:
     """The template, filled with the angles of a day in degrees, gives the same coefficients."""
     system = load_system(NAME)
-    lines = system.template().splitlines()
+    lines = system.measured_data.template.splitlines()
     header = lines.pop()
     windows, rows = held(day)
     phases = {label: k for k, label in enumerate(("x east, y up", "x east, y down", "polar S", "polar N"), 1)}
-    labels = {r["phase"]: phases[r["label"]] for r in day.meta["plan"] if r["mode"] == "servo"}
+    labels = {r.phase: phases[r.label] for r in day.run.plan if r.mode == "servo"}
     number = [labels[p] for p in day.windows["phase"][rows].tolist()]
     deg = [[math.degrees(x) for x in v] for v in (windows.angle_start, windows.angle_end)]
     body = [
@@ -291,13 +291,13 @@ def test_laboratory_file(tmp_path: Any, day: Any) -> None:
     g = frames.normal_gravity(math.radians(45.75))
     text = "\n".join([*lines, header, *body, ""]).replace("9.8067m/s2", f"{g!r}m/s2")
     file.write_text(text, encoding="utf-8")
-    record = system.measured(file, {})
-    record.meta["parameters"]["site.earth_rate"] = W50
+    record = system.read_measured(file, {})
+    record.run.parameters["site.earth_rate"] = W50
     for a, b in zip(system.reduce(record).coefficients, load_system(NAME).reduce(day).coefficients, strict=True):
         assert a.estimate == pytest.approx(b.estimate, abs=1e-8) and a.truth is None
     file.write_text(text.replace("# phase 3 = polar S", "# phase 3 = polar E"), encoding="utf-8")
     with pytest.raises(Exception, match="phase 3: 'polar E' is no attitude"):
-        system.measured(file, {})
+        system.read_measured(file, {})
 
 
 def test_readme_and_show(day: Any) -> None:
@@ -312,7 +312,7 @@ def test_readme_and_show(day: Any) -> None:
     for name, option in system.options.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         assert option.doc in row, name
-    assert day.meta["delays"] == {
+    assert day.run.delays == {
         "gyro.u -> table.u": 1e-3, "cage.i -> gyro.i": 1e-3, "table.angle_read -> sequencer.angle": 1e-3,
         "table.in_position -> sequencer.in_position": 1e-3,
     }  # fmt: skip
@@ -325,4 +325,4 @@ def test_stopped_and_continued(tmp_path: Any) -> None:
     with pytest.raises(RunError, match="--resume"):
         run(NAME, values=values, seed=3, out=tmp_path / "day", stop_at=90.0)
     again = run(NAME, values=values, seed=3, out=tmp_path / "day", resume=True)
-    assert again.same_data(whole) and again.meta["resumed_at"] == pytest.approx([90.0], abs=2e-3)
+    assert again.same_data(whole) and again.run.resumed_at == pytest.approx([90.0], abs=2e-3)

@@ -163,7 +163,7 @@ def test_dynamic_against_quasi_static(table: Session) -> None:
     """Angles integrated from the equation alone give the coefficients of the co-simulation, noise on, within its u."""
     noisy = table.run(NOISY, seed=6)
     _, site, rows = held(noisy)
-    p = noisy.meta["parameters"]
+    p = noisy.run.parameters
     true = {c: np.array([p[f"gyro.{n}"] for n in NAMES[c]]) for c in "xy"}
     static = {k: np.array(v) for k, v in noisy.windows.items()}
 
@@ -177,7 +177,7 @@ def test_dynamic_against_quasi_static(table: Session) -> None:
         _, x, y = geometry.path(mount, PHI, time, 16 * k.size + 1, site.earth_rate, rates)
         for axis, a in (("outer", x), ("inner", y)):
             static[f"{axis}_start"][k], static[f"{axis}_end"][k] = a[:-1:16], a[16::16]
-    ideal = load_system(NAME).reduce(type(noisy)(static, {}, noisy.meta))
+    ideal = load_system(NAME).reduce(type(noisy)(static, {}, noisy.run))
     for a, b in zip(ideal.coefficients, load_system(NAME).reduce(noisy).coefficients, strict=True):
         assert abs(a.estimate - b.estimate) < 4.0 * b.u and b.u > 1e-4, a.name
         assert a.estimate == pytest.approx(a.truth, abs=1e-4), a.name
@@ -246,12 +246,12 @@ def test_refused_records(quiet: Any) -> None:
     w = quiet.windows
     loose = {**w, "mean_x": np.full(w["mean_x"].size, 10.0 * 3.0 * ARCSEC)}
     with pytest.raises(ReductionError, match="x axis: the table is up to 3 arcsec away from the gyro"):
-        load_system(NAME).reduce(type(quiet)(loose, {}, quiet.meta))
-    meta = {**quiet.meta, "options": {**quiet.meta["options"], "tracking": 0.0}}
+        load_system(NAME).reduce(type(quiet)(loose, {}, quiet.run))
+    meta = quiet.run.replace(options={**quiet.run.options, "tracking": 0.0})
     load_system(NAME).reduce(type(quiet)(loose, {}, meta))
     flagged = {**w, "flagged": np.where(np.arange(w["flagged"].size) == 7, 3, 0)}
     with pytest.raises(ReductionError, match="flagged windows"):
-        load_system(NAME).reduce(type(quiet)(flagged, {}, quiet.meta))
+        load_system(NAME).reduce(type(quiet)(flagged, {}, quiet.run))
 
 
 def test_eight_terms_say_what_they_leave_out(quiet: Any) -> None:
@@ -265,7 +265,7 @@ def test_eight_terms_say_what_they_leave_out(quiet: Any) -> None:
 def test_laboratory_file(tmp_path: Any, quiet: Any) -> None:
     """The template, filled with the angles of a day in degrees, gives the same coefficients."""
     system = load_system(NAME)
-    lines = system.template().splitlines()
+    lines = system.measured_data.template.splitlines()
     header = lines.pop()
     _, site, rows = held(quiet)
     w = {k: np.asarray(v)[rows] for k, v in quiet.windows.items()}
@@ -276,17 +276,17 @@ def test_laboratory_file(tmp_path: Any, quiet: Any) -> None:
     text = "\n".join([*lines, header, *body, ""]).replace("9.8067m/s2", f"{site.gravity!r}m/s2")
     file = tmp_path / "day.csv"
     file.write_text(text, encoding="utf-8")
-    record = system.measured(file, {})
-    record.meta["parameters"]["site.earth_rate"] = site.earth_rate
+    record = system.read_measured(file, {})
+    record.run.parameters["site.earth_rate"] = site.earth_rate
     expected = load_system(NAME).reduce(quiet).coefficients
     for a, b in zip(system.reduce(record).coefficients, expected, strict=True):
         assert a.estimate == pytest.approx(b.estimate, abs=1e-8) and a.truth is None
     file.write_text(text.replace("# phase 2 = mount 4", "# phase 2 = mount 14"), encoding="utf-8")
     with pytest.raises(Exception, match="phase 2: 'mount 14' is no attitude"):
-        load_system(NAME).measured(file, {})
+        load_system(NAME).read_measured(file, {})
     file.write_text(text.replace("inner_end [deg]", "inner_end [s]"), encoding="utf-8")
     with pytest.raises(Exception, match="column 'inner_end': wrong unit"):
-        load_system(NAME).measured(file, {})
+        load_system(NAME).read_measured(file, {})
 
 
 def test_readme_and_delays(quiet: Any) -> None:
@@ -298,7 +298,7 @@ def test_readme_and_delays(quiet: Any) -> None:
     for name, option in system.options.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         assert option.doc in row, name
-    assert set(quiet.meta["delays"]) == {
+    assert set(quiet.run.delays) == {
         "coupling.u_outer -> outer.u", "gyro.u_y -> inner.u", "cage_x.i -> gyro.i_y", "cage_y.i -> gyro.i_x",
         "outer.angle -> wobble_x.angle", "inner.angle -> wobble_y.angle",
         "outer.angle_read -> sequencer.angle", "coupling.in_position -> sequencer.in_position",
@@ -311,4 +311,4 @@ def test_stopped_and_continued(tmp_path: Any) -> None:
     with pytest.raises(RunError, match="--resume"):
         run(NAME, values=NOISY, seed=3, out=tmp_path / "day", stop_at=90.0)
     again = run(NAME, values=NOISY, seed=3, out=tmp_path / "day", resume=True)
-    assert again.same_data(whole) and again.meta["resumed_at"] == pytest.approx([90.0], abs=2e-3)
+    assert again.same_data(whole) and again.run.resumed_at == pytest.approx([90.0], abs=2e-3)

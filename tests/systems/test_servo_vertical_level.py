@@ -88,7 +88,7 @@ def test_all_eighteen_attitudes(bench: Session) -> None:
     assert (
         np.max(np.abs(windows.rate - expected_rate(record))) < 1e-8 * DPH
     )  # uneven turn, 1e-3 of the rate in a window
-    north = [r["phase"] for r in record.meta["plan"] if r["label"] == "x north, y up"]
+    north = [r.phase for r in record.run.plan if r.label == "x north, y up"]
     mine = np.isin(record.windows["phase"], north)
     first, last = record.windows["angle_start"][mine][0], record.windows["angle_end"][mine][-1]
     assert first > 0.0 > last and abs(first + last) < 0.1 * abs(first)
@@ -128,19 +128,19 @@ def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], te
 
 def test_beyond_a_degree_is_refused(bench: Session) -> None:
     record = bench.run({**SHORT, **QUIET})
-    phase = next(r["phase"] for r in record.meta["plan"] if r["label"] == "x east, z up")
+    phase = next(r.phase for r in record.run.plan if r.label == "x east, z up")
     mine = record.windows["phase"] == phase
     windows = {k: v.copy() for k, v in record.windows.items()}
     for c in ("angle_start", "angle_end"):
         windows[c][mine] += math.radians(1.2)
     with pytest.raises(ReductionError, match=r"\(x east, z up\) reaches 1.2.* 1° is the limit"):
-        load_system(NAME).reduce(type(record)(windows, {}, record.meta))
+        load_system(NAME).reduce(type(record)(windows, {}, record.run))
 
 
 def test_told_of_another_gyro(bench: Session) -> None:
     """Parameters of the gyro that the user sets are told to the table's loop."""
     record = bench.run({**SHORT, **QUIET, "attitudes": "vertical", "gyro.H": 0.25, "gyro.K_sg": 8.0})
-    assert record.meta["parameters"]["table.H_g"] == 0.25 and record.meta["parameters"]["table.K_g"] == 8.0
+    assert record.run.parameters["table.H_g"] == 0.25 and record.run.parameters["table.K_g"] == 8.0
     assert np.max(np.abs(held(record)[0].rate - expected_rate(record))) < 2e-9 * DPH
 
 
@@ -148,7 +148,7 @@ def test_laboratory_file(tmp_path: Any, bench: Session) -> None:
     """The template, filled with a three-term record in degrees and minutes, gives the same coefficients."""
     record = bench.run({**SHORT, "attitudes": "three"}, seed=2)
     system = load_system(NAME)
-    lines = system.template().splitlines()
+    lines = system.measured_data.template.splitlines()
     header = lines.pop().replace("angle_end [deg]", "angle_end [arcmin]")
     windows, rows = held(record)
     number = (record.windows["phase"][rows] // 2).tolist()
@@ -162,12 +162,12 @@ def test_laboratory_file(tmp_path: Any, bench: Session) -> None:
     file = tmp_path / "three.csv"
     text = "\n".join([*lines, header, *body, ""])
     file.write_text(text.replace("9.8067m/s2", f"{frames.normal_gravity(math.radians(45.75))!r}m/s2"), encoding="utf-8")
-    again = system.reduce(system.measured(file, {}))
+    again = system.reduce(system.read_measured(file, {}))
     for a, b in zip(again.coefficients, load_system(NAME).reduce(record).coefficients, strict=True):
         assert a.estimate == pytest.approx(b.estimate, rel=1e-9) and a.name == b.name and a.truth is None
     file.write_text(text.replace("# latitude = 45.75deg\n", ""), encoding="utf-8")
     with pytest.raises(Exception, match="'latitude' is not given"):
-        load_system(NAME).measured(file, {})
+        load_system(NAME).read_measured(file, {})
 
 
 def test_readme() -> None:

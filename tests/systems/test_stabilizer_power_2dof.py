@@ -135,7 +135,7 @@ def test_routh_limit_in_the_co_simulation(share: float, grows: bool, caplog: pyt
     said = " ".join(caplog.messages)
     assert ("is unstable: pole +" in said) == grows
     assert ("Hz" in said) == grows
-    assert bool(unstable(record.meta["linear"]["closed"]["discrete"])) == grows
+    assert bool(unstable(record.run.linear.closed.discrete)) == grows
 
 
 def test_k_m_beyond_the_limit_is_refused(steps: Session) -> None:
@@ -160,7 +160,7 @@ def test_stop_of_the_precession_ends_the_run() -> None:
 # ------------------------------------------------------------------------------------ linear model and sweep
 def test_poles_of_the_default_set(steps: Session) -> None:
     """-9.1, -55 +- 89j 1/s, beside the free angle of the platform at 0."""
-    linear = steps.run(STILL).meta["linear"]["closed"]["continuous"]
+    linear = steps.run(STILL).run.linear.closed.continuous
     found = sorted((p for p in poles(linear) if abs(p) > 1e-3), key=lambda p: (p.real, p.imag))
     roots = sorted(np.roots([0.01, 1.2, 120.0, 1000.0]), key=lambda p: (p.real, p.imag))
     np.testing.assert_allclose(found, roots, rtol=1e-9)
@@ -270,4 +270,4 @@ def test_foreign_part_leaves_the_system_without_a_linear_model(tmp_path: Path) -
         s.names.pop("gyro", None)
         system = s.system.with_values(STILL)
         linear = s._linear(system, {}, [])
-    assert "the FMU in slot gyro is not one of this bench" in linear["linear"]["missing"]
+    assert "the FMU in slot gyro is not one of this bench" in linear.missing

@@ -153,9 +153,9 @@ def test_nutation_neither_grows_nor_dies(session):
     b = b - np.polyval(np.polyfit(t, b, 1), t)
     quarter = b.size // 4
     assert np.std(b[-quarter:]) == pytest.approx(np.std(b[:quarter]), rel=1e-3)
-    model = record.meta["linear"]["closed"]["discrete"]
-    assert np.abs(np.linalg.eigvals(np.array(model["A"]))).max() < 1.0 + 1e-7
-    assert not any("unstable" in n for n in record.meta["notes"])
+    model = record.run.linear.closed.discrete
+    assert np.abs(np.linalg.eigvals(np.array(model.A))).max() < 1.0 + 1e-7
+    assert not any("unstable" in n for n in record.run.notes)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from gimballed import DEG, STILL, measures, session, table
 
 from gyrobench.engine.session import RunError, Session
 from gyrobench.linear.linear_model import unstable
+from gyrobench.record.run_document import LinearModels
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import InvalidConfigurationError, load_system
@@ -101,21 +102,21 @@ def test_with_the_resolver_every_azimuth_is_stable() -> None:
         for azimuth in range(0, 361, 30):
             system = s.system.with_values({**EXACT, "azimuth": azimuth * DEG})
             linear = linear_model(s, system)
-            assert not unstable(linear["closed"]["discrete"]) and not unstable(linear["closed"]["continuous"]), azimuth
-            assert phase_margin(linear["loops"]["pitch"]["discrete"]) == pytest.approx(by_hand()[1], abs=0.6)
+            assert not unstable(linear.closed.discrete) and not unstable(linear.closed.continuous), azimuth
+            assert phase_margin(linear.loops["pitch"].discrete) == pytest.approx(by_hand()[1], abs=0.6)
 
 
-def linear_model(s: Session, system: Any) -> dict[str, Any]:
+def linear_model(s: Session, system: Any) -> LinearModels:
     """As Session.run takes it for run.json."""
-    seen: dict[str, Any] = {}
+    seen: list[LinearModels] = []
 
     class Stop(Exception):
         pass
 
     original = s._linear
 
-    def keep(*given: Any) -> dict[str, Any]:
-        seen.update(original(*given)["linear"])
+    def keep(*given: Any) -> LinearModels:
+        seen.append(original(*given))
         raise Stop
 
     s._linear = keep  # type: ignore[method-assign]
@@ -126,7 +127,7 @@ def linear_model(s: Session, system: Any) -> dict[str, Any]:
         pass
     finally:
         s._linear = original  # type: ignore[method-assign]
-    return seen
+    return seen[0]
 
 
 @pytest.mark.parametrize("azimuth", [70.0, 180.0, 300.0])
@@ -150,7 +151,7 @@ def test_without_the_resolver_up_to_the_phase_margin(integral: float) -> None:
     given = {**EXACT, "integral": integral}
     with session(NAME, [], parts, at_rest=lambda self: [blow, ring]) as s:
         linear = linear_model(s, s.system.with_values(given))
-        margin = phase_margin(linear["loops"]["pitch"]["discrete"])
+        margin = phase_margin(linear.loops["pitch"].discrete)
         w, pm = by_hand()
         if integral == 0.0:
             assert margin == pytest.approx(pm - math.degrees(w * 0.5e-3 / 2.0), abs=0.6)
@@ -158,14 +159,14 @@ def test_without_the_resolver_up_to_the_phase_margin(integral: float) -> None:
             assert margin == pytest.approx(pm - 26.0, abs=4.0)
         for azimuth, stable in [(margin - 1.0, True), (margin + 1.0, False), (-margin + 1.0, True), (180.0, False)]:
             record = s.run({**given, "azimuth": azimuth * DEG})
-            assert bool(unstable(record.meta["linear"]["closed"]["discrete"])) != stable, azimuth
+            assert bool(unstable(record.run.linear.closed.discrete)) != stable, azimuth
             t, y = record.channels["time"], record.channels["platform.theta[1]"]
             early, late = (np.ptp(y[(t > a) & (t < a + 0.4)]) for a in (0.5, 3.5))
             away = np.ptp(y) > 1.0  # rad: at 180 deg it runs away with its pickoffs at their limit
             assert (late < early / 2.0) if stable else (away or late > 2.0 * early), azimuth
 
 
-def phase_margin(model: dict[str, Any]) -> float:
+def phase_margin(model: Any) -> float:
     from gyrobench.reduction.loops.margins import grid, margins, model_response
 
     f = grid(0.1, 100.0)

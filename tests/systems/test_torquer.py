@@ -16,6 +16,7 @@ import pytest
 
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
+from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.system.system import System, load_system
 
@@ -41,7 +42,7 @@ def servo() -> Iterator[Session]:
 
 
 def quiet() -> dict[str, Any]:
-    return dict.fromkeys(load().noises, 0.0)  # type: ignore[attr-defined]
+    return dict.fromkeys(load().noises, 0.0)
 
 
 def reduced(servo: Session, values: dict[str, Any], seed: int = 1) -> Any:
@@ -64,7 +65,7 @@ def test_marks_by_hand() -> None:
         "angle_end": np.array([angle[k + 1] for k in keep]),
         "mean": np.array([0.01 if k < 10 else -0.01 for k in keep]),
     }  # fmt: skip
-    plan = [{"phase": 1, "mode": "servo", "target": 0.01}, {"phase": 2, "mode": "servo", "target": -0.01}]
+    plan = [PlanRow(phase=1, mode="servo", target=0.01), PlanRow(phase=2, mode="servo", target=-0.01)]
     rows = M.rows(w, plan)
     assert rows["current"] == pytest.approx([0.01])
     assert rows["rate_plus"] == pytest.approx([1.0]) and rows["rate_minus"] == pytest.approx([0.5])

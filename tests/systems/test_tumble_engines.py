@@ -27,13 +27,13 @@ def test_engines_give_bit_equal_records(tmp_path: Path) -> None:
     """All noise on, all parts native: windows and channels of both engines are the same bytes."""
     found = {e: run(NAME, values=HASTY, seed=7, engine=e, out=tmp_path / e) for e in ("native", "reference")}
     native, reference = found["native"], found["reference"]
-    assert native.meta["engine"] == "native" and reference.meta["engine"] == "reference"
-    assert native.meta["steps"] == reference.meta["steps"] > 5000
+    assert native.run.engine == "native" and reference.run.engine == "reference"
+    assert native.run.steps == reference.run.steps > 5000
     assert len(native.windows["mean"]) == 2 * 6 + 2 * round(0.6 / 0.35)
     assert native.windows["mean"].std() > 0.0
     assert native.same_data(reference)
     for key in ("order", "cuts", "delays", "parameters", "plan"):
-        assert native.meta[key] == reference.meta[key]
+        assert getattr(native.run, key) == getattr(reference.run, key)
 
 
 def test_order_cuts_and_delays_are_the_same_everywhere(command: Command, tmp_path: Path) -> None:

@@ -42,8 +42,8 @@ def laboratory(record: Record, scale: str = "laboratory", polarity: str | None =
     out.write("# latitude = -33.9deg\n# k = 17.2 deg/h/mA\n# instrument = RIG 17\n# operator = A. Tester\n")
     if polarity:
         out.write(f"# polarity = {polarity}\n")
-    for p in record.meta["plan"]:
-        out.write(f"# phase {p['phase']} = {p['face']}\n")
+    for p in record.run.plan:
+        out.write(f"# phase {p.phase} = {p.face}\n")
     writer = csv.writer(out, delimiter=delimiter, lineterminator="\n")
     names = ("t_start", "t_end", "angle_start", "angle_end", "mean", "std")
     kinds = ("t", "t", "angle", "angle", "mean", "mean")

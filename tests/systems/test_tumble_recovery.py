@@ -12,7 +12,7 @@ from tumbling import DPH, NAMES, RATE, SHORT, drift_in, errors, gyro, lag, latit
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 LIMIT = 1e-6  # deg/h per g^n
 
@@ -58,9 +58,9 @@ def test_turning_with_the_earth_only(session: Session) -> None:
     values = {**SHORT, **quiet(load()), **gyro(rng), "both_senses": True}
     record = session.run(values)
     for keep in ("against", "with"):
-        rows = [p for p in record.meta["plan"] if p["mode"] == "index" or f", {keep} the Earth" in p["label"]]
-        mine = np.isin(record.windows["phase"], [p["phase"] for p in rows])
-        part = type(record)({k: v[mine] for k, v in record.windows.items()}, {}, {**record.meta, "plan": rows})
+        rows = [p for p in record.run.plan if p.mode == "index" or f", {keep} the Earth" in p.label]
+        mine = np.isin(record.windows["phase"], [p.phase for p in rows])
+        part = type(record)({k: v[mine] for k, v in record.windows.items()}, {}, record.run.replace(plan=rows))
         found, expected = errors(load().reduce(part), values), lag(values)
         for name in NAMES:
             assert found[name] == pytest.approx(expected[name], rel=1e-3, abs=2e-9), (keep, name)
@@ -114,9 +114,9 @@ def test_dynamic_against_quasi_static(session: Session) -> None:
     values = {**SHORT, **gyro(rng), "latitude": phi}
     dynamic = session.run({**values, **quiet(load())})
     system = load().with_values(values)
-    k = dynamic.meta["parameters"]["gyro.k"]
+    k = dynamic.run.parameters["gyro.k"]
     g = frames.normal_gravity(phi)
-    faces = {p["phase"]: p["face"] for p in dynamic.meta["plan"]}
+    faces = {p.phase: p.face for p in dynamic.run.plan}
     nodes, weights = np.polynomial.legendre.leggauss(8)
     w = dynamic.windows
     mean = np.empty(len(w["mean"]))
@@ -126,7 +126,7 @@ def test_dynamic_against_quasi_static(session: Session) -> None:
         seen = [drift_in(faces[phase], values, phi, g, middle + half * x) for x in nodes]
         mean[j] = -float(weights @ np.array(seen)) / 2.0 / k
     assert np.max(np.abs(mean - w["mean"])) * k / DPH < 1e-5  # deg/h; angle of the windows and lag
-    static = system.reduce(type(dynamic)({**w, "mean": mean}, {}, dynamic.meta))
+    static = system.reduce(type(dynamic)({**w, "mean": mean}, {}, dynamic.run))
     quietly = system.reduce(dynamic)
     for a, b in zip(static.coefficients, quietly.coefficients, strict=True):
         assert a.estimate == pytest.approx(values[f"gyro.{a.name}"] / DPH, abs=1e-9)
@@ -140,7 +140,7 @@ def test_dynamic_against_quasi_static(session: Session) -> None:
 def test_lag_by_hand_is_that_of_the_parts(session: Session) -> None:
     """The numbers in tumbling.lag are the defaults of the parts: C = 0.2 and K_sg H k K_i = 200."""
     system = load()
-    parameters = session.run({**SHORT, **quiet(system), "rate": 1.0, "dwell": 1.0}).meta["parameters"]
+    parameters = session.run({**SHORT, **quiet(system), "rate": 1.0, "dwell": 1.0}).run.parameters
     loop = math.prod(parameters[n] for n in ("gyro.K_sg", "gyro.H", "gyro.k", "rebalance.K_i"))
     assert parameters["gyro.C"] / loop == pytest.approx(1e-3, rel=1e-9)
     assert importlib.import_module("tumbling").RATE == RATE

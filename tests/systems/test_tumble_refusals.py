@@ -89,7 +89,7 @@ def text(record: Record, rows: Any = None, header: str | None = None, **columns:
     w = {k: np.asarray(columns.get(k, v)) for k, v in record.windows.items()}
     names = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
     lines = ["# latitude = 45.75deg", "# k = 17.2deg/h/mA"]
-    lines += [f"# phase {p['phase']} = {p['face']}" for p in record.meta["plan"]]
+    lines += [f"# phase {p.phase} = {p.face}" for p in record.run.plan]
     lines += [header or "phase,t_start [s],t_end [s],angle_start [rad],angle_end [rad],mean [A]"]
     chosen = range(len(w["mean"])) if rows is None else rows
     return "\n".join([*lines, *(",".join(repr(w[n][k].item()) for n in names) for k in chosen)]) + "\n"

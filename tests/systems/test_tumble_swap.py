@@ -127,9 +127,9 @@ def test_failing_gyro_under_isolation(
     assert f"the record until then is kept in {tmp_path / 'run'}" in err
     record = Record.load(tmp_path / "run")
     assert not record.complete
-    assert record.meta["stopped_at"] == pytest.approx(1.5)
+    assert record.run.stopped_at == pytest.approx(1.5)
     assert record.windows["phase"].tolist() == [1, 1]
-    assert expected in record.meta["problem"]
+    assert expected in record.run.problem
 
 
 def test_gyro_that_crashes_in_initialization(command: Command, foreign: Foreign, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.sockets import Connector, Socket
 from gyrobench.system.system import Slot, System
 

@@ -15,7 +15,7 @@ import pytest
 from gyrobench import drift
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session, run
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]
@@ -37,7 +37,7 @@ def load() -> System:
 
 
 def quiet() -> dict[str, Any]:
-    return {name: 0.0 for name in load().noises}  # type: ignore[attr-defined]
+    return {name: 0.0 for name in load().noises}
 
 
 def gyro(rng: np.random.Generator) -> dict[str, Any]:

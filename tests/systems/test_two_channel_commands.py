@@ -61,8 +61,8 @@ def laboratory(record: Record, polarity: str = "project", drop: str = "") -> str
     sign = -1.0 if polarity == "book" else 1.0
     w = record.windows
     lines = ["# latitude = -33.9deg", "# k_x = 17.227deg/h/mA", "# k_y = 17.180 deg/h/mA", f"# polarity = {polarity}"]
-    lines += [f"# model = {record.meta['options']['model']}", "# instrument = DTG 4"]
-    lines += [f"# phase {p['phase']} = {p['face']}" for p in record.meta["plan"]]
+    lines += [f"# model = {record.run.options['model']}", "# instrument = DTG 4"]
+    lines += [f"# phase {p.phase} = {p.face}" for p in record.run.plan]
     lines = [line for line in lines if not drop or drop not in line]
     lines.append("phase,t_start [min],t_end [min],angle_start [deg],angle_end [deg],mean_y [mA],mean_x [mA]")
     scale = {"t_start": 60.0, "t_end": 60.0, "angle_start": math.pi / 180, "angle_end": math.pi / 180}

@@ -10,7 +10,7 @@ import pytest
 from two_channels import DPH, LOOP, NAME, NAMES, RATE, SHORT, gyro, latitude, load, quasi_static, quiet
 
 from gyrobench.engine.session import Session, run
-from gyrobench.reduction.result import Result
+from gyrobench.result import Result
 
 LIMIT = 1e-6  # deg/h per g^n
 

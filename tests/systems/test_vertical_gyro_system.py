@@ -113,7 +113,7 @@ def test_lock_without_ring_ends_the_run(session):
     values = {"ring": 0, "phases": "erection", **{f"motion.pitch[{k + 1}]": x for k, x in enumerate(table[:1])}}
     with pytest.raises((ParameterRefusedError, RunError), match="the gimbals have locked"):
         record = session.run(values, seed=1)
-        raise RunError("; ".join(map(str, record.meta.get("notes", []))) + str(record.meta.get("stopped", "")))
+        raise RunError("; ".join(record.run.notes))
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def load() -> System:
 
 def quiet(system: System) -> dict[str, Any]:
     """All noise off."""
-    return {name: 0.0 for name in system.noises}  # type: ignore[attr-defined]
+    return {name: 0.0 for name in system.noises}
 
 
 def gyro(rng: np.random.Generator) -> dict[str, Any]:

@@ -30,7 +30,7 @@ def load() -> System:
 
 def quiet(system: System) -> dict[str, Any]:
     """All noise off."""
-    return {name: 0.0 for name in system.noises}  # type: ignore[attr-defined]
+    return {name: 0.0 for name in system.noises}
 
 
 def gyro(rng: np.random.Generator, model: str = "nine") -> dict[str, Any]:
@@ -66,13 +66,13 @@ def quasi_static(record: Record, values: dict[str, Any], lag: bool) -> Record:
 
     to the next order (1e-2 of it at RATE).  In the turns w = -omega_d(angle), w' = table rate times its derivative.
     """
-    meta, w = record.meta, record.windows
-    phi, model = meta["options"]["latitude"], meta["options"]["model"]
+    run, w = record.run, record.windows
+    phi, model = run.options["latitude"], run.options["model"]
     g = frames.normal_gravity(phi)
-    p = meta["parameters"]
+    p = run.parameters
     b = {c: p[f"gyro.K_sg_{c}"] * p[f"gyro.k_{o}"] * p[f"rebalance_{o}.K_i"] for c, o in (("x", "y"), ("y", "x"))}
     base, mounts = frames.polar_base(phi), faces(model, phi)
-    face = {r["phase"]: mounts[r["face"]] for r in meta["plan"]}
+    face = {row.phase: mounts[row.face] for row in run.plan}
     truth = {c: {n: values[f"gyro.{n}"] for n in NAMES["nine"] if n[1] == c} for c in "xy"}
     nodes, weights = np.polynomial.legendre.leggauss(8)
     d = 1e-3  # rad, of the numerical derivatives
@@ -98,4 +98,4 @@ def quasi_static(record: Record, values: dict[str, Any], lag: bool) -> Record:
             seen = seen - second / sizes + omega_z * np.array([first[1] / b["y"], -first[0] / b["x"]])
         mean[:, j] = seen @ weights / 2
     currents = {"mean_y": mean[0] / p["gyro.k_y"], "mean_x": mean[1] / p["gyro.k_x"]}
-    return type(record)({**w, **currents}, {}, meta)
+    return type(record)({**w, **currents}, {}, run)

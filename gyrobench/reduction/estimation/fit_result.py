@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
-from gyrobench.reduction.result import BudgetLine, Coefficient, Result
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import BudgetLine, Coefficient, Result, Specification
 
 __all__ = ["Effect", "Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 CONDITION = 100.0  # above this a warning names the weakest direction
 
 
@@ -52,7 +51,7 @@ class Effect:
 
 def linear_result(
     found: Findings, *, system: str, title: str, method: str, sources: Sequence[str], equation: str,
-    conventions: Sequence[str], effects: Sequence[Effect] = (), specification: Limits | None = None,
+    conventions: Sequence[str], effects: Sequence[Effect] = (), specification: Specification | None = None,
     site: Mapping[str, Any] | None = None, instrument: str = "", simulated: bool | None = None,
     no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
     harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
@@ -116,7 +115,7 @@ def plus_minus(c: Coefficient) -> str:
     return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
 
 
-def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Limits) -> Coefficient:
+def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Specification) -> Coefficient:
     q, r = found.quantities[j], found.reported
     contributions = [float(e.sensitivity[j]) * e.size for e in effects]
     u, U = uncertainty.combine(float(r.u[j]), float(r.half_width[j]), contributions)

@@ -25,8 +25,8 @@ from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.regression import RegressionError
-from gyrobench.reduction.result import Series, Test
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Series, Test
 
 Array = NDArray[np.float64]
 RAW = "Ljung-Box, residuals"

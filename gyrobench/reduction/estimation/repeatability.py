@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.result import BudgetLine, Coefficient, Result, Series, Test
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import BudgetLine, Coefficient, Result, Series, Specification, Test
 
 Array = NDArray[np.float64]
-Limits = Mapping[str, tuple[float | None, float | None]]
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float
     return q, float(special.chdtrc(x.size - 1, q))
 
 
-def together(results: Mapping[str, Result], what: str = "day", specification: Limits | None = None) -> Result:
+def together(results: Mapping[str, Result], what: str = "day", specification: Specification | None = None) -> Result:
     """One result of repeats (name of the day -> its result) with the same coefficients.
 
     Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common

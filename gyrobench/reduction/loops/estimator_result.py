@@ -19,8 +19,8 @@ import numpy as np
 
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Array, Consistency, Value
-from gyrobench.reduction.result import Coefficient, Test
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Coefficient, Test
 
 RANKED = "error"  # the coefficient that ranks estimators, smallest first
 LOOP = 5.0  # degrees of phase that an estimator may cost in a loop

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.result import Response
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Response
 
 Array = NDArray[np.float64]
 DEG = math.pi / 180.0

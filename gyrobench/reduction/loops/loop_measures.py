@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import residual_series
 from gyrobench.reduction.window_checks import ReductionError
 
@@ -33,7 +35,7 @@ class Gate:
     row: the phase, as in run.json.  t: s.  channels: the whole record; gate["slot.variable"] is the part in the gate.
     """
 
-    row: Mapping[str, Any]
+    row: PlanRow
     t: Array
     inside: slice
     before: slice  # the second half of the settling
@@ -50,31 +52,31 @@ class Gate:
 
     @property
     def label(self) -> str:
-        return str(self.row["label"])
+        return self.row.label
 
     @property
     def kind(self) -> str:
-        return str(self.row["mode"])
+        return self.row.mode
 
     @property
     def shape(self) -> str:
-        return str(self.row["shape"])
+        return self.row.shape
 
     @property
     def axis(self) -> int:
-        return int(self.row["axis"])
+        return self.row.axis
 
     @property
     def amplitude(self) -> float:
-        return float(self.row["amplitude"])
+        return self.row.amplitude
 
     @property
     def f(self) -> float:
         """Frequency, Hz."""
-        return float(self.row["frequency"])
+        return self.row.frequency
 
 
-def gates(record: Any, slot: str = "exciter") -> list[Gate]:
+def gates(record: Record, slot: str = "exciter") -> list[Gate]:
     """The phases of a record (gyrobench.record.record.Record) in their order, those that were run to their end.
 
     Raises ReductionError for a record without the channels phase and gate of the exciter in ``slot``, or without
@@ -86,13 +88,13 @@ def gates(record: Any, slot: str = "exciter") -> list[Gate]:
             raise ReductionError(f"the record has no channel {name}: the system must record it")
     phase, gate, time = channels[f"{slot}.phase"], channels[f"{slot}.gate"], channels["time"]
     found = []
-    for row in record.meta.get("plan", []):
-        here = phase == row["phase"]
+    for row in record.run.plan:
+        here = phase == row.phase
         inside = np.flatnonzero(here & (gate > 0.5))
         if inside.size < 2:
             continue
         period = float(time[1] - time[0])
-        if time[inside[-1]] - time[inside[0]] < float(row["dwell"]) - 2.5 * period:
+        if time[inside[-1]] - time[inside[0]] < row.dwell - 2.5 * period:
             continue  # the run stopped in this phase
         first = int(np.argmax(here))
         middle = first + (int(inside[0]) - first) // 2

@@ -11,13 +11,15 @@ return found.result(title=..., method=..., sources=[...], equation=..., conventi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins as m
@@ -33,7 +35,7 @@ from gyrobench.reduction.loops.loop_measures import (
     scatter,
     step,
 )
-from gyrobench.reduction.result import Coefficient, Response, Result
+from gyrobench.result import Coefficient, Response, Result, Specification
 
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
@@ -48,17 +50,17 @@ class LoopFindings:
     record: gyrobench.record.record.Record.  slot: the exciter's.  Raises ReductionError, as :func:`loops.gates`.
     """
 
-    def __init__(self, record: Any, slot: str = "exciter") -> None:
+    def __init__(self, record: Record, slot: str = "exciter") -> None:
         self.record, self.slot = record, slot
         self.gates = gates(record, slot)
-        self.linear: dict[str, Any] = record.meta.get("linear") or {"missing": "the record holds no linear model"}
+        self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
         self.coefficients: list[Coefficient] = []
         self.responses: list[Response] = []
         self.tables: list[dict[str, Any]] = []
         self.warnings: list[str] = []
         self.allan: dict[str, Any] = {}
-        if "missing" in self.linear:
-            self.warnings.append(f"No linear model to compare with: {self.linear['missing']}")
+        if self.linear.missing:
+            self.warnings.append(f"No linear model to compare with: {self.linear.missing}")
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
         """The phases of a kind, in their order."""
@@ -76,7 +78,7 @@ class LoopFindings:
         *,
         closed: float | None = None,
         truth: float | None = None,
-        limits: Mapping[str, tuple[float | None, float | None]] | None = None,
+        limits: Specification | None = None,
     ) -> None:
         """One row of the table of coefficients, in printed units; nothing for an estimate of None.
 
@@ -120,7 +122,7 @@ class LoopFindings:
             return []
         points.sort(key=lambda p: p.f)
         title = name or f"open loop, {loop}"
-        models = self.linear.get("loops", {}).get(loop, {})
+        models = self.linear.loops.get(loop, LinearPair())
         caption = (
             f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % bars; lines: linear."
         )
@@ -130,9 +132,9 @@ class LoopFindings:
         shown = m.measured_margins(points)
         rows.append(shown.row("measured"))
         for kind, label in NAMES.items():
-            if kind not in models:
+            model = models.of(kind)
+            if model is None:
                 continue
-            model = models[kind]
             dense = m.model_response(model, span)[:, 0, 0]
             found = m.margins(span, dense)
             rows.append(found.row(label))
@@ -143,7 +145,7 @@ class LoopFindings:
                 self._conditional(title, found)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
         self.tables.append(
-            {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.meta), "columns": m.COLUMNS,
+            {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
              "rows": rows}
         )  # fmt: skip
         key = "" if loop == "stabilizer" else f" {loop}"
@@ -212,8 +214,8 @@ class LoopFindings:
         self, which: str, kind: str, axis: int, output: str, f: Array | Sequence[float], plus: str | None = None
     ) -> Any:
         """Linear response ("discrete" or "continuous") of a channel to an excitation, SI; None where there is none."""
-        model = self.linear.get("closed", {}).get(which)
-        if model is None or output not in model["outputs"]:
+        model = self.linear.closed.of(which)
+        if model is None or output not in model.outputs:
             return None
         try:
             found = m.excited(model, kind, axis, output, f)
@@ -245,16 +247,16 @@ class LoopFindings:
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
         curves = []
-        model = self.linear.get("closed", {}).get("discrete")
+        model = self.linear.closed.discrete
         simulated = None if model is None else _simulated(model, gate, output)
-        if simulated is not None and plus:
+        if model is not None and simulated is not None and plus:
             more = _simulated(model, gate, plus)
             simulated = None if more is None else simulated + more
         if simulated is not None:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
             curves.append({**curve, "y": ((found.initial + simulated[pick]) / scale).tolist()})
         what = y_name or output
-        cause = f"{gate.amplitude:g} {gate.row['unit']} on axis {gate.axis} from t = 0 on"
+        cause = f"{gate.amplitude:g} {gate.row.unit} on axis {gate.axis} from t = 0 on"
         self.responses.append(
             Response(
                 name=f"{gate.label}, {what}",
@@ -301,15 +303,15 @@ class LoopFindings:
         summary: Sequence[str] = (),
         instrument: str = "",
         ranked_by: str = "",
-        specification: Mapping[str, tuple[float | None, float | None]] | None = None,
+        specification: Specification | None = None,
     ) -> Result:
         """The Result with all that was collected; limits of the specification are applied by coefficient name."""
         for c in self.coefficients if specification else ():
             c.limit = (specification or {}).get(c.name, c.limit)
             c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
-        meta = self.record.meta
+        run = self.record.run
         result = Result(
-            system=meta.get("system", ""),
+            system=run.system,
             title=title,
             method=method,
             sources=list(sources),
@@ -331,12 +333,12 @@ class LoopFindings:
             summary=list(summary),
             decision_rule=uncertainty.DECISION_RULE,
             verdict=uncertainty.overall(c.verdict for c in self.coefficients),
-            instrument=instrument or meta.get("instrument", ""),
-            simulated=not meta.get("measured", False),
+            instrument=instrument or run.instrument,
+            simulated=not run.measured,
             ranked_by=ranked_by,
             responses=self.responses,
         )
-        result.warnings += [n for n in meta.get("notes", []) if "unstable" in n or "linear model" in n]
+        result.warnings += [n for n in run.notes if "unstable" in n or "linear model" in n]
         return run_metadata.finish(result, self.record)
 
 
@@ -372,31 +374,30 @@ def _bode(
     )
 
 
-def _simulated(model: Mapping[str, Any], gate: Gate, output: str) -> Array | None:
+def _simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:
     """Response of a channel to a unit step of the excitation at the gate's opening, at the gate's times; SI."""
     name = f"{gate.kind}[{gate.axis}]"
-    wired = [j for j, n in enumerate(model["inputs"]) if n.partition(".")[2] == name]
-    if gate.shape != "step" or gate.kind == "motion" or output not in model["outputs"] or not wired:
+    wired = [j for j, n in enumerate(model.inputs) if n.partition(".")[2] == name]
+    if gate.shape != "step" or gate.kind == "motion" or output not in model.outputs or not wired:
         return None
     from scipy.signal import dlsim
 
-    row = model["outputs"].index(output)
-    n = len(model["states"])
-    a, c = np.reshape(model["A"], (n, n)), np.reshape(model["C"], (-1, n))[row : row + 1]
-    b = np.reshape(model["B"], (n, -1))[:, wired].sum(axis=1, keepdims=True)
-    d = np.reshape(model["D"], (-1, len(model["inputs"])))[row : row + 1, wired].sum(axis=1, keepdims=True)
-    count = round((gate.t[-1] - gate.t[0]) / model["step"]) + 1
-    _, y, *_ = dlsim((a, b, c, d, model["step"]), np.full((count, 1), gate.amplitude))
-    at = np.minimum(np.round((gate.t - gate.t[0]) / model["step"]).astype(int), count - 1)
+    row = model.outputs.index(output)
+    n = len(model.states)
+    a, c = np.reshape(model.A, (n, n)), np.reshape(model.C, (-1, n))[row : row + 1]
+    b = np.reshape(model.B, (n, -1))[:, wired].sum(axis=1, keepdims=True)
+    d = np.reshape(model.D, (-1, len(model.inputs)))[row : row + 1, wired].sum(axis=1, keepdims=True)
+    count = round((gate.t[-1] - gate.t[0]) / model.step) + 1
+    _, y, *_ = dlsim((a, b, c, d, model.step), np.full((count, 1), gate.amplitude))
+    at = np.minimum(np.round((gate.t - gate.t[0]) / model.step).astype(int), count - 1)
     return np.asarray(y[at, 0])
 
 
-def _margin_note(meta: Mapping[str, Any]) -> str:
-    delays = meta.get("delays") or {}
-    cuts = ", ".join(f"{w.replace('->', '→')}: {s:g} s" for w, s in delays.items()) or "none"
-    step_ = (
-        f" The communication step is {meta['step']:g} s; delays inserted by the order of the parts: {cuts}."
-        if "step" in meta
+def _margin_note(run: RunDocument) -> str:
+    cuts = ", ".join(f"{w.replace('->', '→')}: {s:g} s" for w, s in run.delays.items()) or "none"
+    delays = (
+        f" The communication step is {run.step:g} s; delays inserted by the order of the parts: {cuts}."
+        if run.step
         else ""
     )
-    return f"Upper and lower gain limits as factors on the gain in dB.{step_}"
+    return f"Upper and lower gain limits as factors on the gain in dB.{delays}"

@@ -9,13 +9,14 @@ points interpolated between measured frequencies: what is compared is found in o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Point
 
 Array = NDArray[np.float64]
@@ -23,33 +24,33 @@ Complex = NDArray[np.complex128]
 DENSE = 2000  # points of a response on which margins are looked for
 
 
-def model_response(model: Mapping[str, Any], f: Sequence[float] | Array) -> Complex:
+def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
     """Frequency response of a model: array (frequency, output, input)."""
-    a, b, c, d = (np.asarray(model[k], float) for k in "ABCD")
-    n = len(model["states"])
-    a, b, c = a.reshape(n, n), b.reshape(n, len(model["inputs"])), c.reshape(len(model["outputs"]), n)
-    d = d.reshape(len(model["outputs"]), len(model["inputs"]))
+    a, b, c, d = (np.asarray(m, float) for m in (model.A, model.B, model.C, model.D))
+    n = len(model.states)
+    a, b, c = a.reshape(n, n), b.reshape(n, len(model.inputs)), c.reshape(len(model.outputs), n)
+    d = d.reshape(len(model.outputs), len(model.inputs))
     s = 2j * np.pi * np.asarray(f, float)
-    s = np.exp(s * model["step"]) if model["step"] else s
+    s = np.exp(s * model.step) if model.step else s
     solved = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
     return np.asarray(c @ solved + d)
 
 
-def excited(model: Mapping[str, Any], kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
+def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
     """Response of a channel ("slot.output") to an excitation: torque, command, test, or motion (angle of the base).
 
     A motion moves angle, rate and acceleration at once; they are summed as 1, s, s^2.  Raises KeyError where the model
     has no such output or the excitation is not wired.
     """
     names = ("motion_angle", "motion_rate", "motion_acceleration") if kind == "motion" else (kind,)
-    if output not in model["outputs"]:
-        raise KeyError(f"{output} is no channel of the linear model; {', '.join(model['outputs'])}")
-    all_of_them = model_response(model, f)[:, model["outputs"].index(output), :]
+    if output not in model.outputs:
+        raise KeyError(f"{output} is no channel of the linear model; {', '.join(model.outputs)}")
+    all_of_them = model_response(model, f)[:, model.outputs.index(output), :]
     s = 2j * np.pi * np.asarray(f, float)
     total = np.zeros(s.size, complex)
     found = False
     for power, name in enumerate(names):
-        for j, wired in enumerate(model["inputs"]):
+        for j, wired in enumerate(model.inputs):
             if wired.partition(".")[2] == f"{name}[{axis}]":
                 total += s**power * all_of_them[:, j]
                 found = True

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
-from gyrobench.reduction.result import Coefficient, Result
 from gyrobench.reduction.suite.consistency import Value
+from gyrobench.result import Coefficient, Result
 
 Array = NDArray[np.float64]
 MODEL = {n for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}

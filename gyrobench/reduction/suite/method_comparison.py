@@ -15,15 +15,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gyrobench import drift
+from gyrobench.record.run_document import RunDocument, SuiteTestRun
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.result import Coefficient, Result, Test
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, Value
 from gyrobench.reduction.suite.estimable_combinations import Compared
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Coefficient, Result, Specification, Test
 
-Limits = Mapping[str, tuple[float | None, float | None]]
 FAMILIES = {
     "single-degree-of-freedom gyro": drift.NAMES,
     "two-degree-of-freedom gyro": sum(drift.NAMES_2DOF.values(), ()),
@@ -38,12 +38,10 @@ RULE = (
 
 @dataclass(frozen=True)
 class Member:
-    """A test of the suite: its result, the id of its report, where its run is kept, and more facts for the report."""
+    """A test of the suite: its result, and where its run is kept with facts for the report."""
 
     result: Result
-    report_id: str = ""
-    folder: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    test: SuiteTestRun = field(default_factory=lambda: SuiteTestRun(folder="", report_id=""))
 
 
 @dataclass(frozen=True)
@@ -137,14 +135,16 @@ def differences(results: Mapping[str, Result], slots: Sequence[str] = ("gyro", "
     """Where the simulated instrument was not the same in all tests, as sentences."""
     said: dict[str, dict[str, list[str]]] = {}
     for label, r in results.items():
-        run = r.provenance
+        run = RunDocument.model_validate(r.provenance)
         for slot in slots:
-            part = (run.get("parts") or {}).get(slot)
-            if part is None:
+            if slot not in run.parts:
                 continue
-            facts = {f"{slot}, its FMU": str(part.get("sha256", ""))[:16]}
-            own = (run.get("parameters") or {}).items()
-            facts |= {n: repr(v) for n, v in own if n.startswith(f"{slot}.") and not n.endswith((".seed", ".mount"))}
+            facts = {f"{slot}, its FMU": run.parts[slot].sha256[:16]}
+            facts |= {
+                n: repr(v)
+                for n, v in run.parameters.items()
+                if n.startswith(f"{slot}.") and not n.endswith((".seed", ".mount"))
+            }
             for name, value in facts.items():
                 said.setdefault(name, {}).setdefault(value, []).append(label)
     several = {n: values for n, values in said.items() if len(values) > 1}
@@ -156,7 +156,7 @@ def differences(results: Mapping[str, Result], slots: Sequence[str] = ("gyro", "
 
 def together(
     members: Mapping[str, Member], *, system: str, title: str, method: str, sources: Sequence[str],
-    conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Limits | None = None,
+    conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Specification | None = None,
     failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
 ) -> Result:  # fmt: skip
     """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
@@ -205,7 +205,7 @@ def together(
     return out
 
 
-def _coefficient(c: Compare, limits: Limits) -> Coefficient:
+def _coefficient(c: Compare, limits: Specification) -> Coefficient:
     q, a = c.quantity, c.found
     limit = limits.get(q.name)
     if a is not None:
@@ -254,10 +254,10 @@ def _how(reported: str, name: str) -> str:
 def _member(label: str, m: Member) -> dict[str, Any]:
     r = m.result
     return {
-        "label": label, "system": r.system, "title": r.title, "method": r.method, "report_id": m.report_id,
-        "folder": m.folder, "verdict": r.verdict, "summary": list(r.summary), "warnings": list(r.warnings),
-        "site": dict(r.site), "instrument": r.instrument, "residual_std": r.residual_std, "unit": r.residual_unit,
-        "condition": r.condition, "rank": r.rank, "windows": sum(len(s.y) for s in r.series), **m.facts,
+        "label": label, "system": r.system, "title": r.title, "method": r.method, "verdict": r.verdict,
+        "summary": list(r.summary), "warnings": list(r.warnings), "site": dict(r.site), "instrument": r.instrument,
+        "residual_std": r.residual_std, "unit": r.residual_unit, "condition": r.condition, "rank": r.rank,
+        "windows": sum(len(s.y) for s in r.series), **m.test.as_dict(),
         "estimates": [
             {k: getattr(c, k) for k in ("name", "unit", "estimate", "u", "k", "interval", "truth", "z")}
             for c in r.coefficients

@@ -6,8 +6,12 @@ Numbers are in surface units (the unit stands beside them); nothing here compute
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
+Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
 
 
 @dataclass
@@ -28,7 +32,7 @@ class Coefficient:
     closed: float | None = None  # the source's closed formula (corrected), same unit
     truth: float | None = None  # simulated runs only
     z: float | None = None  # (estimate - truth) / u
-    limit: tuple[float | None, float | None] | None = None
+    limit: Limit | None = None
     verdict: str = "no specification given"  # pass | fail | inconclusive | no specification given
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
 
