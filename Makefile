@@ -12,7 +12,7 @@ demo: $(VENV)/demo.stamp
 	$(BIN)/gyrobench run tumble_single_axis --set latitude=45.75deg --check-step
 
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(VENV)/test.stamp
 	$(BIN)/ruff check .

@@ -39,7 +39,7 @@ class ServoThreeLoop(Component):
     w_max = Parameter(1.0, "rad/s", "position loop: largest rate", above=0.0)
     track_period = Parameter(5e-3, "s", "position loop: sampling period", above=0.0)
 
-    u = Input(0.0, "V", "gyro signal")
+    u = Input(0.0, "V", "gyro signal", quantity="rate")
     test = Input(0.0, "V", "test signal added to it")
     command = Input(0.0, "rad/s", "rate commanded to the platform")
     i_motor = Input(0.0, "A", "motor current")

@@ -40,12 +40,14 @@ class Declaration:
         max: float | None = None,
         above: float | None = None,
         below: float | None = None,
+        quantity: str = "",
     ) -> None:
         self.start = floats(start)
         self.shape = shape_of(start)
         self.type: type = unit if isinstance(unit, type) else float
         self.unit = "1" if isinstance(unit, type) else unit
         self.doc = doc
+        self.quantity = quantity  # "angle", "rate": what a signal in V or A stands for; goes into the model description
         self.min, self.max, self.above, self.below = min, max, above, below
 
     def __set_name__(self, owner: type, name: str) -> None:

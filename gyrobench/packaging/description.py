@@ -57,6 +57,8 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     of_type: dict[str, str] = {}
     derivative = s.section == "derivative"
     if kind == "Real":
+        if d.quantity:
+            of_type["quantity"] = d.quantity
         of_type["unit"] = unit_name(s)
     if s.section in ("parameter", "input", "state"):
         lo = d.min if d.min is not None else d.above

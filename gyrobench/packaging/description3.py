@@ -52,6 +52,8 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     if initial:
         attributes["initial"] = initial
     if kind == "Float64":
+        if s.decl.quantity:
+            attributes["quantity"] = s.decl.quantity
         attributes["unit"] = unit_name(s)
     if s.section == "derivative":
         attributes["derivative"] = str(next(x for x in cls.states if x.name == s.name[4:-1]).reference)

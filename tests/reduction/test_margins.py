@@ -79,16 +79,17 @@ def test_margins_from_sparse_points() -> None:
     np.testing.assert_allclose(between(points, at), [p.value for p in points], rtol=1e-9)
 
 
-def test_uncertainty_of_measured_margins_covers_interpolation_and_noise() -> None:
-    """12 points over two decades, each wrong by 0.3 % in both parts: of 200 draws the true crossover 15.92 Hz, phase
-    margin 52.3 degrees and lower limit 0.044 lie inside 2 u in nine of ten cases or more, u staying below 1 % and 1
-    degree."""
+def covered(draws: int) -> dict[str, int]:
+    """How many draws have the true crossover 15.92 Hz, phase margin 52.3 degrees and lower limit 0.044 inside 2 u.
+
+    12 points over two decades, each wrong by 0.3 % in both parts; u stays below 1 % and 1 degree.
+    """
     loop, rng = leadlag(), np.random.default_rng(4)
     dense = grid(0.02, 300.0)
     true = margins(dense, np.array([complex(loop(2j * np.pi * x)) for x in dense]))
     truth = {"crossover": true.crossover, "phase": true.phase, "lower": true.lower}
     inside = dict.fromkeys(truth, 0)
-    for _ in range(200):
+    for _ in range(draws):
         noise = 1 + 3e-3 * (rng.standard_normal(12) + 1j * rng.standard_normal(12))
         points = [
             Point(x, complex(loop(2j * np.pi * x)) * n, 3e-3, 1.0)
@@ -98,7 +99,13 @@ def test_uncertainty_of_measured_margins_covers_interpolation_and_noise() -> Non
             if name in inside:
                 inside[name] += abs(value - truth[name]) < 2.0 * u
                 assert u < {"crossover": 0.16, "phase": 1.5, "lower": 0.004}[name]
-    assert all(n >= 180 for n in inside.values()), inside
+    return inside
+
+
+def test_uncertainty_of_measured_margins_covers_interpolation_and_noise() -> None:
+    """In nine of ten draws or more; tests/benchmarks/loops.py counts 1000."""
+    inside = covered(50)
+    assert all(n >= 45 for n in inside.values()), inside
     assert measured_values([]) == {}
 
 

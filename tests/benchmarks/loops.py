@@ -1,0 +1,34 @@
+"""Coverage of loop measures, counted at length: ``python tests/benchmarks/loops.py [--runs 200] [--draws 1000]``.
+
+The tests count the same on fewer runs: tests/systems/test_stabilizer_power_2dof.py (stiffness, platform angle and drift
+of a power gyro stabilizer) and tests/reduction/test_margins.py (measured margins under noise).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS), str(TESTS / "systems"), str(TESTS / "reduction")]
+
+
+def main() -> None:
+    import test_margins
+    import test_stabilizer_power_2dof
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=200, help="runs of the stabilizer")
+    parser.add_argument("--draws", type=int, default=1000, help="draws of measured margins")
+    given = parser.parse_args()
+    for title, counted, n in (
+        ("stabilizer_power_2dof", test_stabilizer_power_2dof.covered, given.runs),
+        ("measured margins, 2 u", test_margins.covered, given.draws),
+    ):
+        for name, inside in counted(n).items():
+            print(f"{title:24s} {name:10s} {inside / n:.3f} of {n}")
+
+
+if __name__ == "__main__":
+    main()
