@@ -25,8 +25,8 @@ class UsageError(GyrobenchError):
 MANY = 30  # names that nobody reads in a message
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Names like ``name`` (a misprint), else all there are, as the end of a message."""
+def suggest_names(name: str, known: Iterable[str]) -> str:
+    """Return names like ``name`` (a misprint), else all there are, as the end of a message."""
     known = list(known)
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.85)
     near = near or difflib.get_close_matches(name, known, n=3, cutoff=0.5) or [k for k in known if name and name in k]
@@ -35,8 +35,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"gyrobench list shows all {len(known)}" if len(known) > MANY else f"there are: {', '.join(known) or 'none'}"
 
 
-def short(path: Path) -> str:
-    """A path from the working folder, where it lies in it."""
+def display_path(path: Path) -> str:
+    """Return a path from the working folder, where it lies in it."""
     path = path.resolve()
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
@@ -133,5 +133,5 @@ class Bench:
     @staticmethod
     def _folder(kind: str, name: str, found: dict[str, Path]) -> Path:
         if name not in found:
-            raise BenchError(f"no {kind} '{name}'; {nearest(name, found)}")
+            raise BenchError(f"no {kind} '{name}'; {suggest_names(name, found)}")
         return found[name]

@@ -1,4 +1,4 @@
-"""The one object every reduction returns and every report renders.
+"""Results: what reductions return and reports render, a class for each kind, and what they are judged by.
 
 Numbers are in surface units (the unit stands beside them); nothing here computes.  HTML, PDF and
 ``result.json`` are all rendered from one ``Result``, so a number is the same number everywhere.
@@ -7,9 +7,10 @@ Numbers are in surface units (the unit stands beside them); nothing here compute
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, ClassVar
 
+NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
 Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
 
@@ -33,7 +34,7 @@ class Coefficient:
     truth: float | None = None  # simulated runs only
     z: float | None = None  # (estimate - truth) / u
     limit: Limit | None = None
-    verdict: str = "no specification given"  # pass | fail | inconclusive | no specification given
+    verdict: str = NO_VERDICT  # pass | fail | inconclusive | no specification given
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
 
 
@@ -106,24 +107,77 @@ class Response:
     curves: list[dict[str, Any]] = field(default_factory=list)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Result:
-    """What a reduction found.  Every field is JSON-able through :meth:`as_dict`."""
+    """What results of every kind hold; a reduction returns one of the kinds below.
+
+    Every field is JSON-able through :meth:`as_dict`.  result.json has the same keys for every kind: empty, 0 or 1 where
+    a kind does not have them.
+    """
+
+    kind: ClassVar[str] = ""
 
     system: str
     title: str
     method: str  # one line, with its source
     sources: list[str]  # "TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21"
-    equation: str  # model equation, Typst math
+    equation: str = ""  # model equation, Typst math
     conventions: list[str]  # sign and axis conventions, a sentence each
     coefficients: list[Coefficient]
+    tests: list[Test] = field(default_factory=list)
+    tables: list[dict[str, Any]] = field(default_factory=list)  # method's own: {"title","caption","columns","rows"}
+    step_check: dict[str, Any] = field(default_factory=dict)  # {"step", "rows": [{name, change, u, ratio}], "worst"}
+    warnings: list[str] = field(default_factory=list)
+    summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
+    decision_rule: str = ""
+    verdict: str = NO_VERDICT
+    site: dict[str, Any] = field(default_factory=dict)
+    instrument: str = ""
+    simulated: bool = True
+    provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
+    ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
+
+    def __post_init__(self) -> None:
+        if not self.kind:
+            raise TypeError("a result is a DriftTestResult, a LoopResult or a SuiteResult")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of result.json, with the kind."""
+        return {"kind": self.kind, **ABSENT, **asdict(self)}
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> DriftTestResult | LoopResult | SuiteResult:
+        """Return the result of the right kind, the inverse of :meth:`as_dict`.
+
+        Without ``kind``, as in older files, its content tells it.  Raises TypeError for an unknown key.
+        """
+        older = "suite" if data.get("suite") else "drift_test" if data.get("correlation") else "loop"
+        cls = KINDS[data.get("kind", older)]
+        own = {f.name for f in fields(cls)}
+        values = {key: value for key, value in data.items() if key != "kind" and (key in own or key not in ABSENT)}
+        for key, entry in ENTRIES.items():
+            if key in own:
+                values[key] = [entry(**e) for e in data.get(key, [])]
+        if cls is SuiteResult:
+            values["suite"] = SuiteComparison(**data["suite"])
+        for c in values["coefficients"]:
+            c.interval = tuple(c.interval)
+            c.limit = tuple(c.limit) if c.limit is not None else None
+        return cls(**values)
+
+
+@dataclass(kw_only=True)
+class DriftTestResult(Result):
+    """Coefficients of an instrument from a regression over windows, with its residuals and its error budget."""
+
+    kind: ClassVar[str] = "drift_test"
+
     series: list[Series]
     correlation: list[list[float]]  # of the estimates, order of `coefficients`
     condition: float
     rank: int
     dof: float
     noise: dict[str, Any]  # {"model": "white" | "ar1" ..., "sigma": .., "tau": .., units in the names}
-    tests: list[Test]
     residual_std: float
     residual_unit: str
     acf: dict[str, list[float]] = field(default_factory=dict)  # lag, rho, bound
@@ -133,35 +187,78 @@ class Result:
     budget: list[BudgetLine] = field(default_factory=list)
     type_b: list[dict[str, Any]] = field(default_factory=list)  # {"source", "changes": independent parts x estimates}
     repeatability: dict[str, Any] = field(default_factory=dict)
-    step_check: dict[str, Any] = field(default_factory=dict)  # {"step", "rows": [{name, change, u, ratio}], "worst"}
-    tables: list[dict[str, Any]] = field(default_factory=list)  # method's own: {"title","caption","columns","rows"}
-    warnings: list[str] = field(default_factory=list)
-    summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
-    decision_rule: str = ""
-    verdict: str = "no specification given"
-    site: dict[str, Any] = field(default_factory=dict)
-    instrument: str = ""
-    simulated: bool = True
-    provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
-    ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
-    responses: list[Response] = field(default_factory=list)  # of loops
-    suite: dict[str, Any] = field(
-        default_factory=dict
-    )  # of several tests: see gyrobench.reduction.suite.method_comparison
 
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Result:
-        """The inverse of :meth:`as_dict`; raises TypeError for an unknown field."""
-        d = dict(data)
-        d["coefficients"] = [Coefficient(**c) for c in d["coefficients"]]
-        d["series"] = [Series(**s) for s in d["series"]]
-        d["tests"] = [Test(**t) for t in d["tests"]]
-        d["budget"] = [BudgetLine(**b) for b in d.get("budget", [])]
-        d["responses"] = [Response(**r) for r in d.get("responses", [])]
-        for c in d["coefficients"]:
-            c.interval = tuple(c.interval)
-            c.limit = tuple(c.limit) if c.limit is not None else None
-        return cls(**d)
+@dataclass(kw_only=True)
+class LoopResult(Result):
+    """Measures of a loop, a platform or an estimator, each by itself: responses, steps, drift."""
+
+    kind: ClassVar[str] = "loop"
+
+    responses: list[Response]
+    allan: dict[str, Any] = field(default_factory=dict)  # as of a drift test
+    # of an estimator: its readings and their errors
+    series: list[Series] = field(default_factory=list)
+    acf: dict[str, list[float]] = field(default_factory=dict)
+    dof: float = 0.0
+    residual_std: float = 0.0
+    residual_unit: str = "1"
+
+
+@dataclass
+class SuiteComparison:
+    """What the methods of a suite say of each other, see gyrobench.reduction.suite.method_comparison."""
+
+    rule: str
+    shared: list[str]  # sources of type B that are one and the same error in all tests
+    members: list[dict[str, Any]]
+    failed: list[dict[str, str]]  # {"label", "reason"}
+    quantities: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]  # {"quantity", "unit", "a", "b", "difference", "U", "E_n"}
+    consistency: str  # consistent | inconsistent | not tested
+    p: float | None  # the smallest, adjusted
+    tested: int  # quantities
+    disagreeing: list[str]
+    pairs_apart: int  # E_n > 1
+
+
+@dataclass(kw_only=True)
+class SuiteResult(Result):
+    """Several tests of one instrument: weighted means of what they have in common, and whether the methods agree."""
+
+    kind: ClassVar[str] = "suite"
+
+    suite: SuiteComparison
+
+
+KINDS: dict[str, type[DriftTestResult | LoopResult | SuiteResult]] = {
+    cls.kind: cls for cls in (DriftTestResult, LoopResult, SuiteResult)
+}
+#: key -> class of its entries
+ENTRIES: dict[str, type] = {
+    "coefficients": Coefficient,
+    "tests": Test,
+    "series": Series,
+    "budget": BudgetLine,
+    "responses": Response,
+}
+#: what result.json holds under the keys that a kind does not have
+ABSENT: dict[str, Any] = {
+    "series": [],
+    "correlation": [],
+    "condition": 0.0,
+    "rank": 0,
+    "dof": 0.0,
+    "noise": {},
+    "residual_std": 0.0,
+    "residual_unit": "1",
+    "acf": {},
+    "allan": {},
+    "psd": {},
+    "harmonics": [],
+    "budget": [],
+    "type_b": [],
+    "repeatability": {},
+    "responses": [],
+    "suite": {},
+}

@@ -22,7 +22,7 @@ import numpy as np
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.result import Coefficient, Result, Series
+from gyrobench.result import Coefficient, DriftTestResult, Series
 from gyrobench.system.system import MeasuredData, Option, Slot, System
 
 
@@ -56,10 +56,10 @@ class Own(System):
             raise KeyboardInterrupt
         y = [gravity, gravity]
         series = Series("site", [0.0, 1.0], "time", "s", y, y, y, "gravity", "m/s²")
-        return Result(
-            system="own", title=self.title, method="reading", sources=[], equation="", conventions=[],
+        return DriftTestResult(
+            system="own", title=self.title, method="reading", sources=[], conventions=[],
             coefficients=[Coefficient("g", "gravity", "m/s²", gravity, 0.1, 2.0, (9.6, 10.0))], series=[series],
-            correlation=[[1.0]], condition=1.0, rank=1, dof=1.0, noise={}, tests=[], residual_std=0.0,
+            correlation=[[1.0]], condition=1.0, rank=1, dof=1.0, noise={}, residual_std=0.0,
             residual_unit="m/s²", acf={"lag": [1.0]} if raises == "figure" else {},
         )
 '''

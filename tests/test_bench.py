@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import gyrobench
-from gyrobench.bench import Bench, BenchError, nearest, short, standard_folder
-from gyrobench.commands.catalog import init_bench, listing
+from gyrobench.bench import Bench, BenchError, display_path, standard_folder, suggest_names
+from gyrobench.commands.catalog import init_bench, list_contents
 
 TOOL = Path(gyrobench.__file__).parent if gyrobench.__file__ else Path(gyrobench.__path__[0])
 
@@ -53,19 +53,19 @@ def test_unknown_names_are_answered_with_names_that_are_near(tmp_path: Path) -> 
         bench.system_folder("tumble_single_axes")
     with pytest.raises(BenchError, match=r"is no bench: it has no folder components/ \(make one: gyrobench init NAME"):
         Bench.find(tmp_path)
-    assert nearest("xyz", ["site", "table"]) == "there are: site, table"
-    assert nearest("xyz", []) == "there are: none"
+    assert suggest_names("xyz", ["site", "table"]) == "there are: site, table"
+    assert suggest_names("xyz", []) == "there are: none"
 
 
 def test_short_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert short(tmp_path / "a" / "b") == "a/b"
-    assert short(Path("/somewhere/else")) == "/somewhere/else"
+    assert display_path(tmp_path / "a" / "b") == "a/b"
+    assert display_path(Path("/somewhere/else")) == "/somewhere/else"
 
 
 # --------------------------------------------------------------------------------- list and init
 def test_listing_reads_what_each_part_says_of_itself() -> None:
-    found = listing(Bench(standard_folder()))
+    found = list_contents(Bench(standard_folder()))
     assert list(found) == ["parts", "systems", "sockets", "specifications"]
     assert all(r["what"] for rows in found.values() for r in rows)
     rows = {r["name"]: r for title in ("parts", "systems") for r in found[title]}
@@ -78,7 +78,7 @@ def test_listing_reads_what_each_part_says_of_itself() -> None:
 def test_listing_survives_a_specification_that_cannot_be_read(tmp_path: Path) -> None:
     init_bench(tmp_path / "mine", [])
     (tmp_path / "mine" / "reports" / "specs" / "odd.toml").write_text("title =")
-    rows = {r["name"]: r for r in listing(Bench.find(tmp_path / "mine"))["specifications"]}
+    rows = {r["name"]: r for r in list_contents(Bench.find(tmp_path / "mine"))["specifications"]}
     assert rows["odd"]["what"].startswith("cannot be read")
 
 
@@ -152,6 +152,55 @@ def test_imports_go_one_way(file: Path) -> None:
     for module in imports(file):
         there = module.split(".")[1] if "." in module else ""
         assert there in ROOMS[room(file)] | {room(file), ""}, f"{file}: imports {module}"
+
+
+def module_of(file: Path) -> str:
+    parts = ("gyrobench", *file.relative_to(TOOL).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported_modules(file: Path, modules: set[str]) -> set[str]:
+    """Modules of gyrobench that a file imports when it runs, in functions too; not what only the type checker reads."""
+    package = ["gyrobench", *file.relative_to(TOOL).parent.parts]
+    pending: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    names: set[str] = set()
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            pending += node.orelse
+            continue
+        pending += ast.iter_child_nodes(node)
+        if isinstance(node, ast.Import):
+            names |= {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            names |= {f"{module}.{a.name}" if f"{module}.{a.name}" in modules else module for a in node.names}
+    return names & modules - {module_of(file)}
+
+
+def cycle(graph: dict[str, set[str]]) -> list[str]:
+    """A closed path through the graph; empty where there is none."""
+    done: set[str] = set()
+
+    def search(path: list[str]) -> list[str]:
+        for module in sorted(graph[path[-1]]):
+            if module in path:
+                return [*path[path.index(module) :], module]
+            if module not in done and (found := search([*path, module])):
+                return found
+        done.add(path[-1])
+        return []
+
+    return next((found for start in sorted(graph) if start not in done and (found := search([start]))), [])
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    modules = {module_of(f) for f in FILES}
+    graph = {module_of(f): imported_modules(f, modules) for f in FILES}
+    assert sum(map(len, graph.values())) > 300, "the imports are read"
+    assert cycle(graph) == []
+    assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
 
 
 FACES = {"commands", "__main__", "__init__"}  # they see everything

@@ -16,7 +16,7 @@ import pytest
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.commands import cli, progress_display
-from gyrobench.commands.run_system import tell
+from gyrobench.commands.console import print_notes
 from gyrobench.engine.run_driver import Status
 from gyrobench.record.record import Record
 
@@ -276,11 +276,11 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress_display.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
         if status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress_display.Meter, "__call__", interrupt)
+    monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
     run = ["run", NAME, "--set", "rate=2deg/s", "--set", "windows=36", "--out", "r"]
     code, out, err = gyrobench(*run)
     assert code == 130 and out == ""
@@ -298,7 +298,9 @@ def test_interrupt_does_not_replace_a_whole_record(
 ) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run)[0] == 0
-    monkeypatch.setattr(progress_display.Meter, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(
+        progress_display.ProgressDisplay, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT)
+    )
     code, _, err = gyrobench(*run)
     assert code == 130 and "is kept in r-incomplete" in err
     assert Record.load(tmp_path / "r").complete and not Record.load(tmp_path / "r-incomplete").complete
@@ -307,11 +309,11 @@ def test_interrupt_does_not_replace_a_whole_record(
 def test_interrupted_step_check_still_gives_the_report(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress_display.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
         if "step check" in self.label:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress_display.Meter, "__call__", interrupt)
+    monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
     code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r")
     assert code == 130
     assert "r/report.html" in out and "the report is without it" in err
@@ -361,14 +363,14 @@ def test_progress_in_lines_where_there_is_no_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(progress_display, "PAUSE", 0.0)
-    with progress_display.Meter("tumble") as meter:
-        meter(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
+    with progress_display.ProgressDisplay("tumble") as display:
+        display(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
     # 250 of 1000 s are done after 2.5 s: 7.5 s are left; 250,000 steps in 2.5 s
     assert capsys.readouterr().err == "tumble: 25 %, t = 250 of 1,000 s, 0.10 M steps/s, 8 s left\n"
 
 
 def test_a_note_on_several_slots_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
-    tell(["site: slow: no compiler", "gyro: slow: no compiler", "isolated FMUs run in the reference engine"])
+    print_notes(["site: slow: no compiler", "gyro: slow: no compiler", "isolated FMUs run in the reference engine"])
     assert capsys.readouterr().err == (
         "note: site, gyro: slow: no compiler\nnote: isolated FMUs run in the reference engine\n"
     )
@@ -378,18 +380,18 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
     monkeypatch.setenv("COLUMNS", "120")
-    with progress_display.Meter("tumble") as meter:
-        meter(Status(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
-        assert meter.bar is None  # short runs stay silent
-        meter(Status(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
-        assert meter.bar is not None and meter.bar.tasks[0].completed == 0.5
-        assert "1 min 00 s left" in meter.bar.tasks[0].fields["words"]
+    with progress_display.ProgressDisplay("tumble") as display:
+        display(Status(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
+        assert display.bar is None  # short runs stay silent
+        display(Status(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
+        assert display.bar is not None and display.bar.tasks[0].completed == 0.5
+        assert "1 min 00 s left" in display.bar.tasks[0].fields["words"]
     captured = capsys.readouterr()
     assert captured.out == ""
 
 
 def test_spans_of_time() -> None:
-    assert [progress_display.span(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
+    assert [progress_display.format_duration(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
         "0 s", "1 min 15 s", "2 h 01 min", "unknown",
     ]  # fmt: skip
 

@@ -19,8 +19,7 @@ from gyrobench.commands import cli, progress_display
 from gyrobench.engine.run_driver import Status
 from gyrobench.engine.session import run
 from gyrobench.record.record import Record
-from gyrobench.system.suite import Suite
-from gyrobench.system.system import load_system
+from gyrobench.system.suite import Suite, load_test
 
 Call = Callable[..., tuple[int, str, str]]
 NAME = "drift_test_suite"
@@ -108,7 +107,7 @@ def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
 
 
 def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Path) -> None:
-    suite = load_system(NAME)
+    suite = load_test(NAME)
     assert isinstance(suite, Suite)
     values: dict[str, Any] = dict(v.split("=") for v in PLANS["fixed_position"]) | {"gyro.markov_tau": 3.0}
     alone = run("fixed_position", values=values, seed=suite.seed_of(3, "fixed_position"))
@@ -206,12 +205,12 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
-    def interrupt(self: progress_display.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
         if self.label == "tumble_single_axis" and status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
     with monkeypatch.context() as patch:
-        patch.setattr(progress_display.Meter, "__call__", interrupt)
+        patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         code, _, err = gyrobench(*run)
     assert code == 130 and "the suite goes on with the same command and --resume" in err
     assert not Path("s/result.json").exists() and not Record.load(Path("s/tumble_single_axis")).complete

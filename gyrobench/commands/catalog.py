@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import ROOMS, Bench, BenchError, nearest
+from gyrobench.bench import ROOMS, Bench, BenchError, suggest_names
 
 
 def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
@@ -44,8 +44,8 @@ def _title(file: Path) -> str:
         return f"cannot be read: {error}"
 
 
-def listing(bench: Bench) -> dict[str, list[dict[str, Any]]]:
-    """Parts, systems, sockets and acceptance specifications: a list of {name, what, spec, folder} each."""
+def list_contents(bench: Bench) -> dict[str, list[dict[str, Any]]]:
+    """Return parts, systems, sockets and acceptance specifications: a list of {name, what, spec, folder} each."""
     from gyrobench.system.sockets import SOCKETS
 
     return {
@@ -71,7 +71,7 @@ Records and reports go to `reports/out/<system>/<id>/`, built FMUs to `fmus/`.
 
 
 def init_bench(folder: Path, copies: list[str]) -> list[str]:
-    """Makes the rooms of a new bench and copies parts and systems into it; returns what was made, a line each.
+    """Make the rooms of a new bench and copy parts and systems into it; return what was made, a line each.
 
     Raises BenchError if the folder exists and is not empty, or there is no such part or system.
     """
@@ -81,7 +81,7 @@ def init_bench(folder: Path, copies: list[str]) -> list[str]:
     parts, systems = bench.parts(), bench.systems()
     for name in copies:
         if name not in parts and name not in systems:
-            raise BenchError(f"--copy {name}: no such part or system; {nearest(name, [*parts, *systems])}")
+            raise BenchError(f"--copy {name}: no such part or system; {suggest_names(name, [*parts, *systems])}")
     for room in (*ROOMS, "fmus"):
         (folder / room).mkdir(parents=True, exist_ok=True)
     for room in ("systems", "components", "reports/specs"):
@@ -90,8 +90,8 @@ def init_bench(folder: Path, copies: list[str]) -> list[str]:
     (folder / "README.md").write_text(README.format(name=folder.resolve().name), encoding="utf-8")
     (folder / ".gitignore").write_text("fmus/\nreports/out/\n", encoding="utf-8")
     lines = [f"{folder}: a new bench; cd {folder} and gyrobench list"]
-    found = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
-    for room, name in found:  # a part and a system may have the same name: then both
+    wanted = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
+    for room, name in wanted:  # a part and a system may have the same name: then both
         source = (parts if room == "components" else systems).get(name)
         if source is None:
             continue

@@ -1,4 +1,4 @@
-"""The commands.  What takes time to import is imported where it is used."""
+"""The command line: options and arguments of each command.  What takes time to import is imported where it is used."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import Bench, UsageError, short
+from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.user_errors import exit_code, user_message
 
 app = typer.Typer(
@@ -65,56 +65,32 @@ class Form(StrEnum):
     container = "container"
 
 
-say = typer.echo
+echo = typer.echo
 
 
-def pairs(values: list[str] | None, option: str, example: str) -> dict[str, str]:
-    """``["a.b=1"]`` -> ``{"a.b": "1"}``.  Raises UsageError for an entry without ``=`` and for a name given twice."""
-    found: dict[str, str] = {}
-    for v in values or []:
-        name, sign, value = (x.strip() for x in v.partition("="))
-        if not (sign and name and value):
-            raise UsageError(f"{option} {v}: write NAME=VALUE, for example {option} {example}")
-        if name in found:
-            raise UsageError(f"{option} {name}: given twice, {found[name]} and {value}")
-        found[name] = value
-    return found
-
-
-def settings(values: list[str] | None) -> dict[str, str]:
-    return pairs(values, "--set", "latitude=45.75deg")
-
-
-def swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict[str, str], dict[str, Path]]:
-    """Parts and mapping files by slot.  Raises UsageError for a mapping file that is not there."""
-    parts = pairs(part, "--part", "gyro=vendor.fmu")
-    maps = {k: Path(v) for k, v in pairs(mapping, "--map", "gyro=vendor.toml").items()}
-    for slot, file in maps.items():
-        if not file.is_file():
-            raise UsageError(f"--map {slot}={file}: no such file")
-    return parts, maps
-
-
-def judge(verdict: str, strict: bool) -> None:
+def exit_on_fail(verdict: str, strict: bool) -> None:
+    """End the command with exit code 1 where a verdict fails and that was asked for."""
     if strict and verdict == "fail":
         raise typer.Exit(1)
 
 
-def version(wanted: bool) -> None:
+def print_version(wanted: bool) -> None:
+    """Print the version and end the command."""
     if wanted:
-        from importlib.metadata import PackageNotFoundError
-        from importlib.metadata import version as installed
+        from importlib.metadata import PackageNotFoundError, version
 
         try:
-            say(f"gyrobench {installed('gyrobench')}")
+            echo(f"gyrobench {version('gyrobench')}")
         except PackageNotFoundError:
-            say("gyrobench, not installed")
+            echo("gyrobench, not installed")
         raise typer.Exit
 
 
 @app.callback()
 def root(
-    show_version: Annotated[bool, typer.Option("--version", callback=version, is_eager=True, help="Version.")] = False,
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=print_version, is_eager=True, help="Version.")
+    ] = False,
 ) -> None:
     """FMI co-simulation bench for inertial instruments: test methods as systems of FMUs, ending in a report.
 
@@ -132,23 +108,23 @@ def root(
 
 @app.command("list")
 def list_command(as_json: Json = False) -> None:
-    """Parts, systems, sockets, specifications.
+    """List parts, systems, sockets, specifications.
 
     \b
     Example: gyrobench list
     """
-    from gyrobench.commands.catalog import listing
+    from gyrobench.commands.catalog import list_contents
 
-    found = listing(Bench.find())
+    contents = list_contents(Bench.find())
     if as_json:
-        say(json.dumps(found, indent=2, ensure_ascii=False))
+        echo(json.dumps(contents, indent=2, ensure_ascii=False))
         return
-    width = max((len(r["name"]) for rows in found.values() for r in rows), default=0)
-    for title, rows in found.items():
+    width = max((len(r["name"]) for rows in contents.values() for r in rows), default=0)
+    for title, rows in contents.items():
         if rows:
-            say(title)
+            echo(title)
         for r in rows:
-            say(f"  {r['name']:<{width}}  {r['what']}" + (f"  [{', '.join(r['spec'])}]" if r.get("spec") else ""))
+            echo(f"  {r['name']:<{width}}  {r['what']}" + (f"  [{', '.join(r['spec'])}]" if r.get("spec") else ""))
 
 
 @app.command()
@@ -160,16 +136,22 @@ def show(
     picture: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw the wiring.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Wiring, plan and options of a system.
+    """Show wiring, plan and options of a system.
 
     Slots, wires, execution order, cuts and delays, plan, options; nothing runs.
 
     \b
     Example: gyrobench show tumble_single_axis --picture wiring.svg
     """
-    from gyrobench.commands import show_system
+    from gyrobench.commands.inputs import load_test, parse_settings, parse_swaps
+    from gyrobench.commands.show_system import show_suite, show_system
+    from gyrobench.system.suite import Suite
 
-    show_system.show(system, settings(values), *swaps(part, mapping), picture, as_json)
+    test = load_test(system, parse_settings(values))
+    if isinstance(test, Suite):
+        show_suite(test, picture, as_json)
+    else:
+        show_system(test, *parse_swaps(part, mapping), picture, as_json)
 
 
 @app.command()
@@ -186,7 +168,7 @@ def build(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Builds parts into FMUs.
+    """Build parts into FMUs.
 
     \b
     Example: gyrobench build floated_gyro --target python
@@ -205,7 +187,7 @@ def build(
         raise UsageError(f"--platform {wrong[0]}: one of {', '.join(PLATFORMS)}")
     for name in names:
         path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
-        say(short(path))
+        echo(display_path(path))
 
 
 @app.command()
@@ -233,7 +215,7 @@ def run(
     resume: Resume = False,
     as_json: Json = False,
 ) -> None:
-    """Runs a system: record, reduction, report.
+    """Run a system: record, reduction, report.
 
     \b
     Examples:
@@ -243,16 +225,16 @@ def run(
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench.commands import run_system
+    from gyrobench.commands.inputs import load_test, parse_settings, parse_step, parse_swaps
+    from gyrobench.system.suite import Suite
 
-    parts, maps = swaps(part, mapping)
-    job = run_system.Job(
-        system=system,
+    parts, maps = parse_swaps(part, mapping)
+    request = run_system.RunRequest(
         parts=parts,
         maps=maps,
-        values=settings(values),
         seed=seed,
         engine=engine.value if engine else None,
-        step=step,
+        step=parse_step(step),
         out=out,
         force=force,
         spec=spec,
@@ -260,7 +242,14 @@ def run(
         isolate=tuple(isolate or ()),
         resume=resume,
     )
-    judge(run_system.run(job, as_json), strict)
+    test = load_test(system, parse_settings(values), request.step)
+    if isinstance(test, Suite):
+        from gyrobench.commands import run_suite
+
+        verdict = run_suite.run(request, test, as_json)
+    else:
+        verdict = run_system.run(request, test, as_json)
+    exit_on_fail(verdict, strict)
 
 
 @app.command()
@@ -277,7 +266,7 @@ def reduce(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Reduces measured data to the same report.
+    """Reduce measured data to the same report.
 
     \b
     Examples:
@@ -285,14 +274,30 @@ def reduce(
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
     """
-    from gyrobench.commands import reduce_data
+    from gyrobench.commands.inputs import apply_values, load_test, parse_settings
+    from gyrobench.system.suite import Suite
 
-    if template:
-        say(reduce_data.template(system).rstrip("\n"))
-        return
-    if not data:
-        raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
-    judge(reduce_data.reduce(system, data, settings(values), spec, out, force, as_json), strict)
+    settings = parse_settings(values)
+    test = load_test(system)
+    if isinstance(test, Suite):
+        if template:
+            raise UsageError(f"{system} compares runs: reduce each record by its own test, then give it their folders")
+        if not data:
+            raise UsageError(f"name the runs: gyrobench reduce {system} --data RUN --data RUN")
+        from gyrobench.commands import suite_report
+
+        apply_values(test, settings)
+        verdict = suite_report.reduce(test, data, spec, out, force, as_json)
+    else:
+        from gyrobench.commands import reduce_data
+
+        if template:
+            echo(reduce_data.template(test).rstrip("\n"))
+            return
+        if not data:
+            raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
+        verdict = reduce_data.reduce(test, data, settings, spec, out, force, as_json)
+    exit_on_fail(verdict, strict)
 
 
 @app.command()
@@ -302,14 +307,24 @@ def report(
     strict: Strict = False,
     as_json: Json = False,
 ) -> None:
-    """Reduces the record of a run again and writes its report.
+    """Reduce the record of a run again and write its report.
 
     \b
     Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
     """
-    from gyrobench.commands import reduce_data
+    from gyrobench.commands.inputs import load_saved_test
+    from gyrobench.system.suite import Suite
 
-    judge(reduce_data.report(folder, spec, as_json), strict)
+    test = load_saved_test(folder)
+    if isinstance(test, Suite):
+        from gyrobench.commands import suite_report
+
+        verdict = suite_report.report(folder, test, spec, as_json)
+    else:
+        from gyrobench.commands import saved_run
+
+        verdict = saved_run.report(folder, test, spec, as_json)
+    exit_on_fail(verdict, strict)
 
 
 @app.command()
@@ -318,14 +333,14 @@ def compare(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Lays the reports of several runs side by side.
+    """Lay the reports of several runs side by side.
 
     \b
     Example: gyrobench compare reports/out/tumble_single_axis/1a2b3c4d vendor --out comparison
     """
-    from gyrobench.commands import run_system
+    from gyrobench.commands import compare_runs
 
-    run_system.compare(runs, out, as_json)
+    compare_runs.compare(runs, out, as_json)
 
 
 @app.command()
@@ -338,21 +353,23 @@ def export(
     seed: Seed = 1,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")] = None,
 ) -> None:
-    """Writes a system for other tools.
+    """Write a system for other tools.
 
     The plan of the test and all values are in it.
 
     \b
     Example: gyrobench export tumble_single_axis --to ssp --set windows=36
     """
-    from gyrobench.commands import run_system
+    from gyrobench.commands import export_system
+    from gyrobench.commands.inputs import parse_settings, parse_swaps
 
-    say(short(run_system.export(system, to.value, settings(values), *swaps(part, mapping), seed, out)))
+    path = export_system.export(system, to.value, parse_settings(values), *parse_swaps(part, mapping), seed, out)
+    echo(display_path(path))
 
 
 @app.command()
 def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An FMU, or the name of a part.")]) -> None:
-    """Checks an FMU: standard, units, reference run.
+    """Check an FMU: standard, units, reference run.
 
     \b
     Example: gyrobench validate fmus/site.fmu
@@ -361,10 +378,10 @@ def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An F
 
     problems = check(file, Bench.find().folder)
     for p in problems:
-        say(p)
+        echo(p)
     if problems:
         raise typer.Exit(1)
-    say(f"{file}: no problems found")
+    echo(f"{file}: no problems found")
 
 
 @app.command()
@@ -375,7 +392,7 @@ def init(
         typer.Option("--copy", metavar="PART|SYSTEM", help="Copy this part or system to change it.  Repeatable."),
     ] = None,
 ) -> None:
-    """Makes a bench; what it lacks the standard one has.
+    """Create a bench on top of the standard one.
 
     \b
     Example: gyrobench init mybench --copy floated_gyro
@@ -383,7 +400,7 @@ def init(
     from gyrobench.commands.catalog import init_bench
 
     for line in init_bench(name, list(copy or [])):
-        say(line)
+        echo(line)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""How far a run is: on a terminal one line that moves, elsewhere a line from time to time.  Always on stderr."""
+"""Progress of a run on standard error: on a terminal one line that moves, elsewhere a line from time to time."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ QUIET = 1.0  # s without a word, so that short runs stay silent
 PAUSE = 10.0  # s between two lines where there is no terminal
 
 
-def span(seconds: float) -> str:
-    """``75`` -> "1 min 15 s"."""
+def format_duration(seconds: float) -> str:
+    """Return a duration for people: 75 s is "1 min 15 s"."""
     if not seconds < 1e6:
         return "unknown"
     whole = round(seconds)
@@ -22,16 +22,16 @@ def span(seconds: float) -> str:
     return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
 
 
-def words(status: Any) -> str:
-    """Simulated time, rate and time left of a :class:`gyrobench.engine.run_driver.Status`."""
+def format_status(status: Any) -> str:
+    """Return simulated time, rate and time left of a :class:`gyrobench.engine.run_driver.Status`."""
     rate = status.steps / max(status.elapsed, 1e-9)
     speed = f"{rate / 1e6:.2f} M steps/s" if rate >= 1e5 else f"{rate:,.0f} steps/s"
     if status.time >= status.total:  # the ways between the phases of a plan are not known beforehand
-        return f"t = {status.time:,.0f} s, {speed}, soon done"
-    return f"t = {status.time:,.0f} of {status.total:,.0f} s, {speed}, {span(status.eta)} left"
+        return f"t = {status.time:,.0f} s, {speed}, finishing"
+    return f"t = {status.time:,.0f} of {status.total:,.0f} s, {speed}, {format_duration(status.eta)} left"
 
 
-class Meter:
+class ProgressDisplay:
     """The ``progress`` of a run; a context manager."""
 
     def __init__(self, label: str) -> None:
@@ -40,7 +40,7 @@ class Meter:
         self.task: Any = None
         self.last = time.monotonic()
 
-    def __enter__(self) -> Meter:
+    def __enter__(self) -> ProgressDisplay:
         return self
 
     def __call__(self, status: Any) -> None:
@@ -48,10 +48,12 @@ class Meter:
             if self.bar is None and status.elapsed >= QUIET:
                 self._open()
             if self.bar is not None:
-                self.bar.update(self.task, completed=status.fraction, words=words(status))
+                self.bar.update(self.task, completed=status.fraction, words=format_status(status))
         elif time.monotonic() - self.last >= PAUSE:
             self.last = time.monotonic()
-            print(f"{self.label}: {100.0 * status.fraction:.0f} %, {words(status)}", file=sys.stderr, flush=True)
+            print(
+                f"{self.label}: {100.0 * status.fraction:.0f} %, {format_status(status)}", file=sys.stderr, flush=True
+            )
 
     def _open(self) -> None:
         from rich.console import Console

@@ -1,4 +1,4 @@
-"""Folders of runs: named by what is run; nobody's run is overwritten by another."""
+"""Folders of runs: named by what is run; a run does not overwrite another one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RECORD = (RUN, "record.parquet", "record.csv", "channels.parquet", "channels.csv
 REPORT = ("result.json", "report.html", "report.pdf")
 
 
-def run_folder(
+def prepare_run_folder(
     session: Any,
     system: System,
     seed: int,
@@ -29,11 +29,11 @@ def run_folder(
     force: bool,
     resume: bool = False,
 ) -> tuple[Path, checkpoint.Keeper]:
-    """Where the run is saved: --out, else a folder named by what is run; and the keeper of its checkpoint.
+    """Return where the run is saved, --out, else a folder named by what is run; and the keeper of its checkpoint.
 
-    With ``resume`` the keeper goes on from the checkpoint in that folder or in the one :func:`beside` it; whether that
-    is one of this run the keeper checks.  Raises UsageError when there is none to resume, and when --out holds another
-    run, unless ``force``, or files that are none of a run.
+    With ``resume`` the keeper goes on from the checkpoint in that folder or in its :func:`incomplete_folder`, once it
+    has seen that it is of this run.  Raises UsageError when there is none to resume, and when --out holds another run,
+    unless ``force``, or files that do not belong to a run.
     """
     from gyrobench.system.parameters import resolve
 
@@ -50,21 +50,25 @@ def run_folder(
     texts = {slot: file.read_text(encoding="utf-8") for slot, file in maps.items()}
     text = json.dumps([identity, texts, session.engine], sort_keys=True)
     folder = out or Bench.find().out / system.name / hashlib.sha256(text.encode()).hexdigest()[:8]
-    kept = [f for f in (folder, beside(folder)) if (f / checkpoint.FILE).is_file()]
+    kept = [f for f in (folder, incomplete_folder(folder)) if (f / checkpoint.FILE).is_file()]
     if not resume:
-        claim(folder, identity, force)
+        prepare_folder(folder, identity, force)
     elif not kept:
-        state = "the run is complete" if whole_record(folder) else "no checkpoint of a run with these parts and values"
+        state = (
+            "the run is complete"
+            if has_complete_record(folder)
+            else "no checkpoint of a run with these parts and values"
+        )
         raise UsageError(
             "--resume: " + (checkpoint.obstacle(session.slaves) or f"nothing to continue in {folder}: {state}")
         )
     elif folder not in kept:
-        claim(folder, identity, force)
-    return folder, checkpoint.Keeper(unfinished(folder), resume, kept[0] if kept else None)
+        prepare_folder(folder, identity, force)
+    return folder, checkpoint.Keeper(partial_folder(folder), resume, kept[0] if kept else None)
 
 
-def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
-    """Makes a folder for a run; one that holds the same run may be written again.  Raises UsageError."""
+def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
+    """Make and return a folder for a run; one that holds the same run may be written again.  Raises UsageError."""
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"--out {folder}: is a file; name a folder")
     old = None
@@ -94,37 +98,37 @@ def claim(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
 
 
 def _covers(old: Any, new: Any) -> bool:
-    """Whether all that ``new`` says stands in ``old`` too."""
+    """Return whether ``old`` has all entries of ``new``, with the same values."""
     if isinstance(old, dict) and isinstance(new, dict):
         return all(_covers(old.get(k), v) for k, v in new.items())
     return bool(old == new)
 
 
-def keep(record: Record, folder: Path) -> Path:
-    """Saves what a run left when it stopped, beside a whole record of the same run rather than over it."""
-    return record.save(unfinished(folder))
+def save_partial_record(record: Record, folder: Path) -> Path:
+    """Save what a run left when it stopped, beside a complete record of the same run rather than over it."""
+    return record.save(partial_folder(folder))
 
 
-def whole_record(folder: Path) -> bool:
-    """Whether a complete record is there."""
+def has_complete_record(folder: Path) -> bool:
+    """Return whether the folder holds a complete record."""
     try:
         return read_run(folder).complete
     except RecordError:
         return False
 
 
-def beside(folder: Path) -> Path:
-    """Where a run that stopped is kept when the folder holds a whole record."""
+def incomplete_folder(folder: Path) -> Path:
+    """Return where a run that stopped is kept when the folder holds a complete record."""
     return folder.with_name(folder.name + "-incomplete")
 
 
-def unfinished(folder: Path) -> Path:
-    """Where a run that has not ended is kept: its folder, unless that holds a whole record."""
-    return beside(folder) if whole_record(folder) else folder
+def partial_folder(folder: Path) -> Path:
+    """Return where a run that has not ended is kept: its folder, unless that holds a complete record."""
+    return incomplete_folder(folder) if has_complete_record(folder) else folder
 
 
-def labels(runs: Iterable[Path]) -> list[str]:
-    """Short names of folders, all different.  Raises UsageError for a folder given twice."""
+def short_names(runs: Iterable[Path]) -> list[str]:
+    """Return short names of folders, all different.  Raises UsageError for a folder given twice."""
     folders = [f.resolve() for f in runs]
     for f in folders:
         if folders.count(f) > 1:

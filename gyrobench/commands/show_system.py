@@ -1,26 +1,23 @@
-"""What ``gyrobench show`` says of a system or of a suite."""
+"""Descriptions of systems and suites: nothing runs."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
-from gyrobench.commands.run_system import check_fmus, load, note, runnable
+from gyrobench.commands.inputs import check_fmu_files, require_slots, suite_members
 from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
 
 
-def show(
-    name: str,
-    values: Mapping[str, str],
-    parts: Mapping[str, str],
-    maps: Mapping[str, Path],
-    picture: Path | None,
-    as_json: bool,
+def show_system(
+    system: System, parts: Mapping[str, str], maps: Mapping[str, Path], picture: Path | None, as_json: bool
 ) -> None:
-    """Slots, wires, order, cuts, delays and plan of a system."""
+    """Print slots, wires, order, cuts, delays and plan of a system, or draw its wiring."""
     from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.part_files import resolve_parts
     from gyrobench.system.system_description import describe
@@ -28,34 +25,54 @@ def show(
 
     if picture is not None and picture.suffix != ".svg":
         raise UsageError(f"--picture {picture}: the drawing is an SVG; write {picture.with_suffix('.svg')}")
-    system = load(name, values)
-    if isinstance(system, Suite):
-        return _suite(system, picture, as_json)
-    system = runnable(system)
-    check_fmus(parts)
+    check_fmu_files(parts)
     notes: list[str] = []
-    paths, _ = resolve_parts(system, parts, "native", Bench.find().folder, notes)
+    paths, _ = resolve_parts(require_slots(system), parts, "native", Bench.find().folder, notes)
     assembly = assemble(system, paths, maps)
     resolve(assembly, system, 1, defaults(assembly))  # refuses parameters that do not exist
-    found = describe(assembly)
+    description = describe(assembly)
     if picture is not None:
         from gyrobench.report import diagrams
 
-        picture.write_text(diagrams.system(found["order"], found, "system"), encoding="utf-8")
-        note(str(picture)) if as_json else print(picture)
+        picture.write_text(diagrams.system(description["order"], description, "system"), encoding="utf-8")
+        console.print_note(str(picture)) if as_json else print(picture)
     if as_json:
-        print(json.dumps(found, indent=1, ensure_ascii=False))
+        print(json.dumps(description, indent=1, ensure_ascii=False))
     elif picture is None:
-        print(console.system(found))
+        print(console.format_system(description))
 
 
-def _suite(suite: Suite, picture: Path | None, as_json: bool) -> None:
-    """Tests of a suite with their plans, and its options."""
-    from gyrobench.commands import run_suite
-
+def show_suite(suite: Suite, picture: Path | None, as_json: bool) -> None:
+    """Print the tests of a suite with their plans, and its options."""
     if picture is not None:
         raise UsageError(
             f"--picture: a suite has no wiring of its own; gyrobench show {suite.tests()[0]} --picture ..."
         )
-    found = run_suite.describe(suite)
-    print(json.dumps(found, indent=1, ensure_ascii=False) if as_json else console.suite(found))
+    description = _describe_suite(suite)
+    print(json.dumps(description, indent=1, ensure_ascii=False) if as_json else console.format_suite(description))
+
+
+def _describe_suite(suite: Suite) -> dict[str, Any]:
+    """Return tests with plans and seeds (of --seed 1), sets and options, JSON-able."""
+    members = suite_members(suite)
+    given = suite.given_to(members)
+    return {
+        "system": suite.name,
+        "title": suite.title,
+        "spec": list(suite.spec),
+        "item": suite.item,
+        "sets": dict(suite.sets),
+        "tests": [
+            {
+                "name": name,
+                "title": system.title,
+                "spec": list(system.spec),
+                "seed": suite.seed_of(1, name),
+                "given": given[name],
+                "plan": system.plan().rows(),
+                "duration": system.plan().duration(),
+            }
+            for name, system in members.items()
+        ],
+        "options": {k: {"value": suite[k], "unit": "str", "doc": o.doc} for k, o in suite.options.items()},
+    }

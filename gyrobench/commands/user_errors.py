@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gyrobench.bench import Bench, short, standard_folder
+from gyrobench.bench import Bench, display_path, standard_folder
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import ReportError
 
@@ -96,8 +96,8 @@ def record_kept(folder: Path, save: Callable[[], object] | None = None) -> Itera
             if isinstance(error, GyrobenchError):
                 raise
             save()
-        kept = f"the record is kept in {short(folder)}"
-        go_on = f"gyrobench report {short(folder)}"
+        kept = f"the record is kept in {display_path(folder)}"
+        go_on = f"gyrobench report {display_path(folder)}"
         if isinstance(error, KeyboardInterrupt):
             raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}") from error
         raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}") from error

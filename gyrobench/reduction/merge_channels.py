@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.result import Result
+from gyrobench.result import DriftTestResult
 
 
 def merge(
-    results: Mapping[str, Result], *, equation: str | None = None, summary: Sequence[str] | None = None,
+    results: Mapping[str, DriftTestResult], *, equation: str | None = None, summary: Sequence[str] | None = None,
     tables: Sequence[dict[str, Any]] = (), warnings: Sequence[str] = (),
-) -> Result:  # fmt: skip
+) -> DriftTestResult:  # fmt: skip
     """One result of ``results`` (channel -> result, printed as "x channel: ..."), in this order.
 
     Coefficients, series, tests, budget and tables follow one another, named by channel where channels could have the
@@ -85,7 +85,7 @@ def _shared(labels: list[str], lists: list[list[str]]) -> list[str]:
     return out
 
 
-def _side_by_side(parts: list[Result]) -> list[dict[str, Any]]:
+def _side_by_side(parts: list[DriftTestResult]) -> list[dict[str, Any]]:
     """Type B of each channel, with zeros for the others: taken as independent from channel to channel."""
     size, out, at = sum(len(r.coefficients) for r in parts), [], 0
     for r in parts:

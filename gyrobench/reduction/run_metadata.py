@@ -11,13 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Result
+
+R = TypeVar("R", bound=Result)
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[
     return {row.phase: row for row in run.plan}
 
 
-def finish(result: Result, record: Record) -> Result:
+def finish(result: R, record: Record) -> R:
     """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete."""
     result.provenance = record.run.as_dict()
     if not record.run.complete:

@@ -1,4 +1,4 @@
-"""Writes the files of a report: each whole or not at all, and each even when another fails."""
+"""The files of a report: each is written whole or not at all, and each even when another fails."""
 
 from __future__ import annotations
 
@@ -7,40 +7,73 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
-from gyrobench.report import FORMATS, ReportError
 from gyrobench.report.page_model import Page
 from gyrobench.report.result_json import document
-from gyrobench.result import Result
+from gyrobench.result import Result, SuiteResult
+
+FORMATS = ("json", "html", "pdf")
+NAMES = {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}
+COMPARISON_NAMES = {kind: f"comparison.{kind}" for kind in FORMATS}
 
 
-def write_all(
-    result: Result, folder: Path, formats: Sequence[str], record: Mapping[str, Any] | None, bench: Path | None
+class ReportError(GyrobenchError):
+    """A report of which some file could not be written.
+
+    ``failures``: file name -> its error; ``written``: format -> path of those that were written.
+    """
+
+    def __init__(self, failures: Mapping[str, Exception], written: Mapping[str, Path]) -> None:
+        self.failures, self.written = dict(failures), dict(written)
+        causes = [f"{name}: {type(error).__name__}: {error}" for name, error in failures.items()]
+        super().__init__("report not complete: " + "; ".join(causes))
+
+
+def write(
+    result: Result,
+    folder: str | Path,
+    formats: Sequence[str] = FORMATS,
+    record: Mapping[str, Any] | None = None,
+    bench: Path | None = None,
 ) -> dict[str, Path]:
+    """Write the report of a result into a folder; return the path of each format.
+
+    ``record`` may hold decimated channels to draw ("time" in s and "slot.variable" columns, equally long).
+    ``bench`` is the bench whose ``reports/`` templates come first.  Files are replaced whole or not at all.
+    Raises ValueError for an unknown format and :class:`ReportError`, after all others were written, when a
+    format fails.
+    """
     doc = document(result)
 
-    def view() -> Page:
-        if doc["suite"]:
+    def page() -> Page:
+        if isinstance(result, SuiteResult):
             from gyrobench.report import suite_page
 
             return suite_page.page(doc)
-        from gyrobench.report.result_page import page
+        from gyrobench.report import result_page
 
-        return page(doc, record)
+        return result_page.page(doc, record)
 
-    return _write(
-        doc, view, folder, formats, {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}, bench
-    )
+    return _write(doc, page, Path(folder), formats, NAMES, bench)
 
 
-def compare_all(
-    results: Sequence[tuple[str, Result]], folder: Path, formats: Sequence[str], baseline: int, bench: Path | None
+def compare(
+    results: Sequence[tuple[str, Result]],
+    folder: str | Path,
+    formats: Sequence[str] = FORMATS,
+    baseline: int = 0,
+    bench: Path | None = None,
 ) -> dict[str, Path]:
-    from gyrobench.report.comparison_page import comparison, page
+    """Write a side-by-side report of named results: ``comparison.json``, ``.html`` and ``.pdf``.
 
-    doc = comparison(results, baseline)
-    names = {kind: f"comparison.{kind}" for kind in FORMATS}
-    return _write(doc, lambda: page(doc), folder, formats, names, bench)
+    ``baseline`` is the index of the run the others are compared with.  Raises ValueError for fewer than two
+    results, repeated names or an unknown baseline; otherwise as :func:`write`.
+    """
+    from gyrobench.report import comparison_page
+
+    doc = comparison_page.comparison(results, baseline)
+    return _write(doc, lambda: comparison_page.page(doc), Path(folder), formats, COMPARISON_NAMES, bench)
 
 
 def _write(

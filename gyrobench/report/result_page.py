@@ -26,6 +26,7 @@ from gyrobench.report.page_model import (
 from gyrobench.report.signature_section import signing
 from gyrobench.report.style import styled
 from gyrobench.report.tables import heading, how_tables, limit_text, unit_groups, words
+from gyrobench.result import NO_VERDICT
 
 Json = dict[str, Any]
 
@@ -120,7 +121,7 @@ def answer(doc: Json) -> Answer:
         Column("verdict"),
     ]
     table = Table(columns, rows, "Verdict per requirement.") if rows else None
-    rule = doc["decision_rule"] if rows or doc["verdict"] != "no specification given" else ""
+    rule = doc["decision_rule"] if rows or doc["verdict"] != NO_VERDICT else ""
     return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
 
 

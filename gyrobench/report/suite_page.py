@@ -26,6 +26,7 @@ from gyrobench.report.references import source_blocks
 from gyrobench.report.signature_section import signing
 from gyrobench.report.style import BLUE, HALF, INK, MUTED, VERMILION, axis_label, figure, styled, svg
 from gyrobench.report.tables import compact, heading
+from gyrobench.result import NO_VERDICT
 
 Json = dict[str, Any]
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -63,7 +64,7 @@ def _head(doc: Json) -> list[tuple[str, str]]:
 def _answer(doc: Json) -> Answer:
     found = result_page.answer(doc)
     said = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "methods not compared"
-    plain = doc["verdict"] == "no specification given"
+    plain = doc["verdict"] == NO_VERDICT
     found.verdict = f"{said}; {doc['verdict']}" if plain else doc["verdict"]
     found.rule = " ".join(filter(None, [doc["suite"]["rule"], found.rule]))
     return found

@@ -10,7 +10,7 @@ Conventions of the connectors: SI units; vectors along I, O, S (gyro), face axes
 
 from __future__ import annotations
 
-from gyrobench.bench import UsageError, nearest
+from gyrobench.bench import UsageError, suggest_names
 from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, out
 from gyrobench.system.loop_sockets import LOOPS
 
@@ -174,5 +174,5 @@ def socket(name: str | Socket) -> Socket:
     if isinstance(name, Socket):
         return name
     if name not in SOCKETS:
-        raise UsageError(f"no socket '{name}'; {nearest(name, SOCKETS)}")
+        raise UsageError(f"no socket '{name}'; {suggest_names(name, SOCKETS)}")
     return SOCKETS[name]

@@ -16,13 +16,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
-from gyrobench.bench import Bench, nearest
+from gyrobench.bench import Bench, suggest_names
+from gyrobench.system.configurable import Configurable, InvalidConfigurationError, Option, load_configurable
+from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.parameters import slot_seed
-from gyrobench.system.system import InvalidConfigurationError, Option, System, load_system
+from gyrobench.system.system import System, load_system
 from gyrobench.system.values import InvalidValueError
 
 
-class Suite(System):
+class Suite(Configurable):
     """Base class of the suites.  Each test runs as a system of its own with a seed of its own: noise is drawn anew, and
     so is what is drawn when a gyro is switched on.  Parameters of the instrument are the same in all tests, unless a
     value is given for one of them.
@@ -48,19 +50,11 @@ class Suite(System):
         self.passed: dict[str, Any] = {}  # values for the tests, as given
 
     def set(self, name: str, value: Any) -> None:
-        """Keeps a value for the tests; whether it fits is seen in :meth:`members`.  Raises InvalidValueError."""
+        """Set an option, or keep a value for the tests; whether it fits is seen in :meth:`members`."""
         if name in self.options:
             super().set(name, value)
         else:
             self.passed[name] = value
-
-    def with_values(self, values: Mapping[str, Any]) -> System:
-        copy = type(self)()
-        copy.name, copy.folder, copy.values = self.name, self.folder, dict(self.values)
-        copy.passed, copy.given = dict(self.passed), list(self.given)
-        for name, value in values.items():
-            copy.set(name, value)
-        return copy
 
     def tests(self) -> list[str]:
         """Names of the tests, in their order."""
@@ -68,31 +62,36 @@ class Suite(System):
         return [name for word in words for name in self.sets.get(word, word).split()]
 
     def members(self, bench: Path | None = None) -> dict[str, System]:
-        """The tests with their values set.
+        """Return the tests with their values set.
 
         Raises InvalidConfigurationError for tests that do not exist, that are named twice or are not of one instrument,
         and InvalidValueError for a value that goes to none of them.
         """
         names = self.tests()
         known = {n for n in Bench.find(bench).systems() if n != self.name}
-        wrong = [f"no test '{n}'; {nearest(n, [*self.sets, *sorted(known)])}" for n in names if n not in known]
-        wrong += [f"{n}: named twice" for n in dict.fromkeys(names) if names.count(n) > 1]
+        problems = [f"no test '{n}'; {suggest_names(n, [*self.sets, *sorted(known)])}" for n in names if n not in known]
+        problems += [f"{n}: named twice" for n in dict.fromkeys(names) if names.count(n) > 1]
         if len(set(names)) < 2:
-            wrong.append(f"{len(set(names))} test: at least two are needed to compare methods")
-        if wrong:
-            raise InvalidConfigurationError(self.name, wrong)
-        found = {n: load_system(n, bench) for n in names}
-        self._one_instrument(found)
-        given = self.given_to(found)
-        for name, system in found.items():
+            problems.append(f"{len(set(names))} test: at least two are needed to compare methods")
+        if problems:
+            raise InvalidConfigurationError(self.name, problems)
+        members = {n: load_system(n, bench) for n in names}
+        self._require_one_instrument(members)
+        given = self.given_to(members)
+        for name, system in members.items():
             for key, value in given[name].items():
                 system.set(key, value)
-        return found
+        return members
 
-    def _one_instrument(self, members: Mapping[str, System]) -> None:
-        bare = [n for n, s in members.items() if self.item not in s.slots]
-        if bare:
-            problem = f"{', '.join(bare)}: no slot {self.item}, so no test of a {self.item}"
+    def _require_one_instrument(self, members: Mapping[str, System]) -> None:
+        """Raise InvalidConfigurationError for tests that are not drift tests of one and the same instrument."""
+        without = [n for n, s in members.items() if self.item not in s.slots]
+        if without:
+            problem = f"{', '.join(without)}: no slot {self.item}, so not a test of a {self.item}"
+            raise InvalidConfigurationError(self.name, [problem])
+        loops = [n for n, s in members.items() if isinstance(s.plan(), LoopPlan)]
+        if loops:
+            problem = f"{', '.join(loops)}: a test of a loop; a suite compares drift tests"
             raise InvalidConfigurationError(self.name, [problem])
         kinds: dict[tuple[str, str], list[str]] = {}
         for name, system in members.items():
@@ -100,35 +99,36 @@ class Suite(System):
             socket = slot.socket if isinstance(slot.socket, str) else slot.socket.name
             kinds.setdefault((socket, slot.part), []).append(name)
         if len(kinds) > 1:
-            said = "; ".join(f"{', '.join(names)}: {part} ({socket})" for (socket, part), names in kinds.items())
+            parts = "; ".join(f"{', '.join(names)}: {part} ({socket})" for (socket, part), names in kinds.items())
             raise InvalidConfigurationError(
-                self.name, [f"the tests are not of one {self.item}: {said}; leave out the tests of the other"]
+                self.name, [f"the tests are not of one {self.item}: {parts}; leave out the tests of the other"]
             )
 
     def given_to(self, members: Mapping[str, System]) -> dict[str, dict[str, Any]]:
-        """test -> the values that go to it.  Raises InvalidValueError for one that goes to none."""
-        found: dict[str, dict[str, Any]] = {n: {} for n in members}
-        alone: dict[str, dict[str, Any]] = {n: {} for n in members}
+        """Return the values that go to each test.  Raises InvalidValueError for one that goes to none."""
+        to_all: dict[str, dict[str, Any]] = {n: {} for n in members}
+        to_one: dict[str, dict[str, Any]] = {n: {} for n in members}
         for key, value in self.passed.items():
             first, dot, rest = key.partition(".")
             if dot and first in members:
                 slot = rest.partition(".")[0]
                 if rest not in members[first].options and slot not in members[first].slots:
                     raise InvalidValueError(f"{key}: {first} has no option {rest} and no slot {slot}")
-                alone[first][rest] = value
+                to_one[first][rest] = value
                 continue
-            fits = [n for n, s in members.items() if (first in s.slots if dot else key in s.options)]
-            if not fits:
+            takers = [n for n, s in members.items() if (first in s.slots if dot else key in s.options)]
+            if not takers:
                 slots = sorted({x for s in members.values() for x in s.slots})
                 options = sorted({x for s in members.values() for x in s.options} | set(self.options))
-                what = f"no slot '{first}'; {nearest(first, [*members, *slots])}" if dot else nearest(key, options)
-                raise InvalidValueError(f"{key}: no test of the suite takes it: {what}")
-            for n in fits:
-                found[n][key] = value
-        return {n: {**found[n], **alone[n]} for n in members}
+                hint = suggest_names(first, [*members, *slots]) if dot else suggest_names(key, options)
+                missing = f"no slot '{first}'; " if dot else ""
+                raise InvalidValueError(f"{key}: no test of the suite takes it: {missing}{hint}")
+            for n in takers:
+                to_all[n][key] = value
+        return {n: {**to_all[n], **to_one[n]} for n in members}
 
     def swaps(self, members: Mapping[str, System], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-        """test -> parts, mapping files or isolated slots that go to it: to all with the slot.
+        """Return the parts, mapping files or isolated slots that go to each test: to all with the slot.
 
         Raises InvalidValueError for a slot that no test has.
         """
@@ -140,3 +140,10 @@ class Suite(System):
     def seed_of(self, seed: int, name: str) -> int:
         """The seed of one test; with it the test alone gives the same record."""
         return slot_seed(seed, name)
+
+
+def load_test(name: str, bench: Path | None = None) -> System | Suite:
+    """Return the system or suite ``name`` of a bench with its default values; raises as load_configurable."""
+    test = load_configurable(name, bench)
+    assert isinstance(test, System | Suite)  # there are no other kinds
+    return test

@@ -27,33 +27,31 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 
 from __future__ import annotations
 
-import importlib.util
-import math
-import sys
-import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from gyrobench.bench import Bench, UsageError
-from gyrobench.errors import GyrobenchError
+from gyrobench.bench import UsageError, suggest_names
+from gyrobench.system.configurable import Configurable, InvalidConfigurationError, Option, load_configurable
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
 from gyrobench.system.sockets import Socket
-from gyrobench.system.values import InvalidValueError, flatten, parse
+from gyrobench.system.values import InvalidValueError, flatten
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
     from gyrobench.result import Result, Specification
 
-
-class InvalidConfigurationError(GyrobenchError):
-    """The system refuses to run with these values; ``problems`` lists why."""
-
-    def __init__(self, name: str, problems: list[str]) -> None:
-        self.problems = problems
-        super().__init__("\n".join([f"{name} refuses to run:", *(f"  - {p}" for p in problems)]))
+__all__ = [
+    "InvalidConfigurationError",
+    "MeasuredData",
+    "Option",
+    "Slot",
+    "System",
+    "Windows",
+    "load_system",
+]
 
 
 @dataclass(frozen=True)
@@ -65,39 +63,6 @@ class Slot:
 
     socket: str | Socket
     part: str
-
-
-def _bound(value: float, unit: str) -> str:
-    """A bound with its unit; an angle in degrees too, as nobody writes a latitude in radians."""
-    shown = f"{value:g}" if unit == "1" else f"{value:g} {unit}"
-    return f"{shown} ({math.degrees(value):.6g}deg)" if unit == "rad" and value else shown
-
-
-@dataclass(frozen=True)
-class Option:
-    """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type."""
-
-    default: Any
-    unit: str | type
-    doc: str = ""
-    min: float | None = None
-    max: float | None = None
-
-    @property
-    def kind(self) -> type:
-        return self.unit if isinstance(self.unit, type) else float
-
-    def parse(self, name: str, value: Any) -> Any:
-        """The SI value; raises InvalidValueError for a wrong dimension or a broken bound."""
-        unit = "1" if isinstance(self.unit, type) else self.unit
-        number = parse(name, value, unit, self.kind)
-        if not isinstance(number, str | list):
-            given = value.strip() if isinstance(value, str) else f"{number:g}"
-            if self.min is not None and not number >= self.min:
-                raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
-            if self.max is not None and not number <= self.max:
-                raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
-        return number
 
 
 @dataclass(frozen=True)
@@ -126,17 +91,14 @@ class MeasuredData:
     read: Callable[[System, Path, Mapping[str, str]], Record]
 
 
-class System:
+class System(Configurable):
     """Base class of the systems; see the module for how to declare one."""
 
-    title: ClassVar[str] = ""
-    spec: ClassVar[tuple[str, ...]] = ()
     slots: ClassVar[Mapping[str, Slot]] = {}
     wires: ClassVar[str] = ""
     open: ClassVar[tuple[str, ...]] = ()  # "slot.input" left at its start value on purpose: no note says so
     factors: ClassVar[Mapping[str, float]] = {}  # of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too)
     raw: ClassVar[Mapping[str, Any]] = {}  # "slot.variable" -> start value in the FMU's own unit
-    options: ClassVar[Mapping[str, Option]] = {}
     windows: ClassVar[Windows | None] = None
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
@@ -146,25 +108,21 @@ class System:
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
-    name: str = ""
-    folder: Path | None = None
 
     def __init__(self) -> None:
-        self.name = self.name or type(self).__name__.lower()
-        self.values = {k: o.parse(k, o.default) for k, o in self.options.items()}
+        super().__init__()
         self.overrides: dict[str, Any] = {}  # "slot.parameter" -> value as given
-        self.given: list[str] = []  # names that were set
-
-    def __getitem__(self, option: str) -> Any:
-        """The SI value of an option."""
-        return self.values[option]
 
     def set(self, name: str, value: Any) -> None:
-        """Sets an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""
+        """Set an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""
+        slot, dot, _ = name.partition(".")
         if name in self.options:
-            self.values[name] = self.options[name].parse(name, value)
-        elif "." in name and name.split(".", 1)[0] in self.slots:
+            super().set(name, value)
+        elif slot in self.slots and dot:
             self.overrides[name] = value  # parsed when the part and so the unit is known
+            self._was_given(name)
+        elif dot:
+            raise InvalidValueError(f"{name}: no slot '{slot}'; {suggest_names(slot, self.slots)}")
         else:
             import difflib
 
@@ -173,17 +131,6 @@ class System:
                 f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "
                 f"is written slot.parameter, slots: {', '.join(self.slots)}"
             )
-        if name not in self.given:
-            self.given.append(name)
-
-    def with_values(self, values: Mapping[str, Any]) -> System:
-        """A copy with further values set."""
-        copy = type(self)()
-        copy.__dict__.update({k: v for k, v in vars(self).items() if k in ("name", "folder", "step", "stop")})
-        copy.values, copy.overrides, copy.given = dict(self.values), dict(self.overrides), list(self.given)
-        for name, value in values.items():
-            copy.set(name, value)
-        return copy
 
     # ------------------------------------------------------------ to be given by the system
     def plan(self) -> Plan | LoopPlan:
@@ -247,26 +194,11 @@ class System:
 
 
 def load_system(name: str, bench: Path | None = None) -> System:
-    """The system ``name`` of a bench (see :class:`gyrobench.bench.Bench`) with its default values.
+    """Return the system ``name`` of a bench (see :class:`gyrobench.bench.Bench`) with its default values.
 
-    Raises BenchError when there is no such system, InvalidConfigurationError when its file does not define exactly one
-    System.
+    Raises as :func:`gyrobench.system.configurable.load_configurable`, and UsageError for a suite.
     """
-    folder = Bench.find(bench).system_folder(name)
-    file = folder / "system.py"
-    module_name = f"gyrobench_system_{name}_{zlib.crc32(str(folder.resolve()).encode()):08x}"
-    spec = importlib.util.spec_from_file_location(module_name, file, submodule_search_locations=[str(folder)])
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module
-    spec.loader.exec_module(module)
-    found = [
-        v
-        for v in vars(module).values()
-        if isinstance(v, type) and issubclass(v, System) and v.__module__ == module_name
-    ]
-    if len(found) != 1:
-        raise InvalidConfigurationError(name, [f"{file}: defines {len(found)} subclasses of System, must define one"])
-    system = found[0]()
-    system.name, system.folder = name, folder
+    system = load_configurable(name, bench)
+    if not isinstance(system, System):
+        raise UsageError(f"{name} is a suite of tests; gyrobench show {name} names them")
     return system

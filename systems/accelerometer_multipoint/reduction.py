@@ -33,7 +33,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.window_checks import ReductionError, window_problems
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import closed
 from .geometry import zero_angle
@@ -66,7 +66,7 @@ SOURCES = [
 ]
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     """Coefficients with uncertainties from the windows of a record (columns as in gyrobench.reduction.window_checks,
     SI).
 
@@ -296,7 +296,7 @@ def _warnings(model: Model, s: Setup) -> list[str]:
     return out
 
 
-def _summary(result: Result, found: Findings) -> list[str]:
+def _summary(result: DriftTestResult, found: Findings) -> list[str]:
     by = {c.name.split(" ")[0]: c for c in result.coefficients}
     third = max((c for c in result.coefficients if "/g" in c.unit and "µ" in c.unit), key=lambda c: abs(c.estimate))
     return [
@@ -332,6 +332,6 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     )
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

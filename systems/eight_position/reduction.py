@@ -31,7 +31,7 @@ from gyrobench.reduction.estimation.fit_result import (
 )
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import window_problems
-from gyrobench.result import Coefficient, Result, Specification
+from gyrobench.result import Coefficient, DriftTestResult, Specification
 
 from . import budget, model, positions, refusals, tables
 from .model import Setup
@@ -48,7 +48,7 @@ SOURCES = [
 ]
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     """Coefficients from one day's readings.
 
     windows: position (1..8), cycle, t_start, t_end (s), mean_x, mean_y (A; currents about x and y), flagged_x,
@@ -124,7 +124,7 @@ def averaged(windows: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _short_term(
-    r: Result, channel: str, current: Array, position: NDArray[np.int_], t0: Array, t1: Array, setup: Setup
+    r: DriftTestResult, channel: str, current: Array, position: NDArray[np.int_], t0: Array, t1: Array, setup: Setup
 ) -> None:
     """Allan deviation and spectrum within the positions, from the single readings less their position's mean."""
     k = next(c.estimate for c in r.coefficients if c.name == f"k_{channel}") * units.factor("deg/h/mA")
@@ -139,7 +139,7 @@ def _short_term(
     r.psd = {**psd, "unit": "(°/h)²/Hz"} if psd else {}
 
 
-def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapping[str, float]) -> Result:
+def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapping[str, float]) -> DriftTestResult:
     current, position = np.asarray(data[f"mean_{channel}"], dtype=float), np.asarray(data["position"]).astype(int)
     t0, t1 = (np.asarray(data[n], dtype=float) for n in ("t_start", "t_end"))
     d = model.directions(position, setup.latitude)
@@ -209,7 +209,7 @@ def _conventions(s: Setup) -> list[str]:
     return folded
 
 
-def _summary(each: Mapping[str, Result]) -> list[str]:
+def _summary(each: Mapping[str, DriftTestResult]) -> list[str]:
     c = {c.name: c for r in each.values() for c in r.coefficients}
     worst = max((c[n] for n in ("u_x", "u_y", "u_zx", "u_zy")), key=lambda v: abs(v.estimate))
     return [
@@ -268,7 +268,7 @@ def days_of(record: Record) -> dict[str, dict[str, Array]]:
     return out
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
     setup = setup_of(record.run, specification)
     days = days_of(record)
@@ -280,5 +280,6 @@ def from_record(record: Record, specification: Specification | None = None) -> R
             each[name] = reduce(windows, setup)
         except ReductionError as error:
             raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
-    result = next(iter(each.values())) if len(each) == 1 else repeatability.together(each, specification=specification)
-    return run_metadata.finish(result, record)
+    if len(each) == 1:
+        return run_metadata.finish(next(iter(each.values())), record)
+    return run_metadata.finish(repeatability.combine_days(each, specification=specification), record)

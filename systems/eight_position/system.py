@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -144,7 +144,7 @@ class EightPosition(System):
     def warnings(self) -> list[str]:
         return refusals.near_pole(self["latitude"])
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

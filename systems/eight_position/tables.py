@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.reduction.estimation import repeatability as repeats
-from gyrobench.result import Result
+from gyrobench.result import DriftTestResult
 
 from . import model, positions
 
@@ -69,7 +69,7 @@ def repeatability(
 
 def all_of(
     position: NDArray[np.int_], cycle: NDArray[np.int_], mean: Mapping[str, Array], s: model.Setup,
-    each: Mapping[str, Result],
+    each: Mapping[str, DriftTestResult],
 ) -> list[Table]:  # fmt: skip
     return [
         _positions(position, cycle, mean),
@@ -160,7 +160,7 @@ def _book_fit(position: NDArray[np.int_], mean: Mapping[str, Array], s: model.Se
     }
 
 
-def _coefficients(s: model.Setup, each: Mapping[str, Result]) -> Table:
+def _coefficients(s: model.Setup, each: Mapping[str, DriftTestResult]) -> Table:
     """The same findings as coefficients of gyrobench.drift."""
     c = {c.name: c for r in each.values() for c in r.coefficients}
     g = s.gamma

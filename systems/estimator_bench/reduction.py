@@ -17,7 +17,7 @@ from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import estimator_result
 from gyrobench.reduction.loops.estimator_result import Measures, Signals
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import Response, Result, Series, Specification
+from gyrobench.result import LoopResult, Response, Series, Specification
 
 from .benchmarks import BENCHMARKS
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 SHOWN, COMPARED = 400, 1000  # readings in the pictures
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """The result of a record; raises ReductionError where it cannot be reduced."""
     run = record.run
     known = BENCHMARKS.get(str(run.options.get("benchmark")))
@@ -74,13 +74,13 @@ def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
     return (float(p["source.white"]) * (factor if time[0] >= after else 1.0)) ** 2
 
 
-def _result(m: Measures, s: Signals, title: str, name: str, limits: Specification) -> Result:
+def _result(m: Measures, s: Signals, title: str, name: str, limits: Specification) -> LoopResult:
     for c in m.coefficients:
         c.limit = limits.get(c.name)
         c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
     error, re_raw = m.named(estimator_result.RANKED), m.named("error re raw")
     gain, noise, delay = (m.named(n) for n in ("gain", "noise re raw", "delay"))
-    return Result(
+    return LoopResult(
         system="estimator_bench",
         title="Bench of estimators",
         method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
@@ -97,11 +97,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Specificatio
         ],
         coefficients=m.coefficients,
         series=[picture(s)],
-        correlation=[],
-        condition=1.0,
-        rank=0,
         dof=float(s.time.size),
-        noise={},
         tests=m.tests,
         residual_std=float(np.sqrt(np.mean(m.error**2))),
         residual_unit="1",

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system.connectors import Socket, out
 from gyrobench.system.system import Option, Slot, System
 from gyrobench.system.values import InvalidValueError
@@ -105,7 +105,7 @@ class EstimatorBench(System):
             return [f"samples = {self.samples}, of which {self.skip} are skipped: at least {least} must be left"]
         return []
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -34,7 +34,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.window_checks import window_problems
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import refusals
 
@@ -80,7 +80,7 @@ class Setup:
         return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     """Composite drift of one day: t_start, t_end (s), mean (A) and, optional, flagged.
 
     Raises ReductionError with everything that is wrong with setup or record.
@@ -211,7 +211,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     )
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
     setup = setup_of(record.run, specification)
     day = {row.phase: row.day for row in record.run.plan}
@@ -224,5 +224,6 @@ def from_record(record: Record, specification: Specification | None = None) -> R
             each[name] = reduce(mine, setup)
         except ReductionError as error:
             raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
-    result = next(iter(each.values())) if len(each) == 1 else repeatability.together(each, specification=specification)
-    return run_metadata.finish(result, record)
+    if len(each) == 1:
+        return run_metadata.finish(next(iter(each.values())), record)
+    return run_metadata.finish(repeatability.combine_days(each, specification=specification), record)

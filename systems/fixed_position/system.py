@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.attitude_parser import parse
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -113,7 +113,7 @@ class FixedPosition(System):
             found.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
         return found
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

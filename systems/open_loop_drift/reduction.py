@@ -41,7 +41,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.window_checks import window_problems
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import refusals
 
@@ -136,7 +136,7 @@ def null_angles(theta: Array, between: Array, t: Array, u: Array, setup: Setup) 
     return null, G, cross
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     """Drift from readings: t_start, t_end (s), angle_start, angle_end (rad), mean (V; pickoff), flagged (optional).
 
     Raises ReductionError with everything that is wrong with setup or record.
@@ -260,7 +260,7 @@ def _float_gain(run: RunDocument) -> float:
     return float(parameters["gyro.H"]) / float(parameters["gyro.C"])
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record with its run.json as provenance."""
     run = record.run
     site = run_metadata.Site.of(run)

@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.attitude_parser import parse
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -131,7 +131,7 @@ class OpenLoopDrift(System):
                 found.append(str(error))
         return found + refusals.pickoff_range(self["bracket"], parameters)
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -37,7 +37,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.window_checks import ReductionError, window_problems
-from gyrobench.result import Coefficient, Result, Specification
+from gyrobench.result import Coefficient, DriftTestResult, Specification
 
 from .levels import Levels
 from .refusals import drift_problems, record_problems
@@ -72,7 +72,7 @@ def float_angle(angle: Array, gain: float) -> Array:
     return out
 
 
-def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult:
     """Scale factor, zero, straightness and drift; raises ReductionError with everything that is wrong."""
     s = setup
     problems = window_problems(windows) or record_problems(windows)
@@ -166,7 +166,7 @@ def _effects(found: Findings, s: PickoffSetup, both: bool) -> list[Effect]:
     return effects
 
 
-def _append(result: Result, c: Coefficient) -> None:
+def _append(result: DriftTestResult, c: Coefficient) -> None:
     """One more line in the table; correlation with the others is not given."""
     result.coefficients.append(c)
     n = len(result.correlation)
@@ -225,6 +225,6 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Pi
     )
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

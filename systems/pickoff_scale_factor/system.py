@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench import frames, units
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -153,7 +153,7 @@ class PickoffScaleFactor(System):
             found += range_problems(self["range"], u_max / (k_sg * h / c))
         return found
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

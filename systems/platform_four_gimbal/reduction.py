@@ -10,7 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
@@ -20,7 +20,7 @@ KEPT = 0.01  # deg: up to this the inner element counts as kept
 PITCH, INNER, AZIMUTH, OUTER = "platform.theta[1]", "platform.theta[2]", "platform.theta[3]", "platform.theta_4"
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     holds = [g for g in found.of("hold") if g.label == REST]

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
@@ -160,7 +160,7 @@ class PlatformFourGimbal(System):
             return [f"law = {self['law']} at pitch 90°: the fourth gimbal turns over there (law=sign does not)"]
         return []
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

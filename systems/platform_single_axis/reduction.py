@@ -11,7 +11,7 @@ from gyrobench.reduction.loops.estimator_metrics import Value, rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.run_metadata import number
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 MRAD = 1e-3
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
@@ -33,7 +33,7 @@ def level(y: np.ndarray, stretches: int = 10) -> Value:
     return Value(whole, u, stretches - 1)
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = _ride(found)

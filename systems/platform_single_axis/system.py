@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
@@ -143,7 +143,7 @@ class PlatformSingleAxisLoop(System):
             "stabilizer.K_u?": 1.0 / TORQUER,
         }
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -12,14 +12,14 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 AXES = ("pitch", "roll", "azimuth")
 XYZ = "xyz"
 ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = [_coupling(found), _isolation(found), _ride(found)]

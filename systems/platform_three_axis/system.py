@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
@@ -162,7 +162,7 @@ class PlatformThreeAxis(System):
             found |= {f"{axis}.{n}?": x for n, x in self.stabilizer(inertia).items()}
         return found
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -10,7 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import Gate, cross_axis, drift, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
@@ -19,7 +19,7 @@ COUPLING = 4.0  # Hz, where the coupling between the axes is shown
 DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z of the platform
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     summary = _flight(found)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
@@ -204,7 +204,7 @@ class PlatformThreeGimbal(System):
             )
         return problems
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

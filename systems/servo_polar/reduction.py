@@ -24,7 +24,7 @@ from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.fit_result import Findings, Group, ReductionError, fit, linear_result, plus_minus
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.servo_stand import ATTITUDES, POLAR, attitude
 
 from . import closed, refusals
@@ -35,7 +35,7 @@ DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run, windows = record.run, record.windows
     options = dict(run.options)
@@ -204,7 +204,9 @@ def _turn_differences(
     return [{"title": "Turns less the first turn", "caption": "At the same table angle", "columns": head, "rows": rows}]
 
 
-def _summary(result: Result, statistics: Mapping[str, composite.Composite | str], found: Findings) -> list[str]:
+def _summary(
+    result: DriftTestResult, statistics: Mapping[str, composite.Composite | str], found: Findings
+) -> list[str]:
     first = result.coefficients[0]
     out = [f"Constant drift {first.name} = {plus_minus(first)}."]
     whole = {n: c for n, c in statistics.items() if not isinstance(c, str) and n.startswith("polar")}

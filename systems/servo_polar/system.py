@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
@@ -103,7 +103,7 @@ class ServoPolar(System):
 
         return unseen(self["route"], self.mounts(), self["terms"])
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

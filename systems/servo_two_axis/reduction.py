@@ -33,7 +33,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import budget, closed, geometry, refusals
 from .windows import ANGLES, Track, track
@@ -45,7 +45,7 @@ DPH = units.factor("deg/h")
 REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients of both channels of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run = record.run
     options, site = dict(run.options), run_metadata.Site.of(run)
@@ -72,7 +72,7 @@ def from_record(record: Record, specification: Specification | None = None) -> R
     middle = seen.middle()
     book = closed.reduce(*middle, mount, site.latitude, site.g, site.earth_rate, terms)
     truth = run_metadata.truth_of(run, [n for c in "xy" for n in drift.NAMES_2DOF[c]])
-    results: dict[str, Result] = {}
+    results: dict[str, DriftTestResult] = {}
     found: dict[str, Findings] = {}
     for j, c in enumerate("xy"):
         quantities = [Quantity.drift(n, (truth or {}).get(n), book[n]) for n in drift.terms_2dof(c, terms)]
@@ -135,7 +135,7 @@ def _problems(
 def _channel(
     c: str, j: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: run_metadata.Site,
     run: RunDocument, terms: int, truth: Mapping[str, float] | None, specification: Specification | None,
-) -> Result:  # fmt: skip
+) -> DriftTestResult:  # fmt: skip
     names = drift.terms_2dof(c, terms)
     warnings = []
     missing = [n for n in drift.NAMES_2DOF[c] if n not in names and (truth or {}).get(n, 0.0)]

@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
@@ -102,7 +102,7 @@ class ServoTwoAxis(System):
 
         return cautions(self.mounts(), self["latitude"], self["time"], self.earth_rate(), self["terms"])
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -23,7 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.fit_result import Group, Quantity, ReductionError, fit, linear_result, plus_minus
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.servo_stand import ATTITUDES, attitude
 
 from . import closed, refusals
@@ -33,7 +33,7 @@ DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run, windows = record.run, record.windows
     options = dict(run.options)

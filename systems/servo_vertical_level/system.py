@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench import frames
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
@@ -109,7 +109,7 @@ class ServoVerticalLevel(System):
 
         return unseen(self.attitudes())
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
         from .reduction import from_record
 
         return from_record(record, specification)

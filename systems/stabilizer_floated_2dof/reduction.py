@@ -17,7 +17,7 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 from .closed import Loop
 from .system import loop_of
@@ -33,7 +33,7 @@ CONVENTIONS = [
 ]
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """The Result.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     parameters = record.run.parameters
@@ -238,7 +238,7 @@ def _blow(found: LoopFindings) -> list[str]:
     return [f"After a blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s the loop comes back to rest."]
 
 
-def _summary(result: Result) -> list[str]:
+def _summary(result: LoopResult) -> list[str]:
     c = {c.name: c for c in result.coefficients}
     said = []
     if "θ*" in c and "S" in c:

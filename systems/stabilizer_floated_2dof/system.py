@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import Option, Slot, System
 
@@ -178,7 +178,7 @@ class StabilizerFloated2dof(System):
             )  # fmt: skip
         return []
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

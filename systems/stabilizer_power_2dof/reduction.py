@@ -16,7 +16,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 648000.0
 BASE = "motion.angle[1]"  # of the base, to be added to what the gyro reads against it
@@ -69,7 +69,7 @@ def steady(M: float, H: float, K_m: float, C_y: float) -> float:
     return C_y * M / (H * K_m)
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """The Result.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     p = record.run.parameters
@@ -187,7 +187,7 @@ def _drift(found: LoopFindings, gate: Gate) -> None:
     found.drift(gate, "gyro.alpha", truth=truth, walk=float(p.get("gyro.white_x", 0.0)))
 
 
-def _summary(result: Result) -> list[str]:
+def _summary(result: LoopResult) -> list[str]:
     c = {c.name: c for c in result.coefficients}
     said = []
     if "α*" in c and "K_m" in c:

@@ -13,7 +13,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import ReductionError
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import DPH, LoopFindings
-from gyrobench.result import Response, Result, Specification
+from gyrobench.result import LoopResult, Response, Specification
 
 from . import closed
 from .closed import Axis
@@ -31,7 +31,7 @@ EQUATIONS = {
 }
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """The result of a record.  Raises ReductionError where the load phase is not whole."""
     run = record.run
     kind = str(run.options.get("kind"))

@@ -30,7 +30,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, Result, Series, Specification, Test
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
 from . import marks
 from .estimates import Estimates, Number, of_table, of_windows
@@ -101,7 +101,9 @@ def problems(rows: Mapping[str, Array]) -> list[str]:
     return found
 
 
-def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: Precession | None = None) -> Result:
+def reduce(
+    rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: Precession | None = None
+) -> DriftTestResult:
     """Scale factor, linearity and drift of a torquer from one row for each current; found: of the windows of a run,
     whose estimates then take the place of those from the rows.  Raises ReductionError with everything that is wrong.
     """
@@ -136,7 +138,7 @@ def reduce(rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: 
     gain = np.vstack([e.gain, np.zeros(n)])
     covariance = gain @ e.cofactor @ gain.T
     covariance[5, 5] = 1.0
-    return Result(
+    return DriftTestResult(
         system="torquer_scale_factor",
         title="Scale factor and linearity of a torquer",
         method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
@@ -283,7 +285,7 @@ def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float]
     return truth | ({"K_LS": k / KU} if k3 == 0.0 else {})
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
     options, measured = record.run.options, record.run.measured
     plan = record.run.plan

@@ -26,7 +26,7 @@ from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise_mixture_fit, regression
 from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
 from gyrobench.reduction.window_checks import ReductionError, window_problems
-from gyrobench.result import Coefficient, Result, Specification
+from gyrobench.result import Coefficient, DriftTestResult, Specification
 
 from . import budget, closed
 from .refusals import plan_problems, refusals, setup_problems
@@ -39,7 +39,7 @@ DPH = units.factor("deg/h")
 FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
 
 
-def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
     """Coefficients with uncertainties from the windows of a record (columns of a record, SI; see checks).
 
     Raises ReductionError with everything that is wrong with setup or record.
@@ -221,6 +221,6 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
     ]
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

@@ -34,7 +34,7 @@ from gyrobench.reduction.estimation.fit_result import (
     plus_minus,
 )
 from gyrobench.reduction.window_checks import ReductionError, window_problems
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import closed, geometry
 from .measured import ANGLES
@@ -88,7 +88,7 @@ def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
     return [f"Condition {seen.condition:.3g}: hardly seen is {seen.weakest}."] if seen.condition > 100.0 else []
 
 
-def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult:
     """Coefficients with uncertainties from the windows of a record (SI).
 
     Columns phase (number of the position), t_start, t_end, outer_start, outer_end, inner_start, inner_end, mean.
@@ -367,6 +367,6 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Tw
     )
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

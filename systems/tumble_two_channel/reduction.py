@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation.fit_result import Quantity, fit, linear_resu
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
-from gyrobench.result import Result, Specification
+from gyrobench.result import DriftTestResult, Specification
 
 from . import closed, evidence, geometry
 from .refusals import plan_problems, setup_problems
@@ -40,7 +40,7 @@ DPH = units.factor("deg/h")
 COLUMNS = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean_x", "mean_y")
 
 
-def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> Result:
+def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> DriftTestResult:
     """Coefficients of both channels with uncertainties from the windows of a record (SI).
 
     Columns phase, t_start, t_end, angle_start, angle_end, mean_x, mean_y (A; currents of the torquers about x and y).
@@ -82,7 +82,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> Result:
 def _channel(
     s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, y: Array, current: Array,
     book: Mapping[str, float], fits: Mapping[str, Fit], why: str,
-) -> Result:  # fmt: skip
+) -> DriftTestResult:  # fmt: skip
     names = s.names(c)
     X = design(s, c, turning)
     found = fit(
@@ -236,7 +236,7 @@ def _conventions(s: TwoChannelSetup) -> list[str]:
     ]
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     result = reduce(record.windows, setup_of(record.run, specification))
     return run_metadata.finish(result, record)

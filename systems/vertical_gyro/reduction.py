@@ -13,7 +13,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.result import Response, Result, Specification
+from gyrobench.result import LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
 ARCMIN, DEG = math.pi / 10800.0, math.pi / 180.0
@@ -52,7 +52,7 @@ def erection_time(tilt: float, zone: float, law: str, rate: float, gain: float) 
     return (tilt - bend) / rate + math.log(bend / zone) / gain
 
 
-def from_record(record: Record, specification: Specification | None = None) -> Result:
+def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """The result of a record; raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
     found.warnings.clear()  # there is no loop to be linearized here

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.record import Record
-from gyrobench.result import Result, Specification
+from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import Option, Slot, System
 
@@ -138,7 +138,7 @@ class VerticalGyroBench(System):
             return [f"gyro.H = {gyro:g} and erection.H = {erection:g} N.m.s: the erection must know the gyro's H"]
         return []
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
+    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 
         return from_record(record, specification)

@@ -25,11 +25,11 @@ from gyrobench.record.run_document import (
     read_run,
     schema,
 )
-from gyrobench.system.suite import Suite
+from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import load_system
 
 SCHEMA_FILE = standard_folder() / "reports" / "run.schema.json"
-SYSTEMS = sorted(n for n in Bench(standard_folder()).systems() if not isinstance(load_system(n), Suite))
+SYSTEMS = sorted(n for n in Bench(standard_folder()).systems() if not isinstance(load_test(n), Suite))
 MEASURED = [n for n in SYSTEMS if load_system(n).measured_data is not None]
 WITH_LOOPS = [n for n in SYSTEMS if load_system(n).loops]
 

@@ -11,14 +11,14 @@ from scipy import stats
 
 from gyrobench.reduction.suite import estimable_combinations
 from gyrobench.reduction.suite.consistency import Value, agree, holm, normalized_error, outlier
-from gyrobench.reduction.suite.method_comparison import Member, compare, together
+from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import Coefficient, Result
+from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
 
 NORMAL = 1.959963984540054
 
 
-def result(values: dict[str, tuple[float, float]], dof: float | None = None, **more: Any) -> Result:
+def result(values: dict[str, tuple[float, float]], dof: float | None = None, **more: Any) -> DriftTestResult:
     """A result that reports name -> (estimate, u) in deg/h, uncorrelated."""
     coefficients = [
         Coefficient(n, "", "°/h", x, u, NORMAL, (x - 2 * u, x + 2 * u), u_a=u, dof=dof, combination=made_of.get(n, {}))
@@ -31,12 +31,12 @@ def result(values: dict[str, tuple[float, float]], dof: float | None = None, **m
         "rank": len(coefficients), "dof": 10.0, "noise": {}, "tests": [], "residual_std": 1.0, "residual_unit": "°/h",
         "simulated": False,
     }  # fmt: skip
-    return Result(**{**base, **more})
+    return DriftTestResult(**{**base, **more})
 
 
-def suite(results: dict[str, Result], **more: Any) -> Result:
+def suite(results: dict[str, DriftTestResult], **more: Any) -> SuiteResult:
     members = {n: Member(r) for n, r in results.items()}
-    return together(members, system="x", title="t", method="m", sources=(), **more)
+    return combine_methods(members, system="x", title="t", method="m", sources=(), **more)
 
 
 # ------------------------------------------------------------------------------------------- by hand
@@ -204,7 +204,7 @@ def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
     values = {"a": 1.0, "b": 1.0, "c": 3.0}
     r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, specification=limits)
     f, i = r.coefficients
-    assert r.suite["disagreeing"] == ["D_F"] and r.suite["consistency"] == "inconsistent"
+    assert r.suite.disagreeing == ["D_F"] and r.suite.consistency == "inconsistent"
     assert "c is off by +2 °/h; the others agree" in " ".join(r.summary)
     assert f.u == pytest.approx(agree([Value("", x, 0.2) for x in values.values()]).birge * 0.2 / math.sqrt(3.0))
     assert (f.verdict, i.verdict, r.verdict) == ("inconclusive", "pass", "inconclusive")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from gyrobench.result import BudgetLine, Coefficient, Result, Series, Test
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Test
 
 NAMES = ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_IS", "D_OS"]
 MEANINGS = [
@@ -42,7 +42,9 @@ def gravity(mount: int, theta):
     return 0.0 * one, (-1.0 if mount == 3 else 1.0) * one, 0.0 * one
 
 
-def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool = True, offset: float = 0.0) -> Result:
+def tumble(
+    seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool = True, offset: float = 0.0
+) -> DriftTestResult:
     random = np.random.default_rng(seed)
     truth = TRUTH.copy()
     truth[3] += offset
@@ -171,7 +173,7 @@ def tumble(seed: int = 1, sigma: float = 0.012, windows: int = 72, limits: bool 
     halved = [{"name": n, "change": 1e-7 * i, "u": float(u[i]), "ratio": 1e-7 * i / u[i]} for i, n in enumerate(NAMES)]
     correlation = covariance / np.outer(ua, ua)
     runs = float(random.normal())
-    return Result(
+    return DriftTestResult(
         system="tumble_single_axis",
         title="Single-axis tumble of a floated gyro",
         method=(

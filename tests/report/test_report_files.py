@@ -48,8 +48,12 @@ def test_json_follows_the_published_schema(written):
 
 def test_schema_knows_every_field_of_a_result():
     s = schema()
-    names = {f.name for f in dataclasses.fields(result_module.Result)}
-    assert names <= set(s["properties"])
+    kinds = result_module.KINDS.values()
+    names = {f.name for kind in kinds for f in dataclasses.fields(kind)}
+    assert {*names, "kind", "schema", "report_id", "derived"} == set(s["properties"])
+    assert set(s["properties"]["kind"]["enum"]) == set(result_module.KINDS)
+    for kind in kinds:
+        assert set(result_module.ABSENT) >= names - {f.name for f in dataclasses.fields(kind)}, kind
     for key, cls in (("coefficient", "Coefficient"), ("series", "Series"), ("test", "Test"), ("budget", "BudgetLine")):
         fields = {f.name for f in dataclasses.fields(getattr(result_module, cls))}
         assert fields == set(s["$defs"][key]["properties"]), key
@@ -88,6 +92,17 @@ def test_a_result_comes_back_from_json(written):
     again = report.load(written.paths["json"].read_text(encoding="utf-8"))
     assert document(again) == document(r)
     assert report.report_id(again) == report.report_id(r) == written.json["report_id"]
+
+
+def test_each_kind_of_result_comes_back_as_that_kind(written):
+    text = written.paths["json"].read_text(encoding="utf-8")
+    assert written.json["kind"] == "drift_test" and isinstance(report.load(text), result_module.DriftTestResult)
+    older = {k: v for k, v in json.loads(text).items() if k != "kind"}  # a file of before there were kinds
+    assert isinstance(report.load(json.dumps(older)), result_module.DriftTestResult)
+    with pytest.raises(report.ResultError, match=r"missing or unknown fields: .*mood"):
+        report.load(json.dumps({**older, "mood": 1}))
+    with pytest.raises(TypeError, match="a result is a DriftTestResult, a LoopResult or a SuiteResult"):
+        result_module.Result(system="", title="", method="", sources=[], conventions=[], coefficients=[])
 
 
 def test_load_refuses_other_json():
@@ -210,9 +225,10 @@ def test_measured_data_has_no_truth(tmp_path):
 def test_a_bare_result_makes_a_report(tmp_path):
     """Nothing but coefficients: every optional part is left out, none is shown empty."""
     full = tumble(windows=12)
-    r = result_module.Result(
-        "torquer", "Torquer scale factor", "method", [], "", [], full.coefficients[:1], [], [[1.0]], 1.0, 1, 0.0,
-        {}, [], 0.0, "°/h",
+    r = result_module.DriftTestResult(
+        system="torquer", title="Torquer scale factor", method="method", sources=[], conventions=[],
+        coefficients=full.coefficients[:1], series=[], correlation=[[1.0]], condition=1.0, rank=1, dof=0.0, noise={},
+        residual_std=0.0, residual_unit="°/h",
     )  # fmt: skip
     w = Written(report.write(r, tmp_path))
     jsonschema.validate(w.json, schema())

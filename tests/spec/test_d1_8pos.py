@@ -262,7 +262,7 @@ def test_days_together() -> None:
         for c in "xy":
             w[f"mean_{c}"] = w[f"mean_{c}"] + rng.normal(size=48) * 0.003 * DPH / p[f"k_{c}"]
         each[f"{day + 1}"] = R.reduce(w, setup(phi))
-    result = repeatability.together(each)
+    result = repeatability.combine_days(each)
     c = named(result)["R_x"]
     values = [named(r)["R_x"].estimate for r in each.values()]
     assert c.estimate == pytest.approx(np.mean(values))
@@ -276,7 +276,7 @@ def test_days_together() -> None:
     assert table["rows"][5][2] == pytest.approx(np.std(values, ddof=1))
     json.dumps(result.as_dict(), allow_nan=False)
     with pytest.raises(R.ReductionError, match="at least two"):
-        repeatability.together({"1": each["1"]})
+        repeatability.combine_days({"1": each["1"]})
 
 
 # ------------------------------------------------------------------------------------------ uncertainty

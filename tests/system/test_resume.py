@@ -191,7 +191,7 @@ def test_time_left_is_that_of_this_process() -> None:
     # resumed at 800 of 1000 s; 100 s of simulated time took 5 s, so the other 100 s take 5 s
     status = Status(time=900.0, total=1000.0, steps=100_000, windows=0, rate=2e4, elapsed=5.0, since=800.0)
     assert status.eta == pytest.approx(5.0)
-    assert progress_display.words(status) == "t = 900 of 1,000 s, 20,000 steps/s, 5 s left"
+    assert progress_display.format_status(status) == "t = 900 of 1,000 s, 20,000 steps/s, 5 s left"
 
 
 # ------------------------------------------------------------------------------- the command, killed processes
@@ -222,14 +222,14 @@ def command(words: list[str], capture: Any, patch: pytest.MonkeyPatch) -> tuple[
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
 
-    def interrupt(self: progress_display.Meter, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
         if status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
     code, out, err = command([*WORDS, "--resume", "--out", "r"], capsys, monkeypatch)
     assert code == 2 and "--resume: nothing to continue in r: no checkpoint of a run with these parts and values" in err
     with monkeypatch.context() as patch:
-        patch.setattr(progress_display.Meter, "__call__", interrupt)
+        patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         code, out, err = command([*WORDS, "--out", "r"], capsys, monkeypatch)
     assert code == 130 and out == "" and "the same command with --resume continues it" in err
     assert not Record.load(tmp_path / "r").complete
@@ -247,7 +247,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
 
     # a whole record is never replaced by half of one: the checkpoint is beside it too, and found there
     with monkeypatch.context() as patch:
-        patch.setattr(progress_display.Meter, "__call__", interrupt)
+        patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         assert command([*WORDS, "--out", "r"], capsys, monkeypatch)[0] == 130
     assert (tmp_path / "r-incomplete" / FILE).is_file() and Record.load(tmp_path / "r").complete
     assert command([*WORDS, "--out", "r", "--resume"], capsys, monkeypatch)[0] == 0

@@ -156,7 +156,7 @@ def test_values_are_refused_with_a_hint(small: System) -> None:
         ({"gyro.mount": 3}, "gyro.mount: is an array"),
         ({"gyro.seed": 1.5}, "must be an integer"),
         ({"gyro.H": math.nan}, "must be finite"),
-        ({"step.": 0}, "no such option"),
+        ({"step.": 0}, "no slot 'step'"),
     ):
         with pytest.raises(InvalidValueError, match=words):
             run(small, values=values)

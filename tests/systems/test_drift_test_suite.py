@@ -16,9 +16,9 @@ import two_channels
 from servoing import DAY50, DPH, W50
 
 from gyrobench.engine.session import Session
-from gyrobench.reduction.suite.method_comparison import Member, compare, together
-from gyrobench.system.suite import Suite
-from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
+from gyrobench.system.suite import Suite, load_test
+from gyrobench.system.system import InvalidConfigurationError
 from gyrobench.system.values import InvalidValueError
 
 NAME = "drift_test_suite"
@@ -43,7 +43,7 @@ def sessions() -> Iterator[dict[str, Session]]:
 
 
 def suite(tests: str, **values: Any) -> Suite:
-    found = load_system(NAME)
+    found = load_test(NAME)
     assert isinstance(found, Suite)
     found.set("tests", tests)
     for name, value in values.items():
@@ -67,7 +67,7 @@ def results(
 
 def report(found: dict[str, Any], chosen: Suite) -> Any:
     members = {n: Member(r) for n, r in found.items()}
-    return together(members, system=NAME, title="", method="", sources=(), shared=chosen.shared)
+    return combine_methods(members, system=NAME, title="", method="", sources=(), shared=chosen.shared)
 
 
 def floated(seed: int, tests: str, **more: Any) -> tuple[Suite, dict[str, float]]:
@@ -82,14 +82,14 @@ def test_tumble_and_polar_servo_agree(sessions: dict[str, Session], seed: int) -
     """[CROSS-MAP], noise on: two tables, two loops, one with the torquer and one without it; all nine coefficients."""
     chosen, true = floated(seed, "tumble_single_axis servo_polar")
     found = report(results(sessions, chosen, seed), chosen)
-    assert found.suite["consistency"] == "consistent"
-    names = [q["name"] for q in found.suite["quantities"]]
-    assert names == [p["quantity"] for p in found.suite["pairs"]] and set(names) == set(true)
-    assert sum(p["E_n"] > 1.0 for p in found.suite["pairs"]) <= 2  # 9 pairs, 5 % each
+    assert found.suite.consistency == "consistent"
+    names = [q["name"] for q in found.suite.quantities]
+    assert names == [p["quantity"] for p in found.suite.pairs] and set(names) == set(true)
+    assert sum(p["E_n"] > 1.0 for p in found.suite.pairs) <= 2  # 9 pairs, 5 % each
     for c in found.coefficients:
         assert c.truth == pytest.approx(true[c.name] / DPH, rel=1e-9)
         assert abs(c.estimate - c.truth) < 4.0 * c.u
-    for p in found.suite["pairs"]:
+    for p in found.suite.pairs:
         assert abs(p["difference"]) < 2.0 * p["U"]
 
 
@@ -113,14 +113,14 @@ def test_composite_drift_and_three_more_methods(sessions: dict[str, Session]) ->
         **{"fixed_position.attitude": "N -E"},
     )  # fmt: skip
     found = report(results(sessions, chosen, 8), chosen)
-    by_name = {q["name"]: [v["label"] for v in q["values"]] for q in found.suite["quantities"]}
+    by_name = {q["name"]: [v["label"] for v in q["values"]] for q in found.suite.quantities}
     assert by_name["D_IS"] == ["tumble_single_axis", "tumble_two_axis"]  # six attitudes with one axis vertical
     assert by_name["D_II"] == ["tumble_single_axis", "tumble_two_axis", "servo_vertical_level"]
     assert by_name["ω_d"] == [*by_name["D_F"][:2], "fixed_position", "servo_vertical_level"]
-    drift = next(q for q in found.suite["quantities"] if q["name"] == "ω_d")
+    drift = next(q for q in found.suite.quantities if q["name"] == "ω_d")
     # input axis north, output axis west, spin axis up: X = Y = 0, Z = -f/g0 = -gamma
     assert drift["combination"]["D_S"] == pytest.approx(-1.0, abs=1e-3) and "D_IS" not in drift["combination"]
-    assert found.suite["consistency"] == "consistent"
+    assert found.suite.consistency == "consistent"
 
 
 def test_both_channels_by_tumble_and_eight_positions(sessions: dict[str, Session]) -> None:
@@ -142,8 +142,8 @@ def test_both_channels_by_tumble_and_two_axis_servo(sessions: dict[str, Session]
     true = two_channels.gyro(np.random.default_rng(6))
     chosen = suite("tumble_two_channel servo_two_axis", **true, **{"gyro.markov_tau": 3.0})
     found = report(results(sessions, chosen, 6), chosen)
-    assert found.suite["consistency"] == "consistent"
-    assert len(found.suite["pairs"]) == 18 and sum(p["E_n"] > 1.0 for p in found.suite["pairs"]) <= 3
+    assert found.suite.consistency == "consistent"
+    assert len(found.suite.pairs) == 18 and sum(p["E_n"] > 1.0 for p in found.suite.pairs) <= 3
     for c in found.coefficients:
         assert c.truth == pytest.approx(true[f"gyro.{c.name}"] / DPH, rel=1e-9, abs=1e-15)
         assert abs(c.estimate - c.truth) < 4.0 * c.u
@@ -156,9 +156,9 @@ def test_a_gyro_that_changed_in_one_test_is_found(sessions: dict[str, Session], 
     other = true[name] + 0.5 * DPH
     chosen.set(f"{culprit}.gyro.{name}", other)
     found = report(results(sessions, chosen, 3), chosen)
-    assert found.suite["consistency"] == "inconsistent"
-    assert name in found.suite["disagreeing"]
-    words = next(q["words"] for q in found.suite["quantities"] if q["name"] == name)
+    assert found.suite.consistency == "inconsistent"
+    assert name in found.suite.disagreeing
+    words = next(q["words"] for q in found.suite.quantities if q["name"] == name)
     assert words.startswith(f"{culprit} is off by +0.5 °/h/g; the others agree")
     assert any(f"gyro.{name} = " in w and "Not the same in all tests" in w for w in found.warnings)
 
@@ -173,9 +173,9 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     chosen, true = floated(3, tests, k=1.1 * right, u_scale_factor=0.1)
     found = results(sessions, chosen, 3)
     together = report(found, chosen)
-    assert together.suite["consistency"] == "consistent" and together.suite["shared"] == ["torquer scale factor"]
+    assert together.suite.consistency == "consistent" and together.suite.shared == ["torquer scale factor"]
     name = max(("D_I", "D_S"), key=lambda n: abs(true[n]))
-    row = next(q for q in together.suite["quantities"] if q["name"] == name)
+    row = next(q for q in together.suite.quantities if q["name"] == name)
     for v in row["values"][:2]:
         assert v["estimate"] == pytest.approx(1.1 * true[name] / DPH, rel=0.02)
         assert v["u_shared"] == pytest.approx(0.1 * abs(v["estimate"]), rel=0.02)
@@ -185,8 +185,8 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
 
     blind, _ = floated(3, tests, k=1.1 * right)
     apart = report(results(sessions, blind, 3), blind)
-    assert name in apart.suite["disagreeing"]
-    words = next(q["words"] for q in apart.suite["quantities"] if q["name"] == name)
+    assert name in apart.suite.disagreeing
+    words = next(q["words"] for q in apart.suite.quantities if q["name"] == name)
     assert words.startswith("servo_polar is off by")  # what an unstated common error does
 
 
@@ -194,7 +194,7 @@ def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> N
     chosen, true = floated(3, "tumble_single_axis servo_polar")
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)
     found = report(results(sessions, chosen, 3), chosen)
-    words = next(q["words"] for q in found.suite["quantities"] if q["name"] == "D_I")
+    words = next(q["words"] for q in found.suite.quantities if q["name"] == "D_I")
     assert "disagree: E_n of tumble_single_axis and servo_polar" in words and "cannot be told" in words
     assert next(c for c in found.coefficients if c.name == "D_I").truth is None  # there are two
 
@@ -226,6 +226,7 @@ def test_seeds_differ_from_test_to_test() -> None:
             r"not of one gyro: tumble_single_axis: floated_gyro \(SdfGyro\); tumble",
         ),
         ("tumble_single_axis accelerometer_multipoint", "accelerometer_multipoint: no slot gyro"),
+        ("tumble_single_axis stabilizer_sdf", "stabilizer_sdf: a test of a loop; a suite compares drift tests"),
         ("tumble_single_axis servo_pole", "no test 'servo_pole'; did you mean servo_polar"),
         ("tumble_single_axis drift_test_suite", "no test 'drift_test_suite'"),
         ("servo_polar servo_polar", "servo_polar: named twice"),

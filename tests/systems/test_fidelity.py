@@ -15,6 +15,7 @@ from servoing import DAY50
 from servoing_two_axes import day
 
 from gyrobench.engine.session import run
+from gyrobench.system.suite import load_test
 from gyrobench.system.system import load_system
 
 ERU = 7.2921159e-5
@@ -71,5 +72,5 @@ def test_dynamic_is_quasi_static(name: str) -> None:
 def test_every_method_is_here() -> None:
     from gyrobench.bench import Bench, standard_folder
 
-    methods = {n for n in Bench(standard_folder()).systems() if getattr(load_system(n), "measured_data", None)}
+    methods = {n for n in Bench(standard_folder()).systems() if getattr(load_test(n), "measured_data", None)}
     assert methods == set(CASES)

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.system.system import load_system
+from gyrobench.system.suite import load_test
 
 Command = Callable[..., tuple[int, str, str]]
 SYSTEMS = sorted(Bench(standard_folder()).systems())
-TAKING = [n for n in SYSTEMS if getattr(load_system(n), "measured_data", None)]
+TAKING = [n for n in SYSTEMS if getattr(load_test(n), "measured_data", None)]
 
 
 def test_every_test_method_takes_records() -> None:

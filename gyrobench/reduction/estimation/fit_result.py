@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, Result, Specification
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 
 __all__ = ["Effect", "Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
 
@@ -56,7 +56,7 @@ def linear_result(
     no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
     harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
-) -> Result:  # fmt: skip
+) -> DriftTestResult:  # fmt: skip
     """The result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
 
     equation: Typst math.  conventions, warnings, summary: sentences.  specification: name -> limits in the printed
@@ -71,7 +71,7 @@ def linear_result(
         said.append(f"No closed formulas: {no_closed}.")
     if design.condition > CONDITION:
         said.append(f"Condition {design.condition:.3g}: hardly seen is {design.weakest}.")
-    return Result(
+    return DriftTestResult(
         system=system,
         title=title,
         method=method,

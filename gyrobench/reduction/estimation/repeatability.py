@@ -22,7 +22,7 @@ from scipy import special
 
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, Result, Series, Specification, Test
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,9 @@ def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float
     return q, float(special.chdtrc(x.size - 1, q))
 
 
-def together(results: Mapping[str, Result], what: str = "day", specification: Specification | None = None) -> Result:
+def combine_days(
+    results: Mapping[str, DriftTestResult], what: str = "day", specification: Specification | None = None
+) -> DriftTestResult:
     """One result of repeats (name of the day -> its result) with the same coefficients.
 
     Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common
@@ -167,7 +169,7 @@ def _correlation(table: Array) -> list[list[float]]:
     return found
 
 
-def _table(days: list[str], parts: list[Result], table: Array, what: str) -> dict[str, Any]:
+def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: str) -> dict[str, Any]:
     """Like Table 3-1: a row for each day, then mean and standard deviation; under it the days' own u of type A."""
     each = [statistics(column) for column in table.T.tolist()]
     own = [float(np.sqrt(np.mean([(r.coefficients[j].u_a or 0.0) ** 2 for r in parts]))) for j in range(len(each))]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from gyrobench.result import NO_VERDICT
+
 NORMAL = 1.959963984540054
 DECISION_RULE = (
     "Guard band equal to the expanded uncertainty U (95 %): pass when estimate ± U lies inside the limits, fail when "
@@ -25,7 +27,7 @@ def combine(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[
 def verdict(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:
     """pass, fail, inconclusive or "no specification given" by :data:`DECISION_RULE`; None is an open side."""
     if limit is None or limit == (None, None):
-        return "no specification given"
+        return NO_VERDICT
     low = -math.inf if limit[0] is None else limit[0]
     high = math.inf if limit[1] is None else limit[1]
     if not math.isfinite(estimate) or not math.isfinite(U):
@@ -41,4 +43,4 @@ def overall(verdicts: Iterable[str]) -> str:
     for word in ("fail", "inconclusive", "pass"):
         if word in given:
             return word
-    return "no specification given"
+    return NO_VERDICT

@@ -35,7 +35,7 @@ from gyrobench.reduction.loops.loop_measures import (
     scatter,
     step,
 )
-from gyrobench.result import Coefficient, Response, Result, Specification
+from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
@@ -304,13 +304,13 @@ class LoopFindings:
         instrument: str = "",
         ranked_by: str = "",
         specification: Specification | None = None,
-    ) -> Result:
+    ) -> LoopResult:
         """The Result with all that was collected; limits of the specification are applied by coefficient name."""
         for c in self.coefficients if specification else ():
             c.limit = (specification or {}).get(c.name, c.limit)
             c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
         run = self.record.run
-        result = Result(
+        result = LoopResult(
             system=run.system,
             title=title,
             method=method,
@@ -318,15 +318,6 @@ class LoopFindings:
             equation=equation,
             conventions=list(conventions),
             coefficients=self.coefficients,
-            series=[],
-            correlation=[],  # measures of their own, no common regression
-            condition=0.0,
-            rank=0,
-            dof=0.0,
-            noise={},
-            tests=[],
-            residual_std=0.0,
-            residual_unit="1",
             allan=self.allan,
             tables=self.tables,
             warnings=self.warnings,

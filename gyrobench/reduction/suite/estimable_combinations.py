@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, units
 from gyrobench.reduction.suite.consistency import Value
-from gyrobench.result import Coefficient, Result
+from gyrobench.result import Coefficient, DriftTestResult
 
 Array = NDArray[np.float64]
 MODEL = {n for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
@@ -64,7 +64,7 @@ def _shown(c: Coefficient) -> Compared:
     return Compared(c.name, c.unit, c.meaning, made_of)
 
 
-def quantities(results: Mapping[str, Result]) -> list[Compared]:
+def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
     """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
     each: list[tuple[Compared, str]] = []
     for label, result in results.items():
@@ -86,7 +86,7 @@ def quantities(results: Mapping[str, Result]) -> list[Compared]:
     return sorted(found, key=rank)
 
 
-def weights(quantity: Compared, result: Result) -> Array | None:
+def weights(quantity: Compared, result: DriftTestResult) -> Array | None:
     """c (q,) of quantity = c' estimates; None where the test does not see it."""
     made_of = [combination(c) for c in result.coefficients]
     for j, own in enumerate(made_of):
@@ -104,7 +104,7 @@ def weights(quantity: Compared, result: Result) -> Array | None:
     return np.asarray(np.where(np.abs(c) < CLOSE * np.max(np.abs(c)), 0.0, c), dtype=float)
 
 
-def value(label: str, quantity: Compared, result: Result, shared: Collection[str]) -> Value | None:
+def value(label: str, quantity: Compared, result: DriftTestResult, shared: Collection[str]) -> Value | None:
     """What the test says of the quantity; None where it does not see it.  shared: sources of type B of all tests."""
     c = weights(quantity, result)
     if c is None:
@@ -133,6 +133,6 @@ def value(label: str, quantity: Compared, result: Result, shared: Collection[str
     return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
 
 
-def ideal(result: Result) -> bool:
+def ideal(result: DriftTestResult) -> bool:
     """Noise was off: residuals are rounding and u means nothing."""
     return all(c.truth is not None and c.z is None for c in result.coefficients) and bool(result.coefficients)

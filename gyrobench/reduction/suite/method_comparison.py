@@ -1,9 +1,9 @@
 """Several tests of one instrument as one result: every quantity by every method that sees it.
 
-    together({"tumble_single_axis": Member(result, ...), "servo_polar": Member(...)}, shared=("torquer scale factor",))
+    combine_methods({"servo_polar": Member(result, ...), "tumble_single_axis": Member(...)}, shared=("latitude",))
 
-``Result.coefficients`` are the weighted means (the one value, where only one method sees a quantity); ``Result.suite``
-holds what the report's cross-method tables show, numbers in printed units.  [CROSS-MAP;
+``SuiteResult.coefficients`` are the weighted means (the one value, where only one method sees a quantity);
+``SuiteResult.suite`` holds what the report's cross-method tables show, numbers in printed units.  [CROSS-MAP;
 gyrobench.reduction.suite.consistency]
 """
 
@@ -22,7 +22,14 @@ from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, Value
 from gyrobench.reduction.suite.estimable_combinations import Compared
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import Coefficient, Result, Specification, Test
+from gyrobench.result import (
+    Coefficient,
+    DriftTestResult,
+    Specification,
+    SuiteComparison,
+    SuiteResult,
+    Test,
+)
 
 FAMILIES = {
     "single-degree-of-freedom gyro": drift.NAMES,
@@ -40,7 +47,7 @@ RULE = (
 class Member:
     """A test of the suite: its result, and where its run is kept with facts for the report."""
 
-    result: Result
+    result: DriftTestResult
     test: SuiteTestRun = field(default_factory=lambda: SuiteTestRun(folder="", report_id=""))
 
 
@@ -83,7 +90,7 @@ class Compare:
         return f"disagree: {', '.join(f'E_n of {x}' for x in far) or 'all of them a little'}{which}"
 
 
-def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Compare]:
+def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[Compare]:
     """Every quantity that the results report, by every one that sees it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
@@ -100,13 +107,13 @@ def compare(results: Mapping[str, Result], shared: Collection[str]) -> list[Comp
     return out
 
 
-def common(results: Mapping[str, Result], shared: Collection[str]) -> list[str]:
+def common(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[str]:
     """Those of the sources ``shared`` that two results or more name."""
     named = [{b["source"] for b in r.type_b} for r in results.values()]
     return sorted(s for s in set(shared) if sum(s in sources for sources in named) > 1)
 
 
-def problems(results: Mapping[str, Result]) -> list[str]:
+def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
     """Why the results are not of one instrument, as sentences."""
     found = []
     families: dict[str, list[str]] = {}
@@ -131,7 +138,7 @@ def problems(results: Mapping[str, Result]) -> list[str]:
     return found
 
 
-def differences(results: Mapping[str, Result], slots: Sequence[str] = ("gyro", "accelerometer")) -> list[str]:
+def differences(results: Mapping[str, DriftTestResult], slots: Sequence[str] = ("gyro", "accelerometer")) -> list[str]:
     """Where the simulated instrument was not the same in all tests, as sentences."""
     said: dict[str, dict[str, list[str]]] = {}
     for label, r in results.items():
@@ -154,11 +161,11 @@ def differences(results: Mapping[str, Result], slots: Sequence[str] = ("gyro", "
     ]
 
 
-def together(
+def combine_methods(
     members: Mapping[str, Member], *, system: str, title: str, method: str, sources: Sequence[str],
     conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Specification | None = None,
     failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
-) -> Result:  # fmt: skip
+) -> SuiteResult:  # fmt: skip
     """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
 
     failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
@@ -177,32 +184,29 @@ def together(
         if c.found is not None
     ]
     sites = [r.site for r in results.values()]
-    out = Result(
-        system=system, title=title, method=method, sources=list(sources), equation="",
-        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
-        coefficients=coefficients, series=[], correlation=[], condition=math.nan, rank=len(coefficients), dof=math.nan,
-        noise={}, tests=tests, residual_std=math.nan, residual_unit=first.residual_unit,
-        decision_rule=uncertainty.DECISION_RULE, verdict=uncertainty.overall(c.verdict for c in coefficients),
-        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
-        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
-        simulated=first.simulated, provenance=dict(provenance or {}),
-    )  # fmt: skip
-    out.suite = {
-        "rule": RULE,
-        "shared": common(results, shared),
-        "members": [_member(label, m) for label, m in members.items()],
-        "failed": [{"label": n, "reason": why} for n, why in (failed or {}).items()],
-        "quantities": [_row(c) for c in compared],
-        "pairs": [
+    comparison = SuiteComparison(
+        rule=RULE,
+        shared=common(results, shared),
+        members=[_member(label, m) for label, m in members.items()],
+        failed=[{"label": n, "reason": why} for n, why in (failed or {}).items()],
+        quantities=[_row(c) for c in compared],
+        pairs=[
             {"quantity": c.quantity.name, "unit": c.quantity.unit, "a": p.a, "b": p.b, "difference": p.difference,
              "U": p.U, "E_n": p.E_n}
             for c in compared if c.found is not None for p in c.found.pairs
         ],
-        **_verdict(compared),
-    }  # fmt: skip
-    out.summary = _summary(out, compared)
-    out.warnings = _warnings(results, compared, failed or {})
-    return out
+        **_consistency(compared),
+    )  # fmt: skip
+    return SuiteResult(
+        system=system, title=title, method=method, sources=list(sources),
+        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
+        coefficients=coefficients, tests=tests, decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
+        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
+        simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
+        summary=_summary(comparison, compared), warnings=_warnings(results, compared, failed or {}),
+    )  # fmt: skip
 
 
 def _coefficient(c: Compare, limits: Specification) -> Coefficient:
@@ -265,7 +269,7 @@ def _member(label: str, m: Member) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _verdict(compared: Sequence[Compare]) -> dict[str, Any]:
+def _consistency(compared: Sequence[Compare]) -> dict[str, Any]:
     tested = [c for c in compared if c.p is not None]
     bad = [c for c in tested if c.disagree]
     pairs = [p for c in tested if c.found for p in c.found.pairs]
@@ -278,21 +282,23 @@ def _verdict(compared: Sequence[Compare]) -> dict[str, Any]:
     }
 
 
-def _summary(r: Result, compared: Sequence[Compare]) -> list[str]:
-    s, many = r.suite, len(r.suite["pairs"])
-    if s["consistency"] == "not tested":
+def _summary(suite: SuiteComparison, compared: Sequence[Compare]) -> list[str]:
+    if suite.consistency == "not tested":
         return ["No quantity is seen by two methods with a noise of their own: nothing was compared."]
-    agreed = f"The methods agree wherever two or more see the same ({s['tested']} of {len(compared)} quantities)"
-    apart = f"The methods do not agree about {', '.join(s['disagreeing'])}"
-    first = agreed if s["consistency"] == "consistent" else apart
+    many = len(suite.pairs)
+    agreed = f"The methods agree wherever two or more see the same ({suite.tested} of {len(compared)} quantities)"
+    apart = f"The methods do not agree about {', '.join(suite.disagreeing)}"
+    first = agreed if suite.consistency == "consistent" else apart
     return [
-        f"{first}; smallest adjusted p = {s['p']:.2g}.",
+        f"{first}; smallest adjusted p = {suite.p or 0.0:.2g}.",
         *(f"{c.quantity.name}: {c.words()}." for c in compared if c.disagree),
-        f"E_n > 1 in {s['pairs_apart']} of {many} pairs; about {0.05 * many:.2g} would be by chance.",
+        f"E_n > 1 in {suite.pairs_apart} of {many} pairs; about {0.05 * many:.2g} would be by chance.",
     ]
 
 
-def _warnings(results: Mapping[str, Result], compared: Sequence[Compare], failed: Mapping[str, str]) -> list[str]:
+def _warnings(
+    results: Mapping[str, DriftTestResult], compared: Sequence[Compare], failed: Mapping[str, str]
+) -> list[str]:
     out = [f"{label} gave no result: {why}" for label, why in failed.items()]
     out += differences(results)
     sites = {label: str(r.site) for label, r in results.items()}
@@ -313,6 +319,6 @@ def _warnings(results: Mapping[str, Result], compared: Sequence[Compare], failed
     return out
 
 
-def _shared(result: Result, results: Mapping[str, Result]) -> list[str]:
+def _shared(result: DriftTestResult, results: Mapping[str, DriftTestResult]) -> list[str]:
     """Conventions that all tests state alike."""
     return [s for s in result.conventions if all(s in r.conventions for r in results.values())]

@@ -1,0 +1,140 @@
+"""The report of a suite: from the tests it has just run, from its folder, or from runs that exist."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.commands import console
+from gyrobench.commands.inputs import find_specification, load_limits
+from gyrobench.commands.run_folders import prepare_folder, short_names
+from gyrobench.commands.saved_run import write_report
+from gyrobench.commands.user_errors import record_kept
+from gyrobench.record.run_document import FILE as RUN
+from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
+from gyrobench.reduction.suite.method_comparison import Member, combine_methods
+from gyrobench.result import DriftTestResult
+from gyrobench.system.suite import Suite
+
+
+def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
+    """Return what run.json says of a suite before its tests."""
+    from gyrobench.engine.session import package_versions
+
+    return SuiteDocument(
+        **identity,
+        title=suite.title,
+        date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        options=dict(suite.values),
+        changed={n: str(suite.passed.get(n, suite.values.get(n))) for n in (*suite.given, *suite.passed)},
+        versions=dict(package_versions()),
+        **{n: suite[n] for n in suite.about if n in suite.options and suite[n]},
+    )
+
+
+def reduce(suite: Suite, runs: Sequence[Path], spec: str | None, out: Path | None, force: bool, as_json: bool) -> str:
+    """Write and print the report of a suite from runs that exist, simulated or measured; return the verdict."""
+    if suite.passed:
+        raise UsageError(
+            f"--set {next(iter(suite.passed))}: the tests have been run; options: {', '.join(suite.about)}"
+        )
+    if len(runs) < 2:
+        raise UsageError("name the runs, two or more: --data RUN --data RUN; a folder with a result.json each")
+    for folder in runs:
+        if not (folder / "result.json").is_file():
+            saved = f"gyrobench report {folder} makes it"
+            hint = saved if (folder / RUN).is_file() else "a measured record becomes a run by gyrobench reduce"
+            raise UsageError(f"--data {folder}: no result.json there; {hint}")
+    systems = [str(json.loads((f / "result.json").read_text(encoding="utf-8"))["system"]) for f in runs]
+    labels = short_names(runs)
+    names = [s if systems.count(s) == 1 else f"{s} {label}" for s, label in zip(systems, labels, strict=True)]
+    file = find_specification(spec)
+    digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
+    identity = {"system": suite.name, "runs": names}
+    folder = prepare_folder(out or Bench.find().out / suite.name / f"runs-{digest}", identity, force)
+    document = suite_document(suite, identity)
+    paths = [os.path.relpath(f.resolve(), folder.resolve()) for f in runs]
+    document.tests = {name: SuiteTestRun(folder=path) for name, path in zip(names, paths, strict=True)}
+    document.complete = True
+    return write_suite_report(suite, folder, document, file, as_json)
+
+
+def report(folder: Path, suite: Suite, spec: str | None, as_json: bool = False) -> str:
+    """Write and print the report of a suite again, from the results of its tests; return the verdict."""
+    document = read_run(folder)
+    if not isinstance(document, SuiteDocument) or not document.tests:
+        raise RecordError(f"{folder}: the suite did not end; the same run command with --resume goes on")
+    for name in suite.options:
+        if name in document.options:
+            suite.set(name, document.options[name])
+    return write_suite_report(suite, folder, document, find_specification(spec), as_json)
+
+
+def write_suite_report(suite: Suite, folder: Path, document: SuiteDocument, spec: Path | None, as_json: bool) -> str:
+    """Write run.json and the report, print the result; return the verdict, fail too where methods disagree."""
+    members = {n: _load_member(folder / test.folder, test.folder) for n, test in document.tests.items()}
+    document.tests = {n: member.test for n, member in members.items()}
+    for name in suite.about:  # what the suite is not told the tests may say
+        texts = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
+        if text := suite[name] or "; ".join(filter(None, texts)):
+            setattr(document, name, text)
+    limits = load_limits(spec)
+    with record_kept(folder, lambda: document.write(folder)):
+        result = combine_methods(
+            members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
+            conventions=suite.conventions, shared=suite.shared, specification=limits,
+            failed=document.failed, provenance=document.as_dict(),
+        )  # fmt: skip
+        if suite["instrument"]:
+            result.instrument = suite["instrument"]
+    document.write(folder)
+    with record_kept(folder):
+        paths = write_report(result, folder, None, spec)
+    console.print_report_files(paths, None if as_json else console.format_suite_result(result))
+    return "fail" if result.suite.consistency == "inconsistent" else result.verdict
+
+
+def _load_member(folder: Path, label: str) -> Member:
+    """Return a test of a suite from its folder.  Raises RecordError for a result that cannot be read."""
+    from gyrobench.report import load
+
+    file = folder / "result.json"
+    try:
+        text = file.read_text(encoding="utf-8")
+        result, report_id = load(text), str(json.loads(text)["report_id"])
+    except (OSError, ValueError, KeyError) as error:
+        raise RecordError(f"{file}: no result that can be read: {error}") from None
+    if not isinstance(result, DriftTestResult):
+        kind = "a suite itself; name its tests" if result.kind == "suite" else f"a {result.kind} test; leave it out"
+        raise RecordError(f"{folder}: is {kind}")
+    run = RunDocument.model_validate(result.provenance)
+    test = SuiteTestRun(
+        folder=label, report_id=report_id, date=run.date or None, operator=run.operator or None, seed=run.seed,
+        step=run.step or None, engine=run.engine or None, phases=len(run.plan), duration=_duration(run, result),
+        changed=run.changed, result_sha256=hashlib.sha256(text.encode()).hexdigest(),
+        record_sha256=_record_hash(folder), data=run.data, versions=run.versions or None,
+        parts={s: PartInfo(name=p.name, version=p.version, sha256=p.sha256) for s, p in run.parts.items()},
+        step_check=(result.step_check or {}).get("worst"), complete=run.complete,
+    )  # fmt: skip
+    return Member(result, test)
+
+
+def _duration(run: RunDocument, result: DriftTestResult) -> float | None:
+    """Return the time of the test, s: of the run, else from first to last window."""
+    if run.stopped_at is not None:
+        return run.stopped_at
+    times = [t for s in result.series for t in s.t]
+    return max(times) - min(times) if times else None
+
+
+def _record_hash(folder: Path) -> str:
+    for name in ("record.parquet", "record.csv"):
+        if (folder / name).is_file():
+            return hashlib.sha256((folder / name).read_bytes()).hexdigest()
+    return ""

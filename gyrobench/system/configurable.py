@@ -1,0 +1,127 @@
+"""What a system and a suite have in common: a name, a title, options with values; and how they are loaded."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import importlib.util
+import math
+import sys
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from gyrobench.bench import Bench
+from gyrobench.errors import GyrobenchError
+from gyrobench.system.values import InvalidValueError, parse
+
+
+class InvalidConfigurationError(GyrobenchError):
+    """The system refuses to run with these values; ``problems`` lists why."""
+
+    def __init__(self, name: str, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("\n".join([f"{name} refuses to run:", *(f"  - {p}" for p in problems)]))
+
+
+def _bound(value: float, unit: str) -> str:
+    """A bound with its unit; an angle in degrees too, as nobody writes a latitude in radians."""
+    shown = f"{value:g}" if unit == "1" else f"{value:g} {unit}"
+    return f"{shown} ({math.degrees(value):.6g}deg)" if unit == "rad" and value else shown
+
+
+@dataclass(frozen=True)
+class Option:
+    """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type."""
+
+    default: Any
+    unit: str | type
+    doc: str = ""
+    min: float | None = None
+    max: float | None = None
+
+    @property
+    def kind(self) -> type:
+        return self.unit if isinstance(self.unit, type) else float
+
+    def parse(self, name: str, value: Any) -> Any:
+        """The SI value; raises InvalidValueError for a wrong dimension or a broken bound."""
+        unit = "1" if isinstance(self.unit, type) else self.unit
+        number = parse(name, value, unit, self.kind)
+        if not isinstance(number, str | list):
+            given = value.strip() if isinstance(value, str) else f"{number:g}"
+            if self.min is not None and not number >= self.min:
+                raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
+            if self.max is not None and not number <= self.max:
+                raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
+        return number
+
+
+class Configurable:
+    """Base of System and Suite: what ``systems/<name>/system.py`` declares of either, with one set of values."""
+
+    title: ClassVar[str] = ""
+    spec: ClassVar[tuple[str, ...]] = ()  # ids of methods, see docs/methods
+    options: ClassVar[Mapping[str, Option]] = {}
+    name: str = ""
+    folder: Path | None = None
+
+    def __init__(self) -> None:
+        self.name = self.name or type(self).__name__.lower()
+        self.values = {k: o.parse(k, o.default) for k, o in self.options.items()}
+        self.given: list[str] = []  # names that were set
+
+    def __getitem__(self, option: str) -> Any:
+        """The SI value of an option."""
+        return self.values[option]
+
+    def set(self, name: str, value: Any) -> None:
+        """Set an option.  Raises InvalidValueError."""
+        if name not in self.options:
+            raise InvalidValueError(f"{name}: no such option of {self.name}")
+        self.values[name] = self.options[name].parse(name, value)
+        self._was_given(name)
+
+    def _was_given(self, name: str) -> None:
+        if name not in self.given:
+            self.given.append(name)
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """Return a copy with further values set."""
+        other = copy.copy(self)
+        for key, held in vars(self).items():
+            if isinstance(getattr(type(self), key, None), functools.cached_property):
+                del other.__dict__[key]  # it was derived from other values
+            elif isinstance(held, dict | list):
+                other.__dict__[key] = copy.copy(held)
+        for name, value in values.items():
+            other.set(name, value)
+        return other
+
+
+def load_configurable(name: str, bench: Path | None = None) -> Configurable:
+    """Return the system or suite ``name`` of a bench with its default values.
+
+    Raises BenchError when there is no such system, InvalidConfigurationError when its file does not define exactly one
+    system or suite.
+    """
+    folder = Bench.find(bench).system_folder(name)
+    file = folder / "system.py"
+    module_name = f"gyrobench_system_{name}_{zlib.crc32(str(folder.resolve()).encode()):08x}"
+    spec = importlib.util.spec_from_file_location(module_name, file, submodule_search_locations=[str(folder)])
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    spec.loader.exec_module(module)
+    classes = [
+        v
+        for v in vars(module).values()
+        if isinstance(v, type) and issubclass(v, Configurable) and v.__module__ == module_name
+    ]
+    if len(classes) != 1:
+        raise InvalidConfigurationError(name, [f"{file}: defines {len(classes)} systems or suites, must define one"])
+    loaded = classes[0]()
+    loaded.name, loaded.folder = name, folder
+    return loaded
