@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output, Parameter, sampled
-from gyrobench.component.math import clip, fabs, pi, sign, sqrt
+from gyrobench.component.math import Number, clip, fabs, pi, sign, sqrt
 
 DEG = pi / 180.0
 
@@ -52,7 +52,7 @@ class ErectionController(Component):
     cut = Output("1", "channels cut off: 0, 1, 2")
     starting = Output("1", "1 during the fast start")
 
-    def torque(self, e, factor):
+    def torque(self, e: Number, factor: Number) -> Number:
         if self.law == 1.0:
             return self.H * factor * clip(self.gain * e, -self.rate, self.rate)
         return self.H * factor * self.rate * sign(e) if fabs(e) > self.dead_zone else 0.0

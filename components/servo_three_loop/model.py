@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, floor
+from gyrobench.component.math import Number, clip, floor
 
 
 class ServoThreeLoop(Component):
@@ -60,7 +60,7 @@ class ServoThreeLoop(Component):
         self.track = clip(self.K_p * (self.theta_wish - self.theta), -self.w_max, self.w_max)
         self.count = 0.0
 
-    def off(self):
+    def off(self) -> Number:
         return (self.u + self.test) / self.K_u - self.command - self.track
 
     def flow(self) -> None:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output, Parameter, State
-from gyrobench.component.math import clip
+from gyrobench.component.math import Number, clip
 
 
 class StabilizerLeadLag(Component):
@@ -46,13 +46,13 @@ class StabilizerLeadLag(Component):
     lead = State(0.0, "V", "state of the lead network")
     sum = State(0.0, "V", "integral part")
 
-    def error(self):
+    def error(self) -> Number:
         return self.u + self.test - self.K_u * self.command
 
-    def after_lag(self):
+    def after_lag(self) -> Number:
         return self.lag + self.tau1 / self.T1 * (self.error() - self.lag)
 
-    def after_lead(self):
+    def after_lead(self) -> Number:
         return self.lead + self.tau2 / self.T2 * (self.after_lag() - self.lead)
 
     def flow(self) -> None:

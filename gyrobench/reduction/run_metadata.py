@@ -73,7 +73,7 @@ def truth_of(run: RunDocument, names: Iterable[str], slot: str = "gyro") -> dict
     return {n: float(run.parameters[f"{slot}.{n}"]) for n in names if f"{slot}.{n}" in run.parameters} or None
 
 
-def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, float]:
+def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
     """Return the options that are sizes of uncertainties, SI; 0 where not given."""
     return {n: float(options.get(n, 0.0)) for n in names}
 

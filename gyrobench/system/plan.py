@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 MODES = {"hold": 0, "index": 1, "rate": 2, "servo": 3}
 LIMIT = 99  # phases
@@ -44,7 +47,7 @@ class Plan:
     """Phases and the mounts they use (name -> 3x3 rotation, rows = gyro axes I, O, S in table axes)."""
 
     phases: list[Phase] = field(default_factory=list)
-    faces: dict[str, Sequence[Sequence[float]]] = field(default_factory=dict)
+    faces: Mapping[str, ArrayLike] = field(default_factory=dict)
 
     def problems(self) -> list[str]:
         """What is wrong with the plan, as sentences; the sequencer itself refuses what is left."""
@@ -77,7 +80,7 @@ class Plan:
             "targets": [float(p.target) for p in self.phases],
             "windows": [float(p.window) for p in self.phases],
             "face_of": [names.index(p.face) + 1 for p in self.phases],
-            "faces": [[float(x) for row in self.faces[n] for x in row] for n in names],
+            "faces": [np.asarray(self.faces[n], dtype=float).ravel().tolist() for n in names],
         }
         if any(p.target_y for p in self.phases):
             columns["targets_y"] = [float(p.target_y) for p in self.phases]

@@ -121,12 +121,12 @@ class Model:
             ones = np.column_stack([np.ones(mine.sum()), np.cos(v.angle[mine]), np.sin(v.angle[mine])])
             _, a, b = np.linalg.lstsq(ones, v.y[mine], rcond=None)[0]
             zeros[m] = math.atan2(-a, -b)
-        k = np.linalg.lstsq(self.columns(v, zeros, gamma), v.y, rcond=None)[0]
+        k: Array = np.asarray(np.linalg.lstsq(self.columns(v, zeros, gamma), v.y, rcond=None)[0], dtype=float)
         for _ in range(20):
             C = self.columns(v, zeros, gamma)
             D = self.slopes(v, zeros, gamma, k)
             delta = np.linalg.lstsq(np.column_stack([C, D]), v.y, rcond=None)[0]
-            k = delta[: C.shape[1]]
+            k = np.asarray(delta[: C.shape[1]], dtype=float)
             zeros = {m: zeros[m] + float(d) for m, d in zip(self.mounts, delta[C.shape[1] :], strict=True)}
             if np.max(np.abs(delta[C.shape[1] :])) < 1e-14:
                 break

@@ -86,7 +86,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
             mode="hold",
             face=positions.NAMES[p],
             cycle=c,
-            **({"day": str(d)} if several else {}),
+            day=str(d) if several else "",
         )
         for (d, c, p), phase in phases.items()
     ]

@@ -52,13 +52,11 @@ def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
     if rows.size == 0:
         raise ReductionError(f"the record ends before the {skip} readings that are left out at the start are over")
 
-    def of(name: str) -> Array | None:
-        return np.asarray(channels[name], dtype=float)[rows] if name in channels else None
-
-    found = {n: of(n) for n in needed}
+    series = {n: np.asarray(values, dtype=float)[rows] for n, values in channels.items()}
+    of = series.get
     return Signals(
-        found["time"], found["source.z"], found["estimator.estimate"], found["source.truth"],
-        float(found["estimator.latency"][-1]), of("estimator.variance"), of("estimator.innovation"),
+        series["time"], series["source.z"], series["estimator.estimate"], series["source.truth"],
+        float(series["estimator.latency"][-1]), of("estimator.variance"), of("estimator.innovation"),
         of("estimator.nis"), of("estimator.R_hat"),
     )  # fmt: skip
 

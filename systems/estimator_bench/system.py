@@ -68,7 +68,7 @@ class EstimatorBench(System):
         return int(self["skip"]) if self["skip"] >= 0 else self.benchmark.skip
 
     @property
-    def step(self) -> float:  # type: ignore[override]
+    def step(self) -> float:
         """The sampling period of the benchmark: the source makes one reading a step, so no other step has a meaning."""
         return self.benchmark.Ts
 
@@ -80,7 +80,7 @@ class EstimatorBench(System):
                 f"{self.benchmark.Ts:g} s (nothing in it is integrated: there is no step to check)"
             )
 
-    @property
+    @property  # both follow the benchmark: there is nothing to set
     def stop(self) -> float:  # type: ignore[override]
         return self.samples * self.step
 

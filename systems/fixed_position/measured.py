@@ -61,7 +61,6 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     days = np.unique(day)
     several = days.size > 1
     plan = [
-        PlanRow(phase=int(d), label=ATTITUDE, mode="hold", face=ATTITUDE, **({"day": str(d)} if several else {}))
-        for d in days
+        PlanRow(phase=int(d), label=ATTITUDE, mode="hold", face=ATTITUDE, day=str(d) if several else "") for d in days
     ]
     return Record({"phase": day, **windows}, {}, record.run.replace(plan=plan))

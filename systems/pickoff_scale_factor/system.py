@@ -96,7 +96,7 @@ class PickoffScaleFactor(System):
 
     def angles(self) -> list[float]:
         """The angles in their order, rad; back over the same ones with both_ways."""
-        there = np.linspace(-self["range"], self["range"], self["points"]).tolist()
+        there: list[float] = np.linspace(-self["range"], self["range"], self["points"]).tolist()
         return there + there[-2::-1] if self["both_ways"] else there
 
     def plan(self) -> Plan:
@@ -113,7 +113,7 @@ class PickoffScaleFactor(System):
         peak = min(index_rate, math.sqrt(step * acceleration))
         move = peak / acceleration + step / peak if peak > 0.0 else 0.0
         n = len(self.angles())
-        return n * (self["settle"] + self["dwell"]) + (n - 1) * move
+        return float(n * (self["settle"] + self["dwell"]) + (n - 1) * move)
 
     def parameters(self) -> dict[str, Any]:
         return {

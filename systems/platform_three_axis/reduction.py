@@ -56,7 +56,8 @@ def _norm(points: list[Point]) -> tuple[float, float]:
 
 def _coupling(found: LoopFindings) -> str:
     """Cross over main angle of a commanded sine.  [DECOUPLE-BENCH-83MIL]"""
-    points, worst = {}, 0.0
+    points: dict[tuple[int, int], complex] = {}
+    worst = 0.0
     gates = found.of("command", shape="sine")
     for gate in gates:
         main = gate[ANGLES[gate.axis - 1]]

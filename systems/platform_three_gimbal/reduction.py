@@ -103,8 +103,9 @@ def _drift(found: LoopFindings) -> None:
             rate, u = got.rate / DPH, got.u / DPH
             found.measure(f"drift {axis}", f"of the platform about {axis}", "°/h", rate, u, truth=truth)
             if axis == "x":
-                scale = {k: [v / DPH for v in got.allan[k]] for k in ("dev", "lo", "hi") if k in got.allan}
-                found.allan = {**got.allan, **scale, "unit": "°/h"} if got.allan else {}
+                kept = [k for k in ("dev", "lo", "hi") if k in got.allan]
+                in_dph = {str(k): [v / DPH for v in got.allan[k]] for k in kept}
+                found.allan = {**got.allan, **in_dph, "unit": "°/h"} if got.allan else {}
         scale = float(found.record.run.parameters.get("gyro_a.K_sg_y", 10.0))
         apart = drift(gate.t, (gate["gyro_b.u_x"] - gate["gyro_a.u_y"]) / scale)
         truth = float(np.mean(gate["gyro_a.drift_y"] - gate["gyro_b.drift_x"])) / DPH

@@ -136,7 +136,7 @@ class PlatformThreeGimbal(System):
 
     def legs(self) -> list[Leg]:
         """The flight and the way back; whole steps, so that the angles are exact."""
-        found = []
+        found: list[Leg] = []
         for name, way in (("roll", 1.0), ("yaw", 1.0), ("yaw", -1.0), ("roll", -1.0)):
             angle = way * self[name]
             time = max(1, round(abs(angle) / self[f"{name}_rate"] / self.step)) * self.step

@@ -28,7 +28,7 @@ Amplitudes = Mapping[str, float]
 
 def amplitudes(
     angle_start: Array, angle_end: Array, rate: Array, order: int = 2
-) -> tuple[dict[str, float], harmonic.Fit]:
+) -> tuple[dict[str, float], regression.Fit]:
     """A0, A1, B1, A2, B2 of theta' (A: sine, B: cosine) by least squares over window means, and the fit itself (whose
     names are the other way round: A cosine, B sine).
     """

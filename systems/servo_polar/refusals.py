@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
 
 
-def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, Array]:
+def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, NDArray[np.int_]]:
     """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(

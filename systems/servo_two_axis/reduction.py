@@ -23,6 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.fit_result import (
     Findings,
     Group,
@@ -86,7 +87,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     k = refusals.condition(X)
     warnings = []
     if k > refusals.WARN:
-        weak = [f"{refusals.regression.examine(v, drift.terms_2dof(c, terms)).weakest} ({c})" for c, v in X.items()]
+        weak = [f"{regression.examine(v, drift.terms_2dof(c, terms)).weakest} ({c})" for c, v in X.items()]
         which = " ".join(str(m) for m in dict.fromkeys(mount.tolist()))
         warnings.append(f"Mounts {which}: condition {k:.3g} of the coefficients per g; hardly seen: {', '.join(weak)}.")
     result = merge(results, tables=[t for t in tables if t["rows"]], warnings=warnings)
@@ -121,7 +122,7 @@ def _problems(
             known = {"gyro.K_sg": gain, "gyro.H": 1.0, "gyro.C": 1.0}  # a pickoff reads the angle itself
             found += [f"{a} axis: {text}" for text in servo_regression.tracking_problems(part, held, known, limit)]
     for c, x in X.items():
-        seen = refusals.regression.examine(x, drift.terms_2dof(c, terms))
+        seen = regression.examine(x, drift.terms_2dof(c, terms))
         if seen.lost:
             found.append(
                 f"{c} channel: rank {seen.rank} of {x.shape[1]}, the record does not see {'; '.join(seen.lost)}"

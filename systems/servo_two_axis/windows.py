@@ -83,7 +83,7 @@ class Track:
 
     def force(self, site: Site) -> Array:
         """-f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
-        g = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
+        g: Array = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
         for R, _ in self.turns():
             g = (R @ g[..., None])[..., 0]
         return g

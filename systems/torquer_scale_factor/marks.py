@@ -25,8 +25,8 @@ def rows(windows: Mapping[str, Array], plan: Sequence[PlanRow]) -> dict[str, Arr
     plan: rows of run.json; the target of a servo phase is its current.  Raises ReductionError for flagged windows, a
     current with one sense only, and senses that do not share their angles.
     """
-    if problems := window_problems(windows):
-        raise ReductionError(problems)
+    if unusable := window_problems(windows):
+        raise ReductionError(unusable)
     phase = np.asarray(windows["phase"]).astype(int)
     pairs = _pairs(plan)
     problems: list[str] = []

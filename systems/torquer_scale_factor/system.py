@@ -117,8 +117,7 @@ class TorquerScaleFactor(System):
             currents = self.currents()
         except ValueError:
             return Plan()
-        at = {"mode": "servo", "face": FACE}
-        phases = [Phase(CAPTURE, settle=STEADY, dwell=0.5, window=0.5, **at)]
+        phases = [Phase(CAPTURE, "servo", FACE, settle=STEADY, dwell=0.5, window=0.5)]
         before, n = 0.0, self["windows"]
         for size in currents:
             way = self["range"] if size < 0.0201 else self["range_large"]
@@ -127,7 +126,7 @@ class TorquerScaleFactor(System):
                 ramp = abs(i - before) / self["slew"] if self["slew"] > 0.0 else 0.0
                 label = f"{i * 1e3:+g} mA".replace("-", "−")
                 phases.append(
-                    Phase(label, target=i, settle=ramp + STEADY, dwell=dwell, travel=way, window=dwell / n, **at)
+                    Phase(label, "servo", FACE, i, settle=ramp + STEADY, dwell=dwell, travel=way, window=dwell / n)
                 )
                 before = i
         return Plan(phases, {FACE: ON_TABLE})

@@ -166,8 +166,10 @@ def _closed(
     named = {c: {m: closed.named(f) for m, f in fits[c].items()} for c in "xy"}
     out: dict[str, float] = {}
     if s.model == "simple":
-        rate = {c: [{n: -v for n, v in named[c][m].items()} for m in ("mount 1", "mount 2")] for c in "xy"}
-        symbols = closed.simple(*rate["y"], *rate["x"], s.latitude, s.gravity)  # k_x i_x is of the y channel
+        rate = {c: {m: {n: -v for n, v in of.items()} for m, of in named[c].items()} for c in "xy"}
+        by_x, by_y = rate["y"], rate["x"]  # k_x i_x is of the y channel
+        one, two = "mount 1", "mount 2"
+        symbols = closed.simple(by_x[one], by_x[two], by_y[one], by_y[two], s.latitude, s.gravity)
         out = {name: sign * symbols[b] for b, (name, sign) in closed.BOOK.items()}
         return out, fits, ""
     length = turning.t_end - turning.t_start
@@ -176,7 +178,8 @@ def _closed(
         for rest in ("static 3", "static 4"):
             rows = np.isin(phase, [p for p, r in roles.items() if r == rest])
             dwell.append(float(np.average(y[c][rows], weights=length[rows])))
-        out |= closed.nine(c, named[c]["mount 1"], named[c]["mount 2"], *dwell, s.latitude, s.gravity)
+        up, down = dwell
+        out |= closed.nine(c, named[c]["mount 1"], named[c]["mount 2"], up, down, s.latitude, s.gravity)
     return out, fits, ""
 
 

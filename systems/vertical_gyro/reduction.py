@@ -100,7 +100,8 @@ ANGLES = ("motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll")
 
 def _lean(channels: Mapping[str, Array], shown: bool = False) -> Array:
     """Of the rotor, or of the vertical that is shown."""
-    return lean(*(channels[n] for n in ANGLES), 0.0 if shown else channels["gyro.inner"])
+    pitch, roll, shown_pitch, shown_roll = (channels[n] for n in ANGLES)
+    return lean(pitch, roll, shown_pitch, shown_roll, 0.0 if shown else channels["gyro.inner"])
 
 
 def _of(gate: Gate, shown: bool = False) -> Array:

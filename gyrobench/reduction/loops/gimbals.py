@@ -76,9 +76,9 @@ class Flight:
         return next((g.label for g in reversed(self.gates) if g.inside.start - self.first <= k), self.gates[0].label)
 
 
-def spans(flag: Array) -> list[tuple[int, int]]:
+def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last sample of each stretch in which a flag is 1."""
-    on = np.concatenate([[False], np.asarray(flag) > 0.5, [False]])
+    on = np.concatenate([[False], np.asarray(flag, dtype=float) > 0.5, [False]])
     edges = np.flatnonzero(np.diff(on.astype(int)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
