@@ -12,6 +12,10 @@ mapping file (TOML): one table for each connector whose name or unit differs,
     name = "dt"
     unit = "ms"
 
+    [parameters.k]             # a value that the FMU has but does not offer as a parameter: designs follow it
+    value = 17.2
+    unit = "deg/h/mA"
+
 A misfit is refused before anything runs, with every missing or wrong connector and what would fit.
 """
 
@@ -29,6 +33,7 @@ from typing import Any
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.sockets import Connector, Socket, element_names
+from gyrobench.system.values import flatten
 
 FMI_TYPES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 
@@ -62,6 +67,7 @@ class Binding:
     inputs: dict[str, Bound] = field(default_factory=dict)  # by element name
     outputs: dict[str, Bound] = field(default_factory=dict)
     parameters: dict[str, Bound] = field(default_factory=dict)
+    constants: dict[str, Any] = field(default_factory=dict)  # values that the mapping file states, SI
     absent: list[str] = field(default_factory=list)  # optional connectors the FMU does not have
     warnings: list[str] = field(default_factory=list)
 
@@ -214,12 +220,26 @@ class _Fitter:
                 ports = self.binding.inputs if v.causality == "input" else self.binding.outputs
                 ports.setdefault(name, Bound(name, name, int(v.valueReference), kind, gain, v.unit or ""))
 
+    def fit_constant(self, name: str, entry: Mapping[str, Any]) -> None:
+        """Note a value that the mapping file states, a number or nested lists of numbers."""
+        known = self.understood(str(entry.get("unit", "1")))
+        values = flatten(name, entry["value"])
+        if known is None or known[2]:
+            self.problems.append(f"parameters.{name}: unit '{entry['unit']}' has no factor to SI")
+        elif not all(isinstance(x, int | float) and math.isfinite(x) for x in values.values()):
+            self.problems.append(f"parameters.{name}: value {entry['value']}: must be a number or a list of numbers")
+        else:
+            self.binding.constants.update({e: x * known[1] for e, x in values.items()})
+
     def fit_parameters(self) -> None:
         given = self.mapping.get("parameters", {})
         mapped = set()
         for ours, entry in given.items():
             if isinstance(entry, str):
                 entry = {"name": entry}
+            if "value" in entry:
+                self.fit_constant(ours, entry)
+                continue
             theirs = entry.get("names") or [entry.get("name", ours)]
             elements = element_names(ours, (len(theirs),)) if "names" in entry else [ours]
             for element, name in zip(elements, theirs, strict=True):

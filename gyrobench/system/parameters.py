@@ -9,6 +9,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.system.binding import Binding, Bound
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError, flatten, nest, parse
 from gyrobench.system.wiring import Assembly
@@ -23,7 +24,10 @@ def slot_seed(seed: int, slot: str) -> int:
 
 
 def defaults(assembly: Assembly) -> dict[str, Any]:
-    """Start values of all parameters as the FMUs declare them: {"slot.name": SI value}, element by element."""
+    """Return the start values of all parameters as the FMUs (or their mapping files) declare them.
+
+    {"slot.name": SI value}, element by element.
+    """
     found: dict[str, Any] = {}
     for slot, binding in assembly.bindings.items():
         starts = {v.name: v.start for v in assembly.descriptions[slot].modelVariables}
@@ -39,6 +43,7 @@ def defaults(assembly: Assembly) -> dict[str, Any]:
                 found[f"{slot}.{name}"] = text in ("true", "1")
             else:
                 found[f"{slot}.{name}"] = text
+        found.update({f"{slot}.{name}": value for name, value in binding.constants.items()})
     return found
 
 
@@ -93,14 +98,20 @@ def resolve(
         slot: {b.variable: (e, b) for e, b in (*binding.inputs.items(), *binding.parameters.items())}
         for slot, binding in (assembly.bindings.items() if system.raw else ())
     }
+    raw: dict[str, Any] = {}
     for name, value in system.raw.items():
         slot, _, variable = name.partition(".")
         if variable in variables[slot]:
             element, known = variables[slot][variable]
-            chosen[f"{slot}.{element}"] = value * known.gain if known.kind == "Real" else value
+            raw[f"{slot}.{element}"] = value * known.gain if known.kind == "Real" else value
         else:
             notes.append(f"{name}: no parameter or input of that name; not set")
-    for name, value in system.flat_parameters().items():
+    chosen.update(raw)
+    overrides: dict[str, Any] = {}
+    for name, value in system.overrides.items():
+        overrides.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
+    parts = PartValues(system, base, {**raw, **overrides})
+    for name, value in system.flat_parameters(parts).items():
         where_known = name.endswith("?")
         name = name.rstrip("?")
         slot, _, parameter = name.partition(".")
@@ -111,8 +122,8 @@ def resolve(
             chosen[name] = _si(name, value, bound)
         elif not where_known:
             notes.append(f"{slot} has no parameter '{parameter}' (set by {system.name}); it stays as it is")
-    for name, value in system.overrides.items():
-        chosen.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
+    notes += parts.notes
+    chosen.update(overrides)
     starts: Starts = {slot: [] for slot in assembly.bindings}
     for name, value in chosen.items():
         slot, _, parameter = name.partition(".")

@@ -18,7 +18,7 @@
         measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
-        def parameters(self): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
+        def parameters(self, parts): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
         def check(self): return [...]
         def reduce(self, record, specification=None): ...
 
@@ -42,6 +42,7 @@ from gyrobench.system.values import InvalidValueError, flatten
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
     from gyrobench.result import Result, Specification
+    from gyrobench.system.part_values import PartValues
 
 __all__ = [
     "InvalidConfigurationError",
@@ -137,9 +138,10 @@ class System(Configurable):
         """The phases; a system without a sequencer or an exciter has none."""
         return Plan()
 
-    def parameters(self) -> dict[str, Any]:
-        """Parameters of the parts derived from plan and options: "slot.parameter" -> SI value or nested list.
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        """Return the parameters that follow from plan, options and parts: "slot.parameter" -> SI value or nested list.
 
+        parts: the values that the parts in the slots have, ``parts["gyro.k"]``, for gains and plans that follow them.
         A scalar named "slot.parameter?" is set where the part has it, and not missed where it has not.
         """
         return {}
@@ -185,10 +187,10 @@ class System(Configurable):
         if problems:
             raise InvalidConfigurationError(self.name, problems)
 
-    def flat_parameters(self) -> dict[str, Any]:
-        """:meth:`parameters` element by element: {"sequencer.mode[1]": 2, ...}."""
+    def flat_parameters(self, parts: PartValues) -> dict[str, Any]:
+        """Return :meth:`parameters` element by element: {"sequencer.mode[1]": 2, ...}."""
         found: dict[str, Any] = {}
-        for name, value in self.parameters().items():
+        for name, value in self.parameters(parts).items():
             found.update(flatten(name, value))
         return found
 

@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -110,7 +111,7 @@ class EightPosition(System):
         ]
         return Plan(phases, faces)
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {
             **self.plan().parameters(),
             "site.latitude": self["latitude"],

@@ -8,6 +8,7 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.connectors import Socket, out
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 from gyrobench.system.values import InvalidValueError
 
@@ -88,7 +89,7 @@ class EstimatorBench(System):
     def channel_period(self) -> float:  # type: ignore[override]
         return self.step
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         b = self.benchmark
         return {
             **{f"source.{k}": v for k, v in b.source.items()},

@@ -12,6 +12,7 @@ from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -90,7 +91,7 @@ class FixedPosition(System):
         )  # fmt: skip
         return Plan([phase], {"service attitude": face})
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {
             **self.plan().parameters(),
             "site.latitude": self["latitude"],

@@ -12,6 +12,7 @@ from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -107,7 +108,7 @@ class OpenLoopDrift(System):
             phases.append(Phase(label=f"reading {j + 1}, {side}", mode="index", face=MOUNT, target=target, **timing))
         return Plan(phases, {MOUNT: [[0, 0, 1], [1, 0, 0], [0, 1, 0]]})
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         C = parse(self["attitude"], self["latitude"])
         return {
             **self.plan().parameters(),

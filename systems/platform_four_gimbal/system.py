@@ -9,6 +9,7 @@ from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 from .flights import FLIGHTS
@@ -117,7 +118,7 @@ class PlatformFourGimbal(System):
         legs = flight_plan.phases(self.flown().legs)
         return LoopPlan([*legs, self.at_rest()[-1]] if self.flown().inner else [*self.at_rest(), *legs])
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         flown = self.flown()
         found: dict[str, Any] = {
             **self.plan().parameters(),

@@ -10,6 +10,7 @@ from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
@@ -120,7 +121,7 @@ class PlatformSingleAxisLoop(System):
         loop = g * (1.0 + found["integral"] / s) / TORQUER * wr / (s + wr) * motor
         return {"K": 1.0 / abs(loop), **found}
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         gain = 2.0 * math.pi * REBALANCE / (TORQUER * PICKOFF)  # A/V, of the rebalance loop
         variance = (self["reading_noise"] ** 2 + (gain * PICKOFF_NOISE) ** 2) / self.step
         wide = (2.0 * math.pi * 5.0 * self["crossover"]) ** 4  # the filter follows five times faster than the loop

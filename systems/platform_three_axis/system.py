@@ -10,6 +10,7 @@ from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 DEG = math.pi / 180.0
@@ -147,7 +148,7 @@ class PlatformThreeAxis(System):
         K = 1.0 / abs(f * gyro / (inertia * s))
         return {"K": K, "tau1": 1.0, "T1": 1.0, "tau2": 4 / wc, "T2": 0.25 / wc, "integral": wc / 15, "v_max": 48.0}
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         found: dict[str, Any] = {
             **self.plan().parameters(),
             **(read_profile(Path(self["profile"])) if self["profile"] else {}),

@@ -14,6 +14,7 @@ from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 DEG = math.pi / 180.0
@@ -151,7 +152,7 @@ class PlatformThreeGimbal(System):
         """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
         return LoopPlan([*flight_plan.phases(self.legs()), *self.at_rest()])
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         found: dict[str, Any] = {
             **self.plan().parameters(),
             **flight_plan.parameters(self.legs()),

@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -85,7 +86,7 @@ class ServoPolar(System):
             angle += travel if mount == "polar S" else -travel
         return servo_stand.plan(holds)
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return servo_stand.parameters(self)
 
     def check(self) -> list[str]:

@@ -10,6 +10,7 @@ from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 from gyrobench.system.values import parse
@@ -84,7 +85,7 @@ class ServoTwoAxis(System):
     def plan(self) -> Plan:
         return setup.plan(self.mounts(), self["time"], self["window"], self["settle"])
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return setup.parameters(self, self.mounts())
 
     def check(self) -> list[str]:

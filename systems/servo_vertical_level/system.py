@@ -10,6 +10,7 @@ from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families import servo_stand
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -91,7 +92,7 @@ class ServoVerticalLevel(System):
         local = frames.earth_rate_local(self["latitude"])
         return float((servo_stand.attitude(name, self["latitude"]) @ local)[0])
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return servo_stand.parameters(self)
 
     def check(self) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 from .closed import Loop
@@ -121,7 +122,7 @@ class StabilizerFloated2dof(System):
             ]
         return LoopPlan(phases)
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         motor = MOTORS.get(self["motor"], MOTORS["ideal"])
         amplifier = self["stiffness"] / (K_SG * motor["k_t"] / motor["R"])  # counts to K_m
         return {

@@ -10,6 +10,7 @@ from gyrobench.record.motion_profile import read_profile
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 #: of the gyro where the user gives nothing else [STAB-POWER-2DOF], and what the stabilizer is told of it
@@ -83,7 +84,7 @@ class StabilizerPower2dof(System):
             ]
         )
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         given = {n.partition(".")[2]: v for n, v in self.overrides.items() if n.startswith("gyro.")}
         gyro = {**GYRO, **{k: v for k, v in given.items() if k in GYRO}}
         k_u = float(gyro["K_sg_y"])

@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 from .closed import Axis
@@ -103,7 +104,7 @@ class StabilizerSdf(System):
             phases += sweep("loop", "test", SWEEP, 1e-3, periods=4)
         return LoopPlan(phases)
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         p = self.axis()
         drifts = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "markov", "white", "pickoff")
         return {

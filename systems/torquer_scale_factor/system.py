@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.sockets import SOCKETS, Connector, Socket
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
@@ -131,7 +132,7 @@ class TorquerScaleFactor(System):
                 before = i
         return Plan(phases, {FACE: ON_TABLE})
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         told = {f"gyro.{a}": f"table.{b}" for a, b in TOLD.items()}
         return {
             **self.plan().parameters(),

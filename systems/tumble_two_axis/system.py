@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
 
@@ -113,7 +114,7 @@ class TumbleTwoAxis(System):
             phases.append(Phase(label=label, target=self["m"] * theta, target_y=self["n"] * theta, **each))
         return Plan(phases, {"gyro": geometry.FACE.tolist()})
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {
             **self.plan().parameters(),
             "site.latitude": self["latitude"],

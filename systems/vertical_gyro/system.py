@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
 DEG = math.pi / 180.0
@@ -86,7 +87,7 @@ class VerticalGyroBench(System):
             ]
         )
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         table: dict[str, list[float]] = {n: [0.0] * LIMIT for n in ("forward", "turn", "pitch", "roll")}
         rows = {
             "acceleration": ("forward", self["acceleration"]),

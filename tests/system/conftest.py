@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import pytest
 
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
 
@@ -69,7 +70,7 @@ class SmallTumble(System):
             {"up": IDENTITY, "side": [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]},
         )
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {**self.plan().parameters(), "site.latitude": self["latitude"]}
 
     def check(self) -> list[str]:

@@ -17,6 +17,7 @@ from gyrobench.engine.session import ParameterRefusedError, RunError, Session
 from gyrobench.linear.linear_model import poles, unstable
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System, load_system
 
 NAME = "stabilizer_power_2dof"
@@ -259,7 +260,8 @@ def test_recorded_profile_that_cannot_be_played(rows: str, says: str, tmp_path: 
     file = tmp_path / "motion.csv"
     file.write_text("time [s],roll [deg]\n" + rows)
     with pytest.raises(DataError, match=says):
-        load().with_values({"profile": str(file)}).parameters()
+        system = load().with_values({"profile": str(file)})
+        system.parameters(PartValues(system))
 
 
 def test_recorded_profile_moves_the_base(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.result import Result
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import Connector, Socket
 from gyrobench.system.system import Slot, System
 
@@ -163,10 +164,10 @@ class Wobbling(type(load())):  # type: ignore[misc]
         )
     )
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
         east, p_cross_east = 1, -5  # directions of the part fixture
         mount = {"stand.mounts[1,1]": east, "stand.mounts[1,2]": p_cross_east, "stand.latitude": self["latitude"]}
-        return {**super().parameters(), "table.base": np.eye(3), "wobble.axis": 3, **mount}
+        return {**super().parameters(parts), "table.base": np.eye(3), "wobble.axis": 3, **mount}
 
 
 @pytest.mark.parametrize("phase", [0.0, HALF])

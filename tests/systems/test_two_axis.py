@@ -16,6 +16,7 @@ from gyrobench import drift
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session, run
 from gyrobench.result import Result
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]
@@ -111,7 +112,7 @@ def test_table_errors_shift_as_the_budget_predicts(session: Session, source: str
     seed = 21
     plain = reduced(session, values, seed)
     system = load()
-    base = np.array(system.parameters()["table.base"])
+    base = np.array(system.parameters(PartValues(system))["table.base"])
     turn = {"about east": [1.0, 0.0, 0.0], "about p × east": np.cross(base[0], [1.0, 0.0, 0.0]).tolist()}
     more: dict[str, Any] = {}
     if option == "u_axis":
