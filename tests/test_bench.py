@@ -122,6 +122,9 @@ ROOMS: dict[str, set[str]] = {
     "reduction": COMMON | {"record"},
     "report": COMMON | {"record", "reduction"},
 }
+BELOW = {*ROOMS}
+#: from a request to a result, for the commands and the library
+ROOMS["workflow"] = BELOW
 
 
 def imports(file: Path) -> set[str]:

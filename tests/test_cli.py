@@ -150,16 +150,16 @@ REFUSED = [
     (["run", NAME, "--step", "1m"], "units that fit: s, ms"),
     (["run", NAME, "--part", "gyr=site"], "no slot 'gyr'; slots: site"),
     (["run", NAME, "--part", "gyro=floated_gyr"], "no part 'floated_gyr'; did you mean floated_gyro?"),
-    (["run", NAME, "--part", "gyro=no.fmu"], "--part gyro=no.fmu: not an FMU that can be read: no such file"),
-    (["run", NAME, "--part", "gyro=bad.fmu"], "--part gyro=bad.fmu: not an FMU that can be read"),
+    (["run", NAME, "--part", "gyro=no.fmu"], "slot gyro: no.fmu: not an FMU that can be read: no such file"),
+    (["run", NAME, "--part", "gyro=bad.fmu"], "slot gyro: bad.fmu: not an FMU that can be read"),
     (["run", NAME, "--part", "gyro=site"], "slot gyro: FMU 'Site' does not fit socket SdfGyro"),
     (["run", NAME, "--map", "gyro=no.toml"], "--map gyro=no.toml: no such file"),
-    (["run", NAME, "--spec", "floated_gyr"], "--spec floated_gyr: no such file or specification; did you mean"),
+    (["run", NAME, "--spec", "floated_gyr"], "floated_gyr: no such file or acceptance specification; did you mean"),
     (["run", NAME, "--isolate", "gyr"], "no slot 'gyr'"),
     (["run", NAME, "--seed", "-1"], "--seed"),
     (["run", NAME, "--engine", "fast"], "'native', 'reference'"),
-    (["run", NAME, "--out", "full"], "--out full: holds other files; name a new folder, for example full/run1"),
-    (["run", NAME, "--out", "bad.fmu"], "--out bad.fmu: is a file"),
+    (["run", NAME, "--out", "full"], "full: holds other files; name a new folder, for example full/run1"),
+    (["run", NAME, "--out", "bad.fmu"], "bad.fmu: is a file"),
     (["run", NAME, "--sed", "3"], "No such option: --sed"),
     (["rum", NAME], "Did you mean 'run'?"),
     (["show", NAME, "--picture", "w.png"], "write w.svg"),
@@ -241,7 +241,7 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
     assert gyrobench(*run)[0] == 0  # the same run again
     code, _, err = gyrobench(*run, "--seed", "2", "--set", "gyro.D_I=0")
     assert code == 2
-    assert "--out here: holds another run (its parameters, seed differ); name another folder, or --force" in err
+    assert "here: holds another run (its parameters, seed differ); name another folder, or replace it: --force" in err
     assert Record.load(tmp_path / "here").run.seed == 1
     assert gyrobench(*run, "--seed", "2", "--force")[0] == 0
     assert Record.load(tmp_path / "here").run.seed == 2
@@ -433,6 +433,6 @@ def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> 
     assert (k["estimate"], k["unit"]) == (pytest.approx(17.0, rel=1e-12), "°/h/mA")
     (tmp_path / "t.csv").rename(tmp_path / "u.csv")
     code, _, err = gyrobench("reduce", "torquer_scale_factor", "--data", "u.csv", "--out", "r")
-    assert code == 2 and "--out r: holds another run (its data differ)" in err
+    assert code == 2 and "r: holds another run (its data differ)" in err
     assert gyrobench("reduce", "torquer_scale_factor", "--data", "u.csv", "--out", "r", "--force")[0] == 0
     assert gyrobench("report", "r")[0] == 0

@@ -255,7 +255,7 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
         (["show", NAME, "--picture", "x.svg"], "a suite has no wiring of its own"),
         (["export", NAME, "--to", "ssp"], "is a suite"),
         (["reduce", NAME, "--template"], "reduce each record by its own test"),
-        (["reduce", NAME, "--data", "a"], "name the runs, two or more"),
+        (["reduce", NAME, "--data", "a"], "name two runs or more"),
         (["reduce", NAME, "--data", "a", "--data", "b"], "a: no result.json there"),
         (["reduce", NAME, "--data", "a", "--data", "b", "--set", "gyro.D_I=1"], "the tests have been run"),
         (["reduce", "fixed_position", "--data", "a", "--data", "b"], "one record at a time"),

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from gyrobench.bench import Bench, UsageError, display_path
-from gyrobench.commands.user_errors import exit_code, user_message
+from gyrobench.workflow.user_errors import exit_code, user_message
 
 app = typer.Typer(
     add_completion=False,
@@ -143,11 +143,11 @@ def show(
     \b
     Example: gyrobench show tumble_single_axis --picture wiring.svg
     """
-    from gyrobench.commands.inputs import load_test, parse_settings, parse_swaps
+    from gyrobench.commands.arguments import load_with_values, parse_settings, parse_swaps
     from gyrobench.commands.show_system import show_suite, show_system
     from gyrobench.system.suite import Suite
 
-    test = load_test(system, parse_settings(values))
+    test = load_with_values(system, parse_settings(values))
     if isinstance(test, Suite):
         show_suite(test, picture, as_json)
     else:
@@ -208,6 +208,9 @@ def run(
     ] = None,
     spec: Spec = None,
     strict: Strict = False,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Record and result.json only: no HTML, no PDF, for many runs.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
     ] = None,
@@ -224,12 +227,13 @@ def run(
       gyrobench run tumble_single_axis --spec floated_gyro --strict
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
-    from gyrobench.commands import run_system
-    from gyrobench.commands.inputs import load_test, parse_settings, parse_step, parse_swaps
-    from gyrobench.system.suite import Suite
+    from gyrobench.commands import print_runs
+    from gyrobench.commands.arguments import load_with_values, parse_settings, parse_step, parse_swaps
+    from gyrobench.report import FORMATS
+    from gyrobench.workflow.run_execution import RunRequest
 
     parts, maps = parse_swaps(part, mapping)
-    request = run_system.RunRequest(
+    request = RunRequest(
         parts=parts,
         maps=maps,
         seed=seed,
@@ -241,15 +245,10 @@ def run(
         check_step=check_step,
         isolate=tuple(isolate or ()),
         resume=resume,
+        formats=("json",) if no_report else FORMATS,
     )
-    test = load_test(system, parse_settings(values), request.step)
-    if isinstance(test, Suite):
-        from gyrobench.commands import run_suite
-
-        verdict = run_suite.run(request, test, as_json)
-    else:
-        verdict = run_system.run(request, test, as_json)
-    exit_on_fail(verdict, strict)
+    test = load_with_values(system, parse_settings(values), request.step)
+    exit_on_fail(print_runs.run(request, test, as_json), strict)
 
 
 @app.command()
@@ -274,30 +273,17 @@ def reduce(
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
     """
-    from gyrobench.commands.inputs import apply_values, load_test, parse_settings
-    from gyrobench.system.suite import Suite
+    from gyrobench.commands import print_runs
+    from gyrobench.commands.arguments import parse_settings
+    from gyrobench.workflow.inputs import load_test
 
-    settings = parse_settings(values)
     test = load_test(system)
-    if isinstance(test, Suite):
-        if template:
-            raise UsageError(f"{system} compares runs: reduce each record by its own test, then give it their folders")
-        if not data:
-            raise UsageError(f"name the runs: gyrobench reduce {system} --data RUN --data RUN")
-        from gyrobench.commands import suite_report
+    if template:
+        from gyrobench.workflow.measured_run import empty_record
 
-        apply_values(test, settings)
-        verdict = suite_report.reduce(test, data, spec, out, force, as_json)
-    else:
-        from gyrobench.commands import reduce_data
-
-        if template:
-            echo(reduce_data.template(test).rstrip("\n"))
-            return
-        if not data:
-            raise UsageError(f"name the record: gyrobench reduce {system} --data FILE.csv (--template prints its form)")
-        verdict = reduce_data.reduce(test, data, settings, spec, out, force, as_json)
-    exit_on_fail(verdict, strict)
+        echo(empty_record(test).rstrip("\n"))
+        return
+    exit_on_fail(print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json), strict)
 
 
 @app.command()
@@ -312,19 +298,10 @@ def report(
     \b
     Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
     """
-    from gyrobench.commands.inputs import load_saved_test
-    from gyrobench.system.suite import Suite
+    from gyrobench.commands import print_runs
+    from gyrobench.workflow.inputs import load_saved_test
 
-    test = load_saved_test(folder)
-    if isinstance(test, Suite):
-        from gyrobench.commands import suite_report
-
-        verdict = suite_report.report(folder, test, spec, as_json)
-    else:
-        from gyrobench.commands import saved_run
-
-        verdict = saved_run.report(folder, test, spec, as_json)
-    exit_on_fail(verdict, strict)
+    exit_on_fail(print_runs.report(folder, load_saved_test(folder), spec, as_json), strict)
 
 
 @app.command()
@@ -338,9 +315,9 @@ def compare(
     \b
     Example: gyrobench compare reports/out/tumble_single_axis/1a2b3c4d vendor --out comparison
     """
-    from gyrobench.commands import compare_runs
+    from gyrobench.commands import print_runs
 
-    compare_runs.compare(runs, out, as_json)
+    print_runs.compare(runs, out, as_json)
 
 
 @app.command()
@@ -361,7 +338,7 @@ def export(
     Example: gyrobench export tumble_single_axis --to ssp --set windows=36
     """
     from gyrobench.commands import export_system
-    from gyrobench.commands.inputs import parse_settings, parse_swaps
+    from gyrobench.commands.arguments import parse_settings, parse_swaps
 
     path = export_system.export(system, to.value, parse_settings(values), *parse_swaps(part, mapping), seed, out)
     echo(display_path(path))

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
-from gyrobench.commands.inputs import check_fmu_files, load_system, require_slots
+from gyrobench.commands.arguments import load_system
+from gyrobench.workflow.inputs import check_fmu_files, require_slots
 
 
 def export(

@@ -9,9 +9,9 @@ from typing import Any
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
-from gyrobench.commands.inputs import check_fmu_files, require_slots, suite_members
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
+from gyrobench.workflow.inputs import check_fmu_files, require_slots, suite_members
 
 
 def show_system(

@@ -275,7 +275,7 @@ def test_a_killed_process_is_resumed(
     assert process.wait() == -signal.SIGKILL and len(written) == 4
     assert not (tmp_path / "k" / "run.json").exists()
     code, _, err = command([*WORDS, "--out", "k", "--seed", "2"], capsys, monkeypatch)
-    assert code == 2 and "--out k: holds another run (its parameters, seed differ)" in err
+    assert code == 2 and "k: holds another run (its parameters, seed differ)" in err
     code, _, err = command([*WORDS, "--out", "k", "--resume"], capsys, monkeypatch)  # the native engine goes on
     assert code == 0, err
     found = Record.load(tmp_path / "k")

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from gyrobench.bench import Bench
-from gyrobench.commands import console
-from gyrobench.commands.inputs import find_specification, load_limits
-from gyrobench.commands.user_errors import PostRunError, record_kept
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System
+from gyrobench.workflow.inputs import load_limits
+from gyrobench.workflow.user_errors import PostRunError, record_kept
 
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """A run: where it is kept, and its result and report (none of a system without reduction).
+    """A run, its result (none of a system without reduction) and where both are kept (None: in memory only).
 
     stopped: what failed, or what the user stopped, after the run itself.
     """
 
-    folder: Path
     record: Record
     result: Result | None = None
+    folder: Path | None = None
     paths: Mapping[str, Path] = field(default_factory=dict)
     stopped: PostRunError | None = None
 
@@ -41,39 +41,55 @@ def reduce_run(system: System, record: Record, limits: Specification | None) -> 
     return result
 
 
-def write_report(result: Result, folder: Path, record: Record | None, spec: Path | None) -> dict[str, Path]:
-    """Write the report and return its files.  Raises SpecificationError where ``spec`` does not fit the result."""
+def write_report(
+    result: Result, folder: Path | None, record: Record | None, spec: Path | None, formats: Sequence[str] = FORMATS
+) -> dict[str, Path]:
+    """Write the report and return its files, none without a folder; those of an older one in other formats are removed.
+
+    Raises SpecificationError where ``spec`` does not fit the result.
+    """
     from gyrobench.report import check_units, write
 
     if spec is not None:
         check_units(spec, {c.name: c.unit for c in result.coefficients})
-    return write(result, folder, record=(record and record.channels) or None, bench=Bench.find().folder)
+    if folder is None:
+        return {}
+    for kind in set(FORMATS) - set(formats):
+        (folder / NAMES[kind]).unlink(missing_ok=True)
+    return write(result, folder, formats, (record and record.channels) or None, Bench.find().folder)
 
 
-def reduce_saved_run(folder: Path, system: System, spec: Path | None) -> RunOutcome:
+def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: Sequence[str] = FORMATS) -> RunOutcome:
     """Reduce the record of a run of ``system`` again and write its report.
 
     Raises PostRunError, for an incomplete record with what it lacks.
     """
     record = Record.load(folder)
     limits = load_limits(spec)
-    with record_kept(folder):
+    with record_kept(folder, record):
         try:
             result = reduce_run(system, record, limits)
         except GyrobenchError:
             if record.complete:
                 raise
-            missing = console.format_missing_windows(record)
+            missing = _missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
         old = folder / "result.json"
         if old.exists():  # the step check is a run of its own and is kept
             result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
-        return RunOutcome(folder, record, result, write_report(result, folder, record, spec))
+        return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
 
 
-def report(folder: Path, system: System, spec: str | None, as_json: bool = False) -> str:
-    """Reduce a saved run again, write and print its report; return the verdict.  Raises as reduce_saved_run."""
-    outcome = reduce_saved_run(folder, system, find_specification(spec))
-    assert outcome.result is not None
-    console.print_report_files(outcome.paths, None if as_json else console.format_result(outcome.result))
-    return outcome.result.verdict
+def _missing_windows(record: Record) -> str:
+    """Return how far an incomplete record goes, phase by phase of its plan."""
+    run = record.run
+    done = [int(p) for p in record.windows.get("phase", [])]
+    lines = [run.problem or "the run did not end"]
+    lines += [f"recorded until t = {run.stopped_at:,.9g} s"] if run.stopped_at is not None else []
+    for row in run.plan:
+        length = row.travel if row.mode == "rate" else row.dwell
+        expected = round(length / row.window) if row.window else 0
+        have = done.count(row.phase)
+        if have < expected:
+            lines.append(f"phase {row.phase} ({row.label}): {have} of {expected} windows")
+    return "\n".join(f"  - {line}" for line in lines)

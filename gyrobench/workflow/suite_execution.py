@@ -16,13 +16,6 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, UsageError, display_path
-from gyrobench.commands import console
-from gyrobench.commands.inputs import check_fmu_files, find_specification, load_limits, suite_members
-from gyrobench.commands.run_folders import has_complete_record, incomplete_folder, prepare_folder
-from gyrobench.commands.run_system import RunRequest, execute_run
-from gyrobench.commands.saved_run import reduce_saved_run
-from gyrobench.commands.suite_report import suite_document, write_suite_report
-from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, user_message
 from gyrobench.engine import checkpoint
 from gyrobench.files import sha256
 from gyrobench.record.run_document import FILE as RUN
@@ -31,23 +24,32 @@ from gyrobench.report import NAMES
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import InvalidConfigurationError, System
 from gyrobench.system.values import InvalidValueError
+from gyrobench.workflow.feedback import SILENT, Feedback
+from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, suite_members
+from gyrobench.workflow.run_execution import RunRequest, execute_run
+from gyrobench.workflow.run_folders import has_complete_record, incomplete_folder, prepare_folder
+from gyrobench.workflow.saved_run import RunOutcome, reduce_saved_run
+from gyrobench.workflow.suite_report import SuiteOutcome, suite_document, write_suite_report
+from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, user_message
 
 
 class SuiteError(PostRunError):
     """Some test of a suite failed; the report is of the others."""
 
 
-def run(request: RunRequest, suite: Suite, as_json: bool = False) -> str:
-    """Run all tests, then write and print the report of the suite; return the verdict, fail too where methods disagree.
+def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT) -> SuiteOutcome:
+    """Run all tests, then write the report of the suite; its ``stopped`` names the tests that failed.
 
     Raises InvalidConfigurationError with the problems of all tests before the first one runs, CommandInterrupted when
-    the user stops one, SuiteError after the report when some failed.
+    the user stops one, SuiteError where none has a result.
     """
+    if request.in_memory:
+        raise UsageError(f"{suite.name} is a suite: each of its tests is kept in a folder; name theirs: out=FOLDER")
     members = suite_members(suite)
     requests = _test_requests(request, suite, members)
     spec = find_specification(request.spec)
     load_limits(spec)
-    identity = _identity(request, suite, members, requests)
+    identity = _identity(request, suite, members, requests, feedback)
     digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:8]
     folder = request.out or Bench.find().out / suite.name / digest
     if request.resume and not (folder / RUN).is_file():
@@ -58,7 +60,7 @@ def run(request: RunRequest, suite: Suite, as_json: bool = False) -> str:
     document.write(folder)
     failed: dict[str, str] = {}
     for number, (name, system) in enumerate(members.items(), 1):
-        problem = _run_test(requests[name], system, folder / name, f"{name} ({number} of {len(members)})")
+        problem = _run_test(requests[name], system, folder / name, f"{name} ({number} of {len(members)})", feedback)
         if problem:
             failed[name] = problem
     document.tests = {n: SuiteTestRun(folder=n) for n in members if n not in failed}
@@ -66,46 +68,51 @@ def run(request: RunRequest, suite: Suite, as_json: bool = False) -> str:
     document.write(folder)
     if not document.tests:
         raise SuiteError(f"no test of the suite has a result; what each left is in {display_path(folder)}")
-    verdict = write_suite_report(suite, folder, document, spec, as_json)
-    if failed:
-        raise SuiteError(
-            f"{', '.join(failed)} failed; the report in {display_path(folder)} is of the others. After correcting the "
-            "cause: the same command with --resume runs only what is missing"
-        )
-    return verdict
+    outcome = write_suite_report(suite, folder, document, spec, request.formats)
+    if not failed:
+        return outcome
+    stopped = SuiteError(
+        f"{', '.join(failed)} failed; the report in {display_path(folder)} is of the others. After correcting the "
+        "cause: the same command with --resume runs only what is missing"
+    )
+    return replace(outcome, stopped=stopped)
 
 
-def _run_test(request: RunRequest, system: System, folder: Path, label: str) -> str:
+def _run_test(request: RunRequest, system: System, folder: Path, label: str, feedback: Feedback) -> str:
     """Run a test, or what is missing of it, with notes; return why it has no result, empty where it has one.
 
     Raises CommandInterrupted.
     """
     resume_hint = "the suite goes on with the same command and --resume"
     has_run = request.resume and not request.force and has_complete_record(folder)
-    if has_run and all((folder / file).is_file() for file in NAMES.values()):
-        console.print_note(f"{label}: kept as it is in {display_path(folder)}")
+
+    def note(text: str) -> None:
+        feedback.notes([f"{label}: {text}"])
+
+    if has_run and all((folder / NAMES[kind]).is_file() for kind in request.formats):
+        note(f"kept as it is in {display_path(folder)}")
         return ""
     resume = request.resume and any((f / checkpoint.FILE).is_file() for f in (folder, incomplete_folder(folder)))
-    console.print_note(f"{label}: {'is reduced again' if has_run else 'goes on' if resume else 'runs'}")
+    note("is reduced again" if has_run else "goes on" if resume else "runs")
     try:
         if has_run:
-            outcome = reduce_saved_run(folder, system, None)
+            outcome: RunOutcome = reduce_saved_run(folder, system, None, request.formats)
         else:
-            outcome = execute_run(replace(request, out=folder, resume=resume), system)
+            outcome = execute_run(replace(request, out=folder, resume=resume), system, feedback)
     except CommandInterrupted as error:
         raise CommandInterrupted(f"{error}\n{resume_hint}") from None
     except Exception as error:  # the other tests must still run
         message = user_message(error)
-        console.print_note(f"{label}: no result: {message}")
+        note(f"no result: {message}")
         return " ".join(line.strip(" -") for line in message.splitlines()[:2])
     if isinstance(outcome.stopped, CommandInterrupted):
         raise CommandInterrupted(f"{system.name}: {outcome.stopped}\n{resume_hint}")
     if outcome.stopped:
-        console.print_note(f"{label}: {outcome.stopped}")
+        note(str(outcome.stopped))
     if outcome.result is None:
         return "it has no reduction"
     result = outcome.result
-    console.print_note(f"{label}: {result.summary[0] if result.summary else result.verdict}")
+    note(result.summary[0] if result.summary else result.verdict)
     return ""
 
 
@@ -127,8 +134,9 @@ def _test_requests(request: RunRequest, suite: Suite, members: Mapping[str, Syst
 
 
 def _identity(
-    request: RunRequest, suite: Suite, members: Mapping[str, System], requests: Mapping[str, RunRequest]
-) -> dict[str, Any]:
+    request: RunRequest, suite: Suite, members: Mapping[str, System], requests: Mapping[str, RunRequest],
+    feedback: Feedback,
+) -> dict[str, Any]:  # fmt: skip
     """Return what makes this suite another one.  Raises InvalidConfigurationError with the problems of all tests."""
     from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.part_files import resolve_parts
@@ -142,7 +150,7 @@ def _identity(
             system.refuse()
             notes: list[str] = []
             paths, _ = resolve_parts(system, requests[name].parts, "native", Bench.find().folder, notes)
-            console.print_notes(notes)
+            feedback.notes(notes)
             assembly = assemble(system, paths, requests[name].maps)
             parameters = resolve(assembly, system, requests[name].seed, defaults(assembly))[1]
             if wrong := system.check_parameters(parameters):
@@ -151,7 +159,7 @@ def _identity(
             problems += [f"{name}: {p}" for p in error.problems]
             continue
         except InvalidValueError as error:
-            problems.append(f"{name}: --set {error}")
+            problems.append(f"{name}: {error}")
             continue
         hashes = {slot: {"sha256": sha256(p)} for slot, p in paths.items()}
         tests[name] = {"parts": hashes, "parameters": parameters, "options": dict(system.values), "step": system.step}

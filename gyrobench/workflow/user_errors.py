@@ -7,23 +7,31 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gyrobench.bench import Bench, display_path, standard_folder
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import ReportError
+
+if TYPE_CHECKING:
+    from gyrobench.record.record import Record
 
 CONTENT = ("components", "systems", str(Path("reports", "templates")))
 TOOL = Path(__file__).parents[1]
 
 
 class PostRunError(GyrobenchError):
-    """A failure after the run: what was computed before is on disk, and the text says where."""
+    """A failure after the run: its record is on disk, and the text says where, or in memory: attribute ``record``."""
 
     exit_code = 3
 
+    def __init__(self, message: str, record: Record | None = None) -> None:
+        self.record = record
+        super().__init__(message)
+
 
 class CommandInterrupted(PostRunError):
-    """The user stopped a command: what was recorded is on disk."""
+    """The user stopped a command: what was recorded is kept."""
 
     exit_code = 130
 
@@ -82,9 +90,12 @@ def exit_code(error: Exception) -> int | None:
 
 
 @contextmanager
-def record_kept(folder: Path, save: Callable[[], object] | None = None) -> Iterator[None]:
+def record_kept(
+    folder: Path | None, record: Record | None = None, save: Callable[[], object] | None = None
+) -> Iterator[None]:
     """Turn any failure after a run into a PostRunError that names the folder of the record and the next step.
 
+    folder: None for a record in memory, which the error then holds.
     save: writes the record of measured data, unless the failure is a GyrobenchError: those concern the data, and pass.
     """
     try:
@@ -96,8 +107,11 @@ def record_kept(folder: Path, save: Callable[[], object] | None = None) -> Itera
             if isinstance(error, GyrobenchError):
                 raise
             save()
-        kept = f"the record is kept in {display_path(folder)}"
-        go_on = f"gyrobench report {display_path(folder)}"
+        if folder is None:
+            kept, go_on = "the record is kept in memory", "attribute 'record' of this error holds it"
+        else:
+            kept = f"the record is kept in {display_path(folder)}"
+            go_on = f"gyrobench report {display_path(folder)}"
         if isinstance(error, KeyboardInterrupt):
-            raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}") from error
-        raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}") from error
+            raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}", record) from error
+        raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}", record) from error

@@ -7,21 +7,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
-from gyrobench.commands import console
-from gyrobench.commands.inputs import find_specification, load_limits, load_test
-from gyrobench.commands.run_folders import prepare_folder
-from gyrobench.commands.saved_run import write_report
-from gyrobench.commands.user_errors import record_kept
 from gyrobench.record.run_document import DataFile
+from gyrobench.report import FORMATS
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import MeasuredData, System
+from gyrobench.workflow.inputs import find_specification, load_limits, load_test
+from gyrobench.workflow.run_folders import prepare_folder
+from gyrobench.workflow.saved_run import RunOutcome, write_report
+from gyrobench.workflow.user_errors import record_kept
 
 
-def template(system: System) -> str:
+def empty_record(test: System | Suite) -> str:
     """Return an empty CSV with the columns that ``gyrobench reduce`` reads, and what each means.  Raises UsageError."""
     from gyrobench.system.lab_record import explained
 
-    return explained(_measured_data(system).template)
+    if isinstance(test, Suite):
+        raise UsageError(f"{test.name} compares runs: reduce each record by its own test, then give it their folders")
+    return explained(_measured_data(test).template)
 
 
 def _measured_data(system: System) -> MeasuredData:
@@ -33,39 +35,38 @@ def _measured_data(system: System) -> MeasuredData:
     return system.measured_data
 
 
-def reduce(
+def reduce_measured(
     system: System,
-    data: Sequence[Path],
+    data: Path,
     values: Mapping[str, str],
-    spec: str | None,
-    out: Path | None,
+    spec: str | None = None,
+    out: Path | None = None,
     force: bool = False,
-    as_json: bool = False,
-) -> str:
-    """Reduce a laboratory's file, write and print the report; return the verdict.
+    in_memory: bool = False,
+    formats: Sequence[str] = FORMATS,
+) -> RunOutcome:
+    """Reduce a laboratory's file; write record and report, unless they are kept in memory.
 
     values: as given to --set, for the reader.  Raises UsageError, DataError, ReductionError and PostRunError.
     """
     reader = _measured_data(system).read
-    if len(data) > 1:
-        raise UsageError(f"{system.name} reduces one record at a time; --data was given {len(data)} times")
     file = find_specification(spec)
     limits = load_limits(file)
-    text = data[0].read_bytes()
-    record = reader(system, data[0], values)
-    record.run.data = DataFile(file=data[0].name, sha256=hashlib.sha256(text).hexdigest())
+    text = data.read_bytes()
+    record = reader(system, data, values)
+    record.run.data = DataFile(file=data.name, sha256=hashlib.sha256(text).hexdigest())
     identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
-    folder = out or Bench.find().out / system.name / f"measured-{identity}"
+    folder = None if in_memory else out or Bench.find().out / system.name / f"measured-{identity}"
 
     def save() -> None:
-        prepare_folder(folder, {"system": system.name, "data": {"file": data[0].name}}, force)
-        record.save(folder)
+        if folder is not None:
+            prepare_folder(folder, {"system": system.name, "data": {"file": data.name}}, force)
+            record.save(folder)
 
-    with record_kept(folder, save):
+    with record_kept(folder, record, save):
         result = system.reduce(record, limits)
     save()
     result.provenance = record.run.as_dict()
-    with record_kept(folder):
-        paths = write_report(result, folder, record, file)
-    console.print_report_files(paths, None if as_json else console.format_result(result))
-    return result.verdict
+    with record_kept(folder, record):
+        paths = write_report(result, folder, record, file, formats)
+    return RunOutcome(record, result, folder, paths)

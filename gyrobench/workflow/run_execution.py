@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, display_path
-from gyrobench.commands import console
-from gyrobench.commands.inputs import check_fmu_files, find_specification, load_limits, require_slots
-from gyrobench.commands.progress_display import ProgressDisplay
-from gyrobench.commands.run_folders import prepare_run_folder, save_partial_record
-from gyrobench.commands.saved_run import RunOutcome, reduce_run, write_report
-from gyrobench.commands.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
-from gyrobench.record.record import Record
-from gyrobench.result import NO_VERDICT, Result
+from gyrobench.engine.checkpoint import Keeper
+from gyrobench.report import FORMATS
+from gyrobench.result import Result
 from gyrobench.system.system import System
+from gyrobench.workflow.feedback import SILENT, Feedback
+from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
+from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
+from gyrobench.workflow.saved_run import RunOutcome, reduce_run, write_report
+from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What ``gyrobench run`` was asked for, beside the system and its values; step: s, None for the system's own."""
+    """What a run is asked for, beside the system and its values.
+
+    step: s, None for the system's own.  in_memory: nothing is written, ``out``, ``force`` and ``resume`` have no
+    meaning.  formats: of the report.
+    """
 
     parts: Mapping[str, str] = field(default_factory=dict)
     maps: Mapping[str, Path] = field(default_factory=dict)
@@ -35,77 +38,75 @@ class RunRequest:
     check_step: bool = False
     isolate: tuple[str, ...] = ()
     resume: bool = False
+    in_memory: bool = False
+    formats: tuple[str, ...] = FORMATS
 
 
-def run(request: RunRequest, system: System, as_json: bool = False) -> str:
-    """Run a system, print its report and return the verdict.  Raises as :func:`execute_run`."""
-    outcome = execute_run(request, require_slots(system))
-    if outcome.result is None:
-        _print_without_reduction(outcome.record, outcome.folder, as_json)
-        return NO_VERDICT
-    console.print_report_files(outcome.paths, None if as_json else console.format_result(outcome.result))
-    if outcome.stopped:
-        raise outcome.stopped
-    return outcome.result.verdict
+def execute_run(request: RunRequest, system: System, feedback: Feedback = SILENT) -> RunOutcome:
+    """Run a system with its values set; write record and report, unless the request keeps them in memory.
 
-
-def execute_run(request: RunRequest, system: System) -> RunOutcome:
-    """Run a system with its values set; write record and report.
-
-    Raises what Session.run raises, and PostRunError for whatever goes wrong after the run.
+    Raises what Session.run raises, and PostRunError for whatever goes wrong after the run: its text names the folder
+    of the record, its attribute ``record`` holds it.
     """
     from gyrobench.engine.session import RunError, RunInterrupted, Session
 
     spec = find_specification(request.spec)
     limits = load_limits(spec)
-    system.refuse()
+    require_slots(system).refuse()
     check_fmu_files(request.parts)
     bench = Bench.find().folder
     with Session(
         system, request.parts, request.maps, engine=request.engine, isolate=request.isolate, bench=bench
     ) as session:
         step = request.step or system.step
-        folder, keeper = prepare_run_folder(
-            session, system, request.seed, step, request.maps, request.out, request.force, request.resume
-        )
-        console.print_notes([*session.notes, *keeper.notes()])
+        folder: Path | None = None
+        keeper: Keeper | None = None
+        if not request.in_memory:
+            folder, keeper = prepare_run_folder(
+                session, system, request.seed, step, request.maps, request.out, request.force, request.resume
+            )
+        feedback.notes([*session.notes, *(keeper.notes() if keeper else ())])
         try:
-            with ProgressDisplay(system.name) as progress:
+            with feedback.progress(system.name) as progress:
                 record = session.run({}, request.seed, request.step, None, progress, keeper)
         except RunError as error:
-            if error.record is None:
+            if error.record is None or folder is None:
                 raise
             kept = save_partial_record(error.record, folder)
             message = f"{error}\nthe record until then is kept in {display_path(kept)}"
             if isinstance(error, RunInterrupted):
-                raise CommandInterrupted(f"{message} (gyrobench report says what it lacks)") from None
-            raise PostRunError(message) from None
-        record.save(folder)
-        keeper.done()
+                raise CommandInterrupted(f"{message} (gyrobench report says what it lacks)", error.record) from None
+            raise PostRunError(message, error.record) from None
+        if folder is not None and keeper is not None:
+            record.save(folder)
+            keeper.done()
         stopped: PostRunError | None = None
-        with record_kept(folder):
+        with record_kept(folder, record):
             if not system.has_reduction:
-                return RunOutcome(folder, record)
+                return RunOutcome(record, folder=folder)
             result = reduce_run(system, record, limits)
             if request.check_step:
                 try:
-                    result.step_check = check_step(session, system, result, request.seed, step)
+                    result.step_check = check_step(session, system, result, request.seed, step, feedback)
                 except RunInterrupted as error:
                     stopped = CommandInterrupted(f"step check {error}; the report is without it")
                 except Exception as error:
                     stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
                     stopped.__cause__ = error
-            return RunOutcome(folder, record, result, write_report(result, folder, record, spec), stopped)
+            paths = write_report(result, folder, record, spec, request.formats)
+            return RunOutcome(record, result, folder, paths, stopped)
 
 
-def check_step(session: Any, system: System, result: Result, seed: int, step: float) -> dict[str, Any]:
+def check_step(
+    session: Any, system: System, result: Result, seed: int, step: float, feedback: Feedback = SILENT
+) -> dict[str, Any]:
     """Return the change of each coefficient when the step is halved, noise off, against its standard uncertainty."""
     bindings = session.assembly.bindings
     known = {f"{slot}.{name}" for slot, binding in bindings.items() for name in binding.parameters}
     quiet = {name: 0.0 for name in system.noises if name in known}
     estimates: list[dict[str, float]] = []
     for h in (step, step / 2.0):
-        with ProgressDisplay(f"step check, {h:g} s") as progress:
+        with feedback.progress(f"step check, {h:g} s") as progress:
             reduced = system.reduce(session.run(quiet, seed, h, None, progress))
         estimates.append({c.name: c.estimate for c in reduced.coefficients})
     full, half = estimates
@@ -117,10 +118,3 @@ def check_step(session: Any, system: System, result: Result, seed: int, step: fl
             rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": ratio})
     worst = max((r["ratio"] for r in rows if r["ratio"] is not None), default=None)
     return {"step": step, "rows": rows, "worst": worst}
-
-
-def _print_without_reduction(record: Record, folder: Path, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps(record.run.as_dict(), indent=1, ensure_ascii=False))
-    else:
-        print(f"no reduction; record: {display_path(folder)}")

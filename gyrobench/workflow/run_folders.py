@@ -70,7 +70,7 @@ def prepare_run_folder(
 def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
     """Make and return a folder for a run; one that holds the same run may be written again.  Raises UsageError."""
     if folder.exists() and not folder.is_dir():
-        raise UsageError(f"--out {folder}: is a file; name a folder")
+        raise UsageError(f"{folder}: is a file; name a folder")
     old = None
     if (folder / RUN).is_file():
         try:
@@ -83,13 +83,13 @@ def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Pa
         except checkpoint.ResumeError:
             old = {}
     elif folder.is_dir() and any(not p.name.startswith(checkpoint.FILE) for p in folder.iterdir()):
-        raise UsageError(f"--out {folder}: holds other files; name a new folder, for example {folder / 'run1'}")
+        raise UsageError(f"{folder}: holds other files; name a new folder, for example {folder / 'run1'}")
     if old is not None:
         changed = [k for k, v in identity.items() if not _covers(old.get(k), v)]
         if changed and not force:
             raise UsageError(
-                f"--out {folder}: holds another run (its {', '.join(changed)} differ); name another folder, "
-                "or --force to replace it"
+                f"{folder}: holds another run (its {', '.join(changed)} differ); name another folder, "
+                "or replace it: --force (force=True)"
             )
         for name in (*RECORD, *REPORT) if changed else ():
             (folder / name).unlink(missing_ok=True)

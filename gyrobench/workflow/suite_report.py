@@ -7,20 +7,36 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, UsageError
-from gyrobench.commands import console
-from gyrobench.commands.inputs import find_specification, load_limits
-from gyrobench.commands.run_folders import prepare_folder, short_names
-from gyrobench.commands.saved_run import write_report
-from gyrobench.commands.user_errors import record_kept
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods
-from gyrobench.result import DriftTestResult
+from gyrobench.report import FORMATS
+from gyrobench.result import DriftTestResult, SuiteResult
 from gyrobench.system.suite import Suite
+from gyrobench.workflow.inputs import find_specification, load_limits
+from gyrobench.workflow.run_folders import prepare_folder, short_names
+from gyrobench.workflow.saved_run import write_report
+from gyrobench.workflow.user_errors import PostRunError, record_kept
+
+
+@dataclass(frozen=True)
+class SuiteOutcome:
+    """The report of a suite; stopped: which tests failed."""
+
+    folder: Path
+    result: SuiteResult
+    paths: Mapping[str, Path]
+    stopped: PostRunError | None = None
+
+    @property
+    def verdict(self) -> str:
+        """That of the result; fail too where methods disagree."""
+        return "fail" if self.result.suite.consistency == "inconsistent" else self.result.verdict
 
 
 def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
@@ -38,19 +54,24 @@ def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
     )
 
 
-def reduce(suite: Suite, runs: Sequence[Path], spec: str | None, out: Path | None, force: bool, as_json: bool) -> str:
-    """Write and print the report of a suite from runs that exist, simulated or measured; return the verdict."""
+def reduce_runs(
+    suite: Suite,
+    runs: Sequence[Path],
+    spec: str | None = None,
+    out: Path | None = None,
+    force: bool = False,
+    formats: Sequence[str] = FORMATS,
+) -> SuiteOutcome:
+    """Write the report of a suite from runs that exist, simulated or measured.  Raises UsageError."""
     if suite.passed:
-        raise UsageError(
-            f"--set {next(iter(suite.passed))}: the tests have been run; options: {', '.join(suite.about)}"
-        )
+        raise UsageError(f"{next(iter(suite.passed))}: the tests have been run; options: {', '.join(suite.about)}")
     if len(runs) < 2:
-        raise UsageError("name the runs, two or more: --data RUN --data RUN; a folder with a result.json each")
+        raise UsageError(f"{suite.name}: name two runs or more, each the folder of a run with its result.json")
     for folder in runs:
         if not (folder / "result.json").is_file():
             saved = f"gyrobench report {folder} makes it"
             hint = saved if (folder / RUN).is_file() else "a measured record becomes a run by gyrobench reduce"
-            raise UsageError(f"--data {folder}: no result.json there; {hint}")
+            raise UsageError(f"{folder}: no result.json there; {hint}")
     systems = [str(json.loads((f / "result.json").read_text(encoding="utf-8"))["system"]) for f in runs]
     labels = short_names(runs)
     names = [s if systems.count(s) == 1 else f"{s} {label}" for s, label in zip(systems, labels, strict=True)]
@@ -62,22 +83,26 @@ def reduce(suite: Suite, runs: Sequence[Path], spec: str | None, out: Path | Non
     paths = [os.path.relpath(f.resolve(), folder.resolve()) for f in runs]
     document.tests = {name: SuiteTestRun(folder=path) for name, path in zip(names, paths, strict=True)}
     document.complete = True
-    return write_suite_report(suite, folder, document, file, as_json)
+    return write_suite_report(suite, folder, document, file, formats)
 
 
-def report(folder: Path, suite: Suite, spec: str | None, as_json: bool = False) -> str:
-    """Write and print the report of a suite again, from the results of its tests; return the verdict."""
+def report_saved_suite(
+    folder: Path, suite: Suite, spec: str | None = None, formats: Sequence[str] = FORMATS
+) -> SuiteOutcome:
+    """Write the report of a suite again, from the results of its tests."""
     document = read_run(folder)
     if not isinstance(document, SuiteDocument) or not document.tests:
         raise RecordError(f"{folder}: the suite did not end; the same run command with --resume goes on")
     for name in suite.options:
         if name in document.options:
             suite.set(name, document.options[name])
-    return write_suite_report(suite, folder, document, find_specification(spec), as_json)
+    return write_suite_report(suite, folder, document, find_specification(spec), formats)
 
 
-def write_suite_report(suite: Suite, folder: Path, document: SuiteDocument, spec: Path | None, as_json: bool) -> str:
-    """Write run.json and the report, print the result; return the verdict, fail too where methods disagree."""
+def write_suite_report(
+    suite: Suite, folder: Path, document: SuiteDocument, spec: Path | None, formats: Sequence[str] = FORMATS
+) -> SuiteOutcome:
+    """Write run.json and the report from the results of the tests."""
     members = {n: _load_member(folder / test.folder, test.folder) for n, test in document.tests.items()}
     document.tests = {n: member.test for n, member in members.items()}
     for name in suite.about:  # what the suite is not told the tests may say
@@ -85,7 +110,7 @@ def write_suite_report(suite: Suite, folder: Path, document: SuiteDocument, spec
         if text := suite[name] or "; ".join(filter(None, texts)):
             setattr(document, name, text)
     limits = load_limits(spec)
-    with record_kept(folder, lambda: document.write(folder)):
+    with record_kept(folder, save=lambda: document.write(folder)):
         result = combine_methods(
             members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
             conventions=suite.conventions, shared=suite.shared, specification=limits,
@@ -95,9 +120,8 @@ def write_suite_report(suite: Suite, folder: Path, document: SuiteDocument, spec
             result.instrument = suite["instrument"]
     document.write(folder)
     with record_kept(folder):
-        paths = write_report(result, folder, None, spec)
-    console.print_report_files(paths, None if as_json else console.format_suite_result(result))
-    return "fail" if result.suite.consistency == "inconsistent" else result.verdict
+        paths = write_report(result, folder, None, spec, formats)
+    return SuiteOutcome(folder, result, paths)
 
 
 def _load_member(folder: Path, label: str) -> Member:

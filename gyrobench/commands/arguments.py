@@ -1,0 +1,83 @@
+"""What a command line names: values, parts and mapping files of slots, times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import UsageError
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+from gyrobench.system.values import InvalidValueError, parse
+from gyrobench.workflow.inputs import load_test
+
+HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
+
+
+def parse_assignments(values: list[str] | None, option: str, example: str) -> dict[str, str]:
+    """Return ``["a.b=1"]`` as ``{"a.b": "1"}``.
+
+    Raises UsageError for an entry without ``=`` and for a name given twice.
+    """
+    assignments: dict[str, str] = {}
+    for v in values or []:
+        name, sign, value = (x.strip() for x in v.partition("="))
+        if not (sign and name and value):
+            raise UsageError(f"{option} {v}: write NAME=VALUE, for example {option} {example}")
+        if name in assignments:
+            raise UsageError(f"{option} {name}: given twice, {assignments[name]} and {value}")
+        assignments[name] = value
+    return assignments
+
+
+def parse_settings(values: list[str] | None) -> dict[str, str]:
+    """Return the values of --set by name.  Raises UsageError."""
+    return parse_assignments(values, "--set", "latitude=45.75deg")
+
+
+def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict[str, str], dict[str, Path]]:
+    """Return parts and mapping files by slot.  Raises UsageError for a mapping file that does not exist."""
+    parts = parse_assignments(part, "--part", "gyro=vendor.fmu")
+    maps = {k: Path(v) for k, v in parse_assignments(mapping, "--map", "gyro=vendor.toml").items()}
+    for slot, file in maps.items():
+        if not file.is_file():
+            raise UsageError(f"--map {slot}={file}: no such file")
+    return parts, maps
+
+
+def parse_step(text: str | None) -> float | None:
+    """Return a communication step in s.  Raises InvalidValueError."""
+    return float(parse("--step", text, "s")) if text else None
+
+
+def load_with_values(name: str, values: Mapping[str, str], step: float | None = None) -> System | Suite:
+    """Return a system or suite with the values of --set, see :func:`gyrobench.workflow.inputs.load_test`."""
+    test = load_test(name, step)
+    apply_values(test, values)
+    return test
+
+
+def load_system(name: str, values: Mapping[str, str]) -> System:
+    """Return a system with the values of --set.  Raises UsageError for a suite too, naming its tests."""
+    test = load_with_values(name, values)
+    if isinstance(test, Suite):
+        raise UsageError(f"{name} is a suite; name one of its tests: {', '.join(test.tests())}")
+    return test
+
+
+def apply_values(test: System | Suite, values: Mapping[str, Any]) -> None:
+    """Set values.  Raises UsageError."""
+    for key, value in values.items():
+        try:
+            test.set(key, value)
+        except InvalidValueError as error:
+            raise UsageError(f"--set {error}{_unit_hint(test, key, value)}") from None
+
+
+def _unit_hint(test: System | Suite, key: str, value: Any) -> str:
+    """Return the end of a message about a number that was given without its unit."""
+    option = test.options.get(key)
+    if option is None or option.unit not in HINTS or str(value)[-1:].isalpha():
+        return ""
+    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS[option.unit]}"

@@ -1,0 +1,93 @@
+"""What the commands that end in a report print: table, verdict, files; and their verdict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from gyrobench.bench import UsageError, display_path
+from gyrobench.commands import console
+from gyrobench.commands.arguments import apply_values
+from gyrobench.commands.progress_display import ProgressDisplay
+from gyrobench.report.plain_text import format_ranking, format_result
+from gyrobench.result import NO_VERDICT
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+from gyrobench.workflow.feedback import Feedback
+from gyrobench.workflow.inputs import find_specification
+from gyrobench.workflow.run_execution import RunRequest, execute_run
+from gyrobench.workflow.saved_run import RunOutcome, reduce_saved_run
+from gyrobench.workflow.suite_report import SuiteOutcome
+
+FEEDBACK = Feedback(console.print_notes, ProgressDisplay)
+
+
+def run(request: RunRequest, test: System | Suite, as_json: bool = False) -> str:
+    """Run a system or suite, print its result and return the verdict.  Raises as execute_run and execute_suite."""
+    if isinstance(test, Suite):
+        from gyrobench.workflow.suite_execution import execute_suite
+
+        return _print_outcome(execute_suite(request, test, FEEDBACK), as_json)
+    return _print_outcome(execute_run(request, test, FEEDBACK), as_json)
+
+
+def report(folder: Path, test: System | Suite, spec: str | None, as_json: bool = False) -> str:
+    """Reduce a saved run again, print its result and return the verdict."""
+    if isinstance(test, Suite):
+        from gyrobench.workflow.suite_report import report_saved_suite
+
+        return _print_outcome(report_saved_suite(folder, test, spec), as_json)
+    return _print_outcome(reduce_saved_run(folder, test, find_specification(spec)), as_json)
+
+
+def reduce(
+    test: System | Suite,
+    data: Sequence[Path],
+    values: Mapping[str, str],
+    spec: str | None,
+    out: Path | None,
+    force: bool = False,
+    as_json: bool = False,
+) -> str:
+    """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict."""
+    if isinstance(test, Suite):
+        from gyrobench.workflow.suite_report import reduce_runs
+
+        if not data:
+            raise UsageError(f"name the runs: gyrobench reduce {test.name} --data RUN --data RUN")
+        apply_values(test, values)
+        return _print_outcome(reduce_runs(test, data, spec, out, force), as_json)
+    from gyrobench.workflow.measured_run import reduce_measured
+
+    if not data:
+        raise UsageError(f"name the record: gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
+    if len(data) > 1:
+        raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
+    return _print_outcome(reduce_measured(test, data[0], values, spec, out, force), as_json)
+
+
+def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:
+    """Write and print the comparison of several runs; the first is the baseline.  Raises UsageError."""
+    from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
+
+    comparison = compare_folders(runs)
+    if comparison.note:
+        console.print_note(f"note: {comparison.note}")
+    paths = comparison.write(out or comparison_folder(runs))
+    console.print_report_files(paths, None if as_json else format_ranking(comparison.document))
+
+
+def _print_outcome(outcome: RunOutcome | SuiteOutcome, as_json: bool) -> str:
+    """Print a result, or where the record of a system without reduction is; return the verdict."""
+    if outcome.result is None:
+        assert isinstance(outcome, RunOutcome) and outcome.folder is not None
+        if as_json:
+            print(json.dumps(outcome.record.run.as_dict(), indent=1, ensure_ascii=False))
+        else:
+            print(f"no reduction; record: {display_path(outcome.folder)}")
+        return NO_VERDICT
+    console.print_report_files(outcome.paths, None if as_json else format_result(outcome.result))
+    if outcome.stopped:
+        raise outcome.stopped
+    return outcome.verdict if isinstance(outcome, SuiteOutcome) else outcome.result.verdict

@@ -1,0 +1,99 @@
+"""Results of several runs side by side."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.report import FORMATS, ResultError
+from gyrobench.result import Result
+from gyrobench.workflow.run_folders import short_names
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Named results laid side by side; the first is the baseline.
+
+    document: the content of comparison.json.  note: what to be aware of, "" where nothing.
+    """
+
+    results: Sequence[tuple[str, Result]]
+    document: Mapping[str, Any]
+    note: str = ""
+
+    def write(self, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+        """Write comparison.json, .html and .pdf into a folder; return their paths."""
+        from gyrobench.report import compare
+
+        return compare(self.results, folder, formats, bench=Bench.find().folder)
+
+
+def compare_results(results: Sequence[tuple[str, Result]]) -> Comparison:
+    """Return named results side by side.  Raises UsageError for fewer than two, and for runs with nothing in common."""
+    from gyrobench.report.comparison_page import comparison
+
+    _require_two(len(results))
+    names = [name for name, _ in results]
+    if len(set(names)) < len(names):
+        raise UsageError(f"runs to compare: their names must differ: {', '.join(names)}")
+    note = _common_ground(results)
+    return Comparison(tuple(results), comparison(results), note)
+
+
+def compare_folders(runs: Sequence[Path]) -> Comparison:
+    """Return runs side by side, each by its result.json.  Raises UsageError."""
+    _require_two(len(runs))
+    for folder in runs:
+        _require_folder(folder)
+    results = [read_result(f) for f in runs]
+    return compare_results(list(zip(short_names(runs), results, strict=True)))
+
+
+def comparison_folder(runs: Sequence[Path]) -> Path:
+    """Return where the comparison of these runs goes unless a folder is named."""
+    digest = hashlib.sha256("".join(str(f.resolve()) for f in runs).encode()).hexdigest()[:8]
+    return Bench.find().out / "comparison" / digest
+
+
+def read_result(folder: Path) -> Result:
+    """Return the result of a saved run.  Raises UsageError where there is none that can be read."""
+    from gyrobench.report import load
+
+    _require_folder(folder)
+    file = folder / "result.json"
+    if not file.is_file():
+        raise UsageError(f"{folder}: has no result.json; gyrobench report {folder} makes it")
+    try:
+        return load(file.read_text(encoding="utf-8"))
+    except ResultError as error:
+        raise UsageError(f"{file}: {error}") from None
+
+
+def _require_two(runs: int) -> None:
+    if runs < 2:
+        raise UsageError("compare needs two runs or more: gyrobench compare RUN RUN")
+
+
+def _require_folder(folder: Path) -> None:
+    if not folder.is_dir():
+        raise UsageError(f"{folder}: no such folder; runs are in {Bench.find().out}/SYSTEM/")
+
+
+def _common_ground(results: Sequence[tuple[str, Result]]) -> str:
+    """Return a note where systems differ.  Raises UsageError for a run without any coefficient of the baseline."""
+    (first, base), *others = results
+    known = {c.name for c in base.coefficients}
+    for name, result in others:
+        if known.isdisjoint(c.name for c in result.coefficients):
+            raise UsageError(
+                f"{name} ({result.system}) and {first} ({base.system}) have no coefficient in common: "
+                "nothing to compare"
+            )
+    systems = dict.fromkeys(r.system for _, r in results)
+    if len(systems) == 1:
+        return ""
+    return f"runs of different systems ({', '.join(systems)}): equal names may not mean equal quantities"
