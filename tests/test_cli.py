@@ -247,6 +247,21 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
     assert Record.load(tmp_path / "here").run.seed == 2
 
 
+def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Call, tmp_path: Path) -> None:
+    run = ["run", NAME, *TINY, "--out", "r"]
+    assert gyrobench(*run)[0] == 0
+    assert (tmp_path / "r" / "report.html").is_file() and (tmp_path / "r" / "report.pdf").is_file()
+    before = (tmp_path / "r" / "result.json").read_bytes()
+    code, out, _ = gyrobench(*run, "--no-report")
+    assert code == 0 and out.rstrip().endswith("r/result.json") and "D_I" in out
+    assert {f.name for f in (tmp_path / "r").iterdir()} == {
+        "run.json", "record.parquet", "channels.parquet", "result.json",
+    }  # fmt: skip
+    again = json.loads((tmp_path / "r" / "result.json").read_bytes())
+    assert again["coefficients"] == json.loads(before)["coefficients"]
+    assert gyrobench("report", "r")[0] == 0 and (tmp_path / "r" / "report.html").is_file()
+
+
 def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text('[coefficients.D_I]\nunit = "mA"\nmin = -1\n', encoding="utf-8")
     code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
