@@ -25,8 +25,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gyrobench import units
 from gyrobench.units import DEG, G0
 
+DPH = units.factor("deg/h")
 NAMES = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_OO", "D_SS", "D_IO", "D_OS", "D_IS")
 TERM_SETS: dict[int, tuple[str, ...]] = {
     3: ("D_F", "D_I", "D_S"),
@@ -47,6 +49,12 @@ MEANING = {
     "D_IO": "compliance, input and output axes",
     "D_OS": "compliance, output and spin axes",
     "D_IS": "anisoelasticity, input and spin axes",
+}
+#: the square that cannot be told from the others at constant |g| -> the three that take it up
+FOLDED = {
+    "D_OO": ("D_F", "D_II", "D_SS"),
+    "Dx_yy": ("Dx_0", "Dx_xx", "Dx_zz"),
+    "Dy_xx": ("Dy_0", "Dy_yy", "Dy_zz"),
 }
 _AXES = {"I": 0, "O": 1, "S": 2, "x": 0, "y": 1, "z": 2}
 _OWN = {"x": {"I": "x", "O": "y", "S": "z"}, "y": {"I": "y", "O": "x", "S": "z"}}  # of a channel, signs apart
@@ -97,6 +105,19 @@ def terms(which: int) -> tuple[str, ...]:
 def terms_2dof(channel: str, which: int) -> tuple[str, ...]:
     """Coefficient names of the ``which``-term model of a channel: x, 9: Dx_0, Dx_x, Dx_y, ... without Dx_yy."""
     return tuple(name_2dof(channel, n) for n in terms(which))
+
+
+def fold_problems(true: Mapping[str, float], prefix: str = "") -> list[str]:
+    """Return which squares of a simulated gyro no test at constant |g| sees: coefficients in rad/s per g0 squared.
+
+    prefix: of the names in ``true``, which the sentences repeat ("gyro.").
+    """
+    return [
+        f"{prefix}{square} = {true[prefix + square] / DPH:g} deg/h/g2: at constant |g| it cannot be told from {a}, {b} "
+        f"and {c}; set fold=true to accept the combinations {a} + γ² {square}, {b} − {square}, {c} − {square}"
+        for square, (a, b, c) in FOLDED.items()
+        if true.get(prefix + square)
+    ]
 
 
 def regressors(xyz: ArrayLike, names: tuple[str, ...] = NAMES) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ counts that positive: its theta is -angle.  [CONV-FRAMES, TUM1-GEOM; Hu 1981, eq
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,11 +28,15 @@ __all__ = [
     "U",
     "check_rotation",
     "earth_rate_local",
+    "equatorial_base",
+    "gravity_problems",
+    "latitude_problems",
     "normal_gravity",
     "passive_z",
     "polar_base",
     "pole",
     "rotation",
+    "rotation_problems",
     "to_face",
     "tumble_faces",
 ]
@@ -132,10 +136,39 @@ def check_rotation(matrix: ArrayLike, name: str, tolerance: float = 1e-9) -> Arr
     return c
 
 
+def rotation_problems(matrices: Mapping[str, ArrayLike]) -> list[str]:
+    """Return what :func:`check_rotation` says of each of the named matrices."""
+    problems = []
+    for name, matrix in matrices.items():
+        try:
+            check_rotation(matrix, name)
+        except ValueError as error:
+            problems.append(str(error))
+    return problems
+
+
+def latitude_problems(latitude: float) -> list[str]:
+    """Return why there is no such latitude (rad), as a sentence; empty where there is."""
+    if abs(latitude) <= math.pi / 2:
+        return []
+    return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+
+
+def gravity_problems(gravity: float) -> list[str]:
+    """Return why there is no such gravity (m/s2) on Earth, as a sentence; empty where there is."""
+    return [] if 9.7 <= gravity <= 9.9 else [f"gravity {gravity:.6g} m/s² lies outside 9.7..9.9 m/s²"]
+
+
 def polar_base(latitude: float) -> Array:
     """Base matrix of a table with its axis on the pole: rows x_T = E, y_T = p x E, z_T = p at angle 0."""
     p = pole(check_latitude(latitude))
     return np.array([E, np.cross(p, E), p])
+
+
+def equatorial_base(latitude: float) -> Array:
+    """Return the base of a table with its axis east, first axis on the pole: its axis sees no Earth rate."""
+    p = pole(latitude)
+    return np.array([p, np.cross(E, p), E])
 
 
 def tumble_faces(latitude: float) -> dict[str, Array]:

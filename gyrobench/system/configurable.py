@@ -34,13 +34,17 @@ def _bound(value: float, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Option:
-    """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type."""
+    """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type.
+
+    sets: parameters of parts ("site.latitude") that the option owns: they take its value.
+    """
 
     default: Any
     unit: str | type
     doc: str = ""
     min: float | None = None
     max: float | None = None
+    sets: tuple[str, ...] = ()
 
     @property
     def kind(self) -> type:

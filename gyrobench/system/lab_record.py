@@ -36,10 +36,10 @@ def explained(template: str) -> str:
 
 def read_record(
     system: System, data: Path, values: Mapping[str, str], *, needed: Mapping[str, str] | None = None,
-    attitudes: Callable[[], Mapping[str, str]] | None = None, columns: tuple[Column, ...] = WINDOW_COLUMNS,
+    attitudes: Callable[[System], Mapping[str, str]] | None = None, columns: tuple[Column, ...] = WINDOW_COLUMNS,
     time: str | None = "t_start", texts: Sequence[str] = TEXTS,
 ) -> Record:  # fmt: skip
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
+    """Return the CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
 
     needed: options that must be given, with an example: {"latitude": "45.75deg", "k": "..."}.  attitudes: what a
     phase may be called -> mode "hold", "index" or "rate", asked once the options are set; None: a record without
@@ -63,7 +63,7 @@ def read_record(
             )
     plan: list[PlanRow] = []
     if attitudes is not None:
-        plan, unclear = _plan(windows["phase"], said, attitudes())
+        plan, unclear = _plan(windows["phase"], said, attitudes(system))
         problems += unclear
     if problems:
         raise DataError(data, problems)

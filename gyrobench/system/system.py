@@ -28,7 +28,7 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,11 +59,12 @@ __all__ = [
 class Slot:
     """A place in a system: its socket and the name of the part that is there unless another one is given.
 
-    socket: the name of one of gyrobench.system.sockets, or a Socket of the system's own.
+    socket: the name of one of gyrobench.system.sockets, or a Socket of the system's own.  part: "" in a family, where
+    the system names it, see :meth:`System.with_parts`.
     """
 
     socket: str | Socket
-    part: str
+    part: str = ""
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,9 @@ class System(Configurable):
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
+    assumed: ClassVar[
+        tuple[str, ...]
+    ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
 
@@ -132,6 +136,23 @@ class System(Configurable):
                 f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "
                 f"is written slot.parameter, slots: {', '.join(self.slots)}"
             )
+
+    @classmethod
+    def with_parts(cls, **parts: str) -> dict[str, Slot]:
+        """Return the slots of a family with the parts of a system: ``RebalanceTest.with_parts(gyro="floated_gyro")``.
+
+        Raises InvalidConfigurationError for a slot that the family does not have.
+        """
+        unknown = [
+            f"no slot '{n}' in {cls.__name__}; slots: {', '.join(cls.slots)}" for n in parts if n not in cls.slots
+        ]
+        if unknown:
+            raise InvalidConfigurationError(cls.__name__, unknown)
+        return {name: replace(slot, part=parts.get(name, slot.part)) for name, slot in cls.slots.items()}
+
+    def owned(self) -> dict[str, Any]:
+        """Return the parameters that options own: "slot.parameter" -> value of the option."""
+        return {name: self[key] for key, option in self.options.items() for name in option.sets}
 
     # ------------------------------------------------------------ to be given by the system
     def plan(self) -> Plan | LoopPlan:
@@ -203,4 +224,7 @@ def load_system(name: str, bench: Path | None = None) -> System:
     system = load_configurable(name, bench)
     if not isinstance(system, System):
         raise UsageError(f"{name} is a suite of tests; gyrobench show {name} names them")
+    if empty := [slot for slot, s in system.slots.items() if not s.part]:
+        parts = ", ".join(f'{slot}="..."' for slot in empty)
+        raise InvalidConfigurationError(name, [f"slot {', '.join(empty)}: no part; name it by with_parts({parts})"])
     return system

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
 
-from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
+from gyrobench.system.system import MeasuredData
 
 from .geometry import FACES
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 TEMPLATE = """\
 # Multi-position test of an accelerometer on a head with a horizontal axis: one row for each reading.
@@ -32,12 +27,7 @@ TEMPLATE = """\
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
-    needed = {"gravity": "9.8067m/s2", "scale": "9806.65m/s2/A"}
-    return read_record(system, data, values, needed=needed, attitudes=lambda: dict.fromkeys(FACES, "index"))
+NEEDED = {"gravity": "9.8067m/s2", "scale": "9806.65m/s2/A"}
+MEASURED = MeasuredData(
+    TEMPLATE, partial(read_record, needed=NEEDED, attitudes=lambda _: dict.fromkeys(FACES, "index"))
+)

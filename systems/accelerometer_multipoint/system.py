@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.table_test import Array, TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
+from gyrobench.system.system import Option, Slot
 
-from . import geometry, measured
+from . import geometry
+from .measured import MEASURED
 
 TURN = 2.0 * math.pi
 DEG = math.pi / 180.0
@@ -23,7 +25,7 @@ STATIONS = 24  # of the indexing head
 MOUNTS = {"both": ("a", "b"), "a": ("a",), "b": ("b",)}
 
 
-class AccelerometerMultipoint(System):
+class AccelerometerMultipoint(TableTest):
     """An accelerometer stands in 4, 8, 12 or 24 equally spaced positions about a horizontal axis; gravity gives bias,
     scale factor, second and third order; two mounts give the cross terms with the output and with the pendulum axis.
 
@@ -32,33 +34,13 @@ class AccelerometerMultipoint(System):
 
     title = "Multi-position test of an accelerometer"
     spec = ("TEST-ACC-MULTI", "ACC-EXACT", "ACC-4PT", "ACC-MINPTS")
-    slots = {
-        "site": Slot("Site", "site"),
-        "sequencer": Slot("Sequencer", "sequencer"),
-        "table": Slot("Table", "index_head"),
-        "accelerometer": Slot("Accelerometer", "accelerometer_pendulous"),
-        "sampler": Slot("Sampler", "sampler"),
-    }
-    wires = """
-        site.f -> table.f_local
-        site.omega -> table.omega_local
-        sequencer.mode -> table.mode
-        sequencer.target -> table.target
-        sequencer.face -> table.face
-        table.f -> accelerometer.f
-        table.angle_read -> sequencer.angle
-        table.in_position -> sequencer.in_position
-        accelerometer.i_read -> sampler.x
-        table.angle_read -> sampler.angle
-        sequencer.gate -> sampler.gate
-        sequencer.window -> sampler.window
-        sequencer.phase -> sampler.phase
-        accelerometer.saturated -> sampler.flag
+    slots = on_table(table=Slot("Table", "index_head"), accelerometer=Slot("Accelerometer", "accelerometer_pendulous"))
+    wires = f"""
+        {TableTest.wires}
+        table -> accelerometer: f
+        accelerometer -> sampler: i_read=x saturated=flag
     """
-    options = {
-        "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
-        "height": Option(0.0, "m", "height above the ellipsoid"),
-        "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity"),
+    options = SITE | {
         "points": Option(24, int, "positions a turn: 4, or 7 to 24", 4, STATIONS),
         "mounts": Option("both", str, "a (gives k5), b (gives k4) or both"),
         "turns": Option(1, int, "turns in each mount", 1, 24),
@@ -74,9 +56,8 @@ class AccelerometerMultipoint(System):
     noises = (
         "accelerometer.turn_on", "accelerometer.markov", "accelerometer.white", "accelerometer.meter", "table.repeat",
     )  # fmt: skip
-    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
-    windows = Windows.of("sampler")
-    done = "sequencer.done"
+    assumed = ("table.base",)
+    measured_data = MEASURED
     channels = ("table.angle", "accelerometer.i", "accelerometer.theta")
     channel_period = 1.0
 
@@ -100,49 +81,35 @@ class AccelerometerMultipoint(System):
                 station += 1
         return Plan(phases, {m: f.tolist() for m, f in geometry.FACES.items()})
 
+    def base(self) -> Array:
+        return geometry.BASE
+
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {
-            **self.plan().parameters(),
-            "site.latitude": self["latitude"],
-            "site.height": self["height"],
-            "site.gravity": self["gravity"],
-            "table.base": geometry.BASE,
-            "table.positions": STATIONS if STATIONS % self["points"] == 0 else self["points"],
-        }
+        stations = STATIONS if STATIONS % self["points"] == 0 else self["points"]
+        return {**super().parameters(parts), "table.positions": stations}
 
     def check(self) -> list[str]:
         from .refusals import points_problems
 
-        found = []
+        problems = super().check() + points_problems(self["points"], self["mounts"], self["turns"])
         if self["mounts"] not in MOUNTS:
-            found.append(f"mounts = {self['mounts']}: must be a, b or both")
-        return found + points_problems(self["points"], self["mounts"], self["turns"])
+            problems.append(f"mounts = {self['mounts']}: must be a, b or both")
+        return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        found = []
-        faces = parameters.get("sequencer.faces", [])
-        matrices = {
-            f"sequencer.faces, mount {name}": np.reshape(f, (3, 3))
-            for name, f in zip(geometry.FACES, faces, strict=False)
-        }
-        matrices |= {n: parameters[n] for n in ("accelerometer.mount", "table.base") if n in parameters}
-        for name, matrix in matrices.items():
-            try:
-                frames.check_rotation(matrix, name)
-            except ValueError as error:
-                found.append(str(error))
+        problems = super().check_parameters(parameters)
         axis = np.asarray(parameters.get("table.base", geometry.BASE))[2]
         if abs(float(axis[2])) > DEG:
-            found.append(
+            problems.append(
                 f"table.base: the axis stands {math.degrees(math.asin(min(1.0, abs(float(axis[2]))))):.3g}° from the "
                 "horizon; the test needs a horizontal axis (1°)"
             )
-        if not found and "accelerometer.mount" in parameters:
+        if not problems and "accelerometer.mount" in parameters:
             from .refusals import zero_problems
 
             mounts = MOUNTS[self["mounts"]]
-            found += zero_problems({m: geometry.zero_angle(m, parameters["accelerometer.mount"]) for m in mounts})
-        return found
+            problems += zero_problems({m: geometry.zero_angle(m, parameters["accelerometer.mount"]) for m in mounts})
+        return problems
 
     def warnings(self) -> list[str]:
         if self["points"] == 4:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,9 @@ from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import TEXTS, read_record
+from gyrobench.system.system import MeasuredData, System
 
 from . import positions
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 TEMPLATE = """\
 # Eight-position test of a two-degree-of-freedom gyro with both rebalance loops closed: one row for each reading.
@@ -55,10 +52,7 @@ COLUMNS = (
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
+    """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
     runs = read_runs(data, system.name)
     if runs is not None:
         return runs
@@ -92,3 +86,6 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     ]
     windows = {"phase": np.array([phases[k] for k in keys], dtype=np.int64), **rows}
     return Record(windows, {}, record.run.replace(plan=plan))
+
+
+MEASURED = MeasuredData(TEMPLATE, read)

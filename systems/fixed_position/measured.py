@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData, System
 
 TEMPLATE = """\
 # Fixed-position test of a gyro in torque rebalance: one row for each reading.
@@ -47,10 +44,7 @@ COLUMNS = (
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
+    """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
     runs = read_runs(data, system.name)
     if runs is not None:
         return runs
@@ -64,3 +58,6 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
         PlanRow(phase=int(d), label=ATTITUDE, mode="hold", face=ATTITUDE, day=str(d) if several else "") for d in days
     ]
     return Record({"phase": day, **windows}, {}, record.run.replace(plan=plan))
+
+
+MEASURED = MeasuredData(TEMPLATE, read)

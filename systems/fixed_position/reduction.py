@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.attitudes import parse
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
-from gyrobench.reduction.drift.attitude_parser import parse
 from gyrobench.reduction.estimation import repeatability
 from gyrobench.reduction.estimation.fit_result import (
     Effect,

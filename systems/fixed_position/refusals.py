@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.reduction.drift.attitude_parser import parse
+from gyrobench.attitudes import parse
 
 STEP_MAX = 5e-3  # s
 

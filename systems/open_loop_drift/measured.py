@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from gyrobench.record.csv_reader import Column
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData, System
 
 TEMPLATE = """\
 # Open-loop drift test: the case is turned about the input axis of the gyro to the null of its pickoff; a row a reading.
@@ -41,10 +38,7 @@ COLUMNS = (
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
+    """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
     needed = {"latitude": "45.75deg", "attitude": "E U -N"}
     record = read_record(system, data, values, needed=needed, columns=COLUMNS)
     windows = dict(record.windows)
@@ -53,3 +47,6 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     windows |= {"angle_start": angle, "angle_end": angle, "phase": np.arange(1, angle.size + 1)}
     plan = [PlanRow(phase=n, label=f"reading {n}", mode="hold", face="input axis") for n in windows["phase"].tolist()]
     return Record(windows, {}, record.run.replace(plan=plan))
+
+
+MEASURED = MeasuredData(TEMPLATE, read)

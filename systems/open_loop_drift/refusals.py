@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.reduction.drift.attitude_parser import parse
+from gyrobench.attitudes import parse
 
 ARCMIN = math.pi / 10800.0
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
-from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
 # Pickoff of a gyro, open loop, input axis along the table axis and at right angles to the pole: one row per reading.
@@ -37,12 +32,4 @@ COLUMNS = tuple(
     else c
     for c in WINDOW_COLUMNS
 )
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
-    needed = {"gain": "1", "drift": "2deg/h"}
-    return read_record(system, data, values, needed=needed, columns=COLUMNS)
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed={"gain": "1", "drift": "2deg/h"}, columns=COLUMNS))

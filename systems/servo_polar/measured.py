@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from gyrobench.record.record import Record
-from gyrobench.system.families import servo_stand
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.attitudes import POLAR
+from gyrobench.system.families.servo_test import laboratory_data
 
 TEMPLATE = """\
 # Polar servo test: the gyro holds a table with its axis along the pole; one row for each window between two readings.
@@ -33,8 +26,4 @@ TEMPLATE = """\
 # mean, std: pickoff voltage, n samples, flagged (suspect samples): optional.  Units may be others of the same kind.
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]
 """
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI.  Raises DataError, and InvalidValueError for an option that does not fit."""
-    return servo_stand.read(system, data, values, ("x east, y up", "x east, y down", *servo_stand.POLAR))
+MEASURED = laboratory_data(TEMPLATE, ("x east, y up", "x east, y down", *POLAR))

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
+from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.fit_result import Findings, Group, ReductionError, fit, linear_result, plus_minus
 from gyrobench.result import DriftTestResult, Specification
-from gyrobench.system.families.servo_stand import ATTITUDES, POLAR, attitude
 
 from . import closed, refusals
 from .model import Model
@@ -43,10 +43,10 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     route, which = str(options.get("route", "dwells")), int(options.get("terms", 9))
     labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
     if route != "dwells" or len({n for n in labels.values() if n in POLAR}) == 1:
-        labels = {p: n for p, n in labels.items() if n in POLAR or n not in ATTITUDES}
+        labels = {p: n for p, n in labels.items() if n in POLAR or n not in SERVO_ATTITUDES}
     wrong = refusals.latitude_problems(site.latitude)
-    wrong += [f"phase {p}: attitude '{n}' unknown; there are {', '.join(ATTITUDES)}" for p, n in labels.items()
-              if n not in ATTITUDES]  # fmt: skip
+    wrong += [f"phase {p}: attitude '{n}' unknown; there are {', '.join(SERVO_ATTITUDES)}" for p, n in labels.items()
+              if n not in SERVO_ATTITUDES]  # fmt: skip
     wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
     if wrong:
         raise ReductionError(wrong)
@@ -70,7 +70,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         wrong.append(f"no polar mount in the record; phases are {', '.join(labels.values())}")
     if wrong:
         raise ReductionError(wrong)
-    axes = np.array([attitude(labels[p], site.latitude) for p in phase.tolist()])
+    axes = np.array([on_servo_table(labels[p], site.latitude) for p in phase.tolist()])
     held = servo_regression.Held(start, end, t0, t1, axes)
     model = Model.of(route, mounts, which)
     y, X = servo_regression.drift_rate(held, site), model.columns(held, site)
@@ -144,7 +144,7 @@ def _group(
         return Group(labels[p], mine, middle[mine] - held.t_start[mine][0], "time in the dwell", "s")
     angle = np.degrees(np.mod(((held.angle_start + held.angle_end) / 2.0)[mine], 2.0 * math.pi))
     dense = np.radians(np.arange(0.0, 361.0, 3.0))
-    axes = np.broadcast_to(attitude(labels[p], site.latitude), (dense.size, 3, 3))
+    axes = np.broadcast_to(on_servo_table(labels[p], site.latitude), (dense.size, 3, 3))
     zero = np.zeros_like(dense)
     curve = model.columns(servo_regression.Held(dense, dense, zero, zero + 1.0, axes), site)
     return Group(labels[p], mine, angle, "table angle", "°", (np.degrees(dense), curve))

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
+from gyrobench.attitudes import POLAR, on_servo_table
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.run_metadata import Site
-from gyrobench.system.families.servo_stand import POLAR, attitude
 
 from .model import ROUTES, Model
 
@@ -25,7 +25,7 @@ def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[serv
     """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(
-        [np.repeat(attitude(p, latitude)[None], a.size, axis=0) for p, a in zip(phases, angles, strict=True)]
+        [np.repeat(on_servo_table(p, latitude)[None], a.size, axis=0) for p, a in zip(phases, angles, strict=True)]
     )
     phase = np.repeat(np.arange(len(phases)), [a.size for a in angles])
     a, t = np.concatenate(angles), np.arange(phase.size, dtype=float)
@@ -71,7 +71,7 @@ def option_problems(options: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def model_problems(parameters: Mapping[str, Any], which: int) -> list[str]:
+def model_problems(parameters: Mapping[str, Any]) -> list[str]:
     """What the simulated gyro has and the model has not."""
     square = parameters.get("gyro.D_OO", 0.0) / DPH
     if square:

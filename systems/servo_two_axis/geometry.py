@@ -17,28 +17,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gyrobench import frames
+from gyrobench.attitudes import CROSS, EAST, NORTH, POLE, UP, axes
 
 Array = NDArray[np.float64]
-E, N, U, P, Q = 1, 2, 3, 4, 5  # directions of the part fixture: east, north, up, pole p, E x p (the I of Hu 1981)
 #: number in appendix 2 of Hu 1981, ch. 3, -> directions of X (outer axis) and Y (inner axis); Z = X cross Y
 MOUNTS = {
-    1: (E, N), 2: (E, U), 3: (N, E), 4: (N, U), 5: (E, P), 6: (E, Q), 7: (U, N), 8: (U, E), 9: (P, E), 10: (P, Q),
-    11: (Q, E), 12: (Q, P),
+    1: (EAST, NORTH), 2: (EAST, UP), 3: (NORTH, EAST), 4: (NORTH, UP),
+    5: (EAST, POLE), 6: (EAST, CROSS), 7: (UP, NORTH), 8: (UP, EAST),
+    9: (POLE, EAST), 10: (POLE, CROSS), 11: (CROSS, EAST), 12: (CROSS, POLE),
 }  # fmt: skip
 LEAST = 0.2  # of cos y  [SERVO2-LOCK]
 DAY = 2.0 * math.pi / frames.EARTH_RATE
 
 
-def directions(latitude: float) -> dict[int, Array]:
-    """Unit vectors in ENU by number."""
-    p = frames.pole(latitude)
-    return {E: frames.E, N: frames.N, U: frames.U, P: p, Q: np.cross(frames.E, p)}
-
-
 def base(mount: int, latitude: float) -> Array:
     """Rows X, Y, Z of a mount in ENU.  KeyError for a number that is none of the twelve."""
-    x, y = (directions(latitude)[k] for k in MOUNTS[mount])
-    return np.array([x, y, np.cross(x, y)])
+    return axes(*MOUNTS[mount], latitude)
 
 
 def attitude(x: ArrayLike, y: ArrayLike) -> Array:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
-from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
+from gyrobench.system.system import MeasuredData
 
 from .geometry import MOUNTS
 from .windows import ANGLES
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 TEMPLATE = """\
 # Two-axis servo test: the gyro holds a table with two axes; one row for each window between two readings of its angles.
@@ -45,9 +40,6 @@ COLUMNS = (
     *(Column(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
     *(Column(f"{c}_{a}", "V", f"{a} pickoff voltage", required=False) for a in "xy" for c in ("mean", "std")),
 )
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI.  Raises DataError, and InvalidValueError for an option that does not fit."""
-    mounts = {f"mount {m}": "servo" for m in MOUNTS}
-    return read_record(system, data, values, needed={"latitude": "45.75deg"}, attitudes=lambda: mounts, columns=COLUMNS)
+NEEDED = {"latitude": "45.75deg"}
+ATTITUDES = {f"mount {m}": "servo" for m in MOUNTS}
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=lambda _: ATTITUDES, columns=COLUMNS))

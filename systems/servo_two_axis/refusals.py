@@ -168,12 +168,6 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
                 f"gyro.{square} = {value:g} °/h/g² ({c} channel): at constant |g| it cannot be told from the constant "
                 "and the other squares, and the model of Hu 1981 has no such term; set it to 0"
             )
-    for name in ("gyro.mount", "outer.base", "inner.base", "stand.base"):
-        if name in parameters:
-            try:
-                frames.check_rotation(parameters[name], name)
-            except ValueError as error:
-                found.append(str(error))
     M = np.asarray(parameters.get("gyro.mount", np.eye(3)))
     if not found and min(M[0, 0], M[1, 1]) < TILTED:
         found.append(

@@ -8,18 +8,15 @@ between site and outer table: it turns what the site says into the axes of the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
-from gyrobench.system.families import servo_stand
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.servo_test import CAPTURE_RATE, INDEX_RATE, stand_parameters
+from gyrobench.system.families.table_test import sampled
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.sockets import Connector, Socket
 
 from .geometry import MOUNTS
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 FACE = "gyro x, y, z along X, Y, Z at 0, 0"
 #: (Y, Z, X) in (X, Y, Z), (Z, X, Y) in (Y, Z, X) and (x, y, z) in (Z, X, Y): the same matrix three times
@@ -31,73 +28,55 @@ COUPLING = Socket(
     "AxisCoupling",
     "what the two axes of a servo table need of each other",
     (
-        Connector("u", "input", "V", "pickoff voltage about gyro x"),
-        Connector("angle", "input", "rad", "inner angle"),
-        Connector("ready_x", "input", "1", "1 when the outer axis is in position", whole=True),
-        Connector("ready_y", "input", "1", "1 when the inner axis is in position", whole=True),
-        Connector("u_outer", "output", "V", "voltage for the servo of the outer axis"),
-        Connector("in_position", "output", "1", "1 when both axes are in position", whole=True),
+        inp("u", "V", "pickoff voltage about gyro x"),
+        inp("angle", "rad", "inner angle"),
+        inp("ready_x", "1", "1 when the outer axis is in position", whole=True),
+        inp("ready_y", "1", "1 when the inner axis is in position", whole=True),
+        out("u_outer", "V", "voltage for the servo of the outer axis"),
+        out("in_position", "1", "1 when both axes are in position", whole=True),
     ),
 )
 WOBBLE = Socket(
     "AxisWobble",
     "wobble of a table axis: what the table's base feels",
     (
-        Connector("angle", "input", "rad", "table angle"),
-        Connector("f_base", "input", "m/s2", "specific force along the axes of what carries the table", (3,)),
-        Connector("omega_base", "input", "rad/s", "inertial rate along them", (3,)),
-        Connector("f", "output", "m/s2", "specific force along the axes that wobble", (3,)),
-        Connector("omega", "output", "rad/s", "inertial rate along them", (3,)),
+        inp("angle", "rad", "table angle"),
+        inp("f_base", "m/s2", "specific force along the axes of what carries the table", 3),
+        inp("omega_base", "rad/s", "inertial rate along them", 3),
+        out("f", "m/s2", "specific force along the axes that wobble", 3),
+        out("omega", "rad/s", "inertial rate along them", 3),
     ),
 )
 # the torquer about y precesses the rotor about x: the cage of u_x feeds i_y
-WIRES = """
-    site.f -> stand.f_face
-    site.omega -> stand.omega_face
-    sequencer.phase -> stand.mount
-    outer.angle -> wobble_x.angle
-    stand.f -> wobble_x.f_base
-    stand.omega -> wobble_x.omega_base
-    wobble_x.f -> outer.f_local
-    wobble_x.omega -> outer.omega_local
-    sequencer.mode -> outer.mode
-    sequencer.target -> outer.target
-    inner.angle -> wobble_y.angle
-    outer.f -> wobble_y.f_base
-    outer.omega -> wobble_y.omega_base
-    wobble_y.f -> inner.f_local
-    wobble_y.omega -> inner.omega_local
-    sequencer.mode -> inner.mode
-    sequencer.target -> inner.target
-    sequencer.face -> inner.face
-    inner.omega -> gyro.omega
-    inner.f -> gyro.f
-    gyro.u_x -> coupling.u
-    inner.angle -> coupling.angle
-    outer.in_position -> coupling.ready_x
-    inner.in_position -> coupling.ready_y
-    coupling.u_outer -> outer.u
-    gyro.u_y -> inner.u
-    gyro.u_x -> cage_x.u
-    gyro.u_y -> cage_y.u
-    sequencer.mode -> cage_x.mode
-    sequencer.mode -> cage_y.mode
-    cage_x.i -> gyro.i_y
-    cage_y.i -> gyro.i_x
+WIRES = f"""
+    site -> stand: f=f_face omega=omega_face
+    sequencer -> stand: phase=mount
+    outer -> wobble_x: angle
+    stand -> wobble_x: f=f_base omega=omega_base
+    wobble_x -> outer: f=f_local omega=omega_local
+    sequencer -> outer: mode target
+    inner -> wobble_y: angle
+    outer -> wobble_y: f=f_base omega=omega_base
+    wobble_y -> inner: f=f_local omega=omega_local
+    sequencer -> inner: mode target face
+    inner -> gyro: omega f
+    gyro -> coupling: u_x=u
+    inner -> coupling: angle in_position=ready_y
+    outer -> coupling: in_position=ready_x
+    coupling -> outer: u_outer=u
+    gyro -> inner: u_y=u
+    gyro -> cage_x: u_x=u
+    gyro -> cage_y: u_y=u
+    sequencer -> cage_x: mode
+    sequencer -> cage_y: mode
+    cage_x -> gyro: i=i_y
+    cage_y -> gyro: i=i_x
     outer.angle_read -> sequencer.angle
-    coupling.in_position -> sequencer.in_position
-    gyro.u_x -> sampler_x.x
-    outer.angle_read -> sampler_x.angle
-    sequencer.gate -> sampler_x.gate
-    sequencer.window -> sampler_x.window
-    sequencer.phase -> sampler_x.phase
-    gyro.saturated -> sampler_x.flag
-    gyro.u_y -> sampler_y.x
-    inner.angle_read -> sampler_y.angle
-    sequencer.gate -> sampler_y.gate
-    sequencer.window -> sampler_y.window
-    sequencer.phase -> sampler_y.phase
-    gyro.saturated -> sampler_y.flag
+    coupling -> sequencer: in_position
+    gyro -> sampler_x: u_x=x saturated=flag
+    gyro -> sampler_y: u_y=x saturated=flag
+    {sampled("sampler_x", "outer: angle_read")}
+    {sampled("sampler_y", "inner: angle_read")}
 """
 COLUMNS = {
     "phase": "sampler_x.window_phase",
@@ -106,10 +85,6 @@ COLUMNS = {
     **{f"inner_{e}": f"sampler_y.angle_{e}" for e in ("start", "end")},
     **{f"{c}_{a}": f"sampler_{a}.{c}" for a in "xy" for c in ("mean", "std")},
 }
-NOISES = (
-    "gyro.turn_on_x", "gyro.turn_on_y", "gyro.markov_x", "gyro.markov_y", "gyro.white_x", "gyro.white_y",
-    "gyro.pickoff_x", "gyro.pickoff_y", "outer.rumble", "inner.rumble",
-)  # fmt: skip
 
 
 def plan(mounts: Sequence[int], time: float, window: float, settle: float) -> Plan:
@@ -121,28 +96,14 @@ def plan(mounts: Sequence[int], time: float, window: float, settle: float) -> Pl
     return Plan(phases, {FACE: NEXT})
 
 
-def parameters(system: System, mounts: Sequence[int]) -> dict[str, Any]:
-    """Of all parts, from the plan and the site options."""
-    rows = plan(mounts, system["time"], system["window"], system["settle"])
-    placed = {
-        f"stand.mounts[{2 * k + i},{j + 1}]": MOUNTS[m][j] for k, m in enumerate(mounts) for i in (1, 2) for j in (0, 1)
-    }
-    table = {**FREE, "base": NEXT, "index_rate": servo_stand.INDEX_RATE, "capture_rate": servo_stand.CAPTURE_RATE}
-    gains = {
-        f"{slot}.K_g": system.overrides[name]
-        for slot, name in (("outer", "gyro.K_sg_x"), ("inner", "gyro.K_sg_y"))
-        if name in system.overrides
-    }
+def parameters(parts: PartValues, mounts: Sequence[int]) -> dict[str, Any]:
+    """Return the parameters of the stand and of both tables."""
+    table = {**FREE, "base": NEXT, "index_rate": INDEX_RATE, "capture_rate": CAPTURE_RATE}
     return {
-        **rows.parameters(),
-        **placed,
-        "site.latitude": system["latitude"],
-        "site.height": system["height"],
-        "site.gravity": system["gravity"],
-        "stand.latitude": system["latitude"],
-        "stand.base": np.eye(3),
+        **stand_parameters(MOUNTS[m] for m in mounts for _ in range(2)),
         **{f"{slot}.{n}": value for slot in ("outer", "inner") for n, value in table.items()},
-        **gains,
+        "outer.K_g": parts["gyro.K_sg_x"],
+        "inner.K_g": parts["gyro.K_sg_y"],
         "wobble_x.axis": 1,  # X of X, Y, Z
         "wobble_y.axis": 1,  # Y of Y, Z, X
     }

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult, Specification
-from gyrobench.system.families import servo_stand
+from gyrobench.system.families.option_groups import type_b
+from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
+from gyrobench.system.families.servo_test import CAGE, SERVO_TABLE, SITE_AND_STAND, STAND, TRACKING
+from gyrobench.system.families.table_test import TableTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import MeasuredData, Option, Slot, System, Windows
+from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.system.values import parse
 
-from . import measured, setup
+from . import setup
+from .measured import MEASURED
 
-DEG = math.pi / 180.0
 
-
-class ServoTwoAxis(System):
+class ServoTwoAxis(TableTest):
     """The x pickoff drives the outer and the y pickoff the inner axis of a table, so that the plate keeps the gyro's
     x and y axes free of rotation but for the drift, while the base turns with the Earth below.  The angles of both axes
     over a day in two of the twelve mounts of Hu 1981 give nine coefficients a channel; the torquers are idle.
@@ -33,42 +34,37 @@ class ServoTwoAxis(System):
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
-        "stand": Slot(servo_stand.STAND, "fixture"),
+        "stand": Slot(STAND, "fixture"),
         "wobble_x": Slot(setup.WOBBLE, "axis_wobble"),
-        "outer": Slot(servo_stand.SERVO_TABLE, "table_servo"),
+        "outer": Slot(SERVO_TABLE, "table_servo"),
         "wobble_y": Slot(setup.WOBBLE, "axis_wobble"),
-        "inner": Slot(servo_stand.SERVO_TABLE, "table_servo"),
+        "inner": Slot(SERVO_TABLE, "table_servo"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "coupling": Slot(setup.COUPLING, "axis_coupling"),
-        "cage_x": Slot(servo_stand.CAGE, "cage"),
-        "cage_y": Slot(servo_stand.CAGE, "cage"),
+        "cage_x": Slot(CAGE, "cage"),
+        "cage_y": Slot(CAGE, "cage"),
         "sampler_x": Slot("Sampler", "sampler"),
         "sampler_y": Slot("Sampler", "sampler"),
     }
     wires = setup.WIRES
     open = ("outer.face",)  # left at their start values
-    options = {
-        "latitude": Option("45.75deg", "rad", "geographic latitude, north positive", -90 * DEG, 90 * DEG),
-        "height": Option(0.0, "m", "height above the ellipsoid"),
-        "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity"),
-        "mounts": Option("2 4", str, "mounts in their order, by their numbers in Hu 1981 (1 to 12)"),
-        "time": Option(86400.0, "s", "time in each mount", 1.0),
-        "window": Option(600.0, "s", "length of a window", 1e-3),
-        "settle": Option(10.0, "s", "wait after both loops have closed", 0.5),
-        "terms": Option(9, int, "terms of the model of a channel: 8 (Hu 1981), 9 (with Dx_y, Dy_x)", 8, 9),
-        "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
-        "u_axis": Option(0.0, "rad", "standard uncertainty of each mount, about each of its axes", 0.0),
-        "u_square": Option(0.0, "rad", "standard uncertainty of the right angle between the table axes", 0.0),
-        "u_mount": Option(0.0, "rad", "standard uncertainty of the gyro axes against the plate", 0.0),
-        "u_angle1": Option(0.0, "rad", "angle error once a turn of either axis, std. unc. of its amplitude", 0.0),
-        "u_angle2": Option(0.0, "rad", "angle error twice a turn of either axis, std. unc. of its amplitude", 0.0),
-        "u_wobble": Option(0.0, "rad", "wobble of either axis twice a turn, std. unc. of its amplitude", 0.0),
-        "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
-    }
-    noises = setup.NOISES
-    measured_data = MeasuredData(measured.TEMPLATE, measured.read)
+    options = (
+        SITE_AND_STAND
+        | {
+            "mounts": Option("2 4", str, "mounts in their order, by their numbers in Hu 1981 (1 to 12)"),
+            "time": Option(86400.0, "s", "time in each mount", 1.0),
+            "window": Option(600.0, "s", "length of a window", 1e-3),
+            "settle": Option(10.0, "s", "wait after both loops have closed", 0.5),
+            "terms": Option(9, int, "terms of the model of a channel: 8 (Hu 1981), 9 (with Dx_y, Dy_x)", 8, 9),
+        }
+        | TRACKING
+        | type_b("square", "angle1", "angle2", "wobble", "time", "mount", axis="standard uncertainty of each mount, "
+                 "about each of its axes")
+    )  # fmt: skip
+    assumed = ("gyro.mount", "outer.base", "inner.base", "stand.base", "stand.mounts")
+    noises = (*TWO_AXIS_NOISES, "outer.rumble", "inner.rumble")
+    measured_data = MEASURED
     windows = Windows("sampler_x.count", setup.COLUMNS)
-    done = "sequencer.done"
     channels = ("outer.angle", "inner.angle", "gyro.u_x", "gyro.u_y", "gyro.drift_x", "gyro.drift_y")
     channel_period = 60.0
 
@@ -86,17 +82,19 @@ class ServoTwoAxis(System):
         return setup.plan(self.mounts(), self["time"], self["window"], self["settle"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return setup.parameters(self, self.mounts())
+        plan = {**self.plan().parameters(), **self.owned()}
+        return {**plan, **setup.parameters(parts, self.mounts())}
 
     def check(self) -> list[str]:
         from .refusals import option_problems
 
-        return option_problems(self.values, self.step, self.earth_rate())
+        return option_problems(self.values, self.step, self.earth_rate()) + super().check()
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         from .refusals import model_problems
 
-        return model_problems(parameters, self.mounts(), self.values)
+        problems = super().check_parameters(parameters)
+        return problems or model_problems(parameters, self.mounts(), self.values)
 
     def warnings(self) -> list[str]:
         from .refusals import cautions

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.attitudes import SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.fit_result import Group, Quantity, ReductionError, fit, linear_result, plus_minus
 from gyrobench.result import DriftTestResult, Specification
-from gyrobench.system.families.servo_stand import ATTITUDES, attitude
 
 from . import closed, refusals
 
@@ -39,8 +39,8 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     options = dict(run.options)
     site = run_metadata.Site.of(run)
     labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
-    wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(ATTITUDES)}" for p, n in labels.items()
-             if n not in ATTITUDES or n.startswith("polar")]  # fmt: skip
+    wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(SERVO_ATTITUDES)}" for p, n in labels.items()
+             if n not in SERVO_ATTITUDES or n.startswith("polar")]  # fmt: skip
     wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
     if wrong:
         raise ReductionError(wrong)
@@ -56,7 +56,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     if wrong:
         raise ReductionError(wrong)
     held = servo_regression.Held(
-        start, end, t0, t1, np.array([attitude(labels[p], site.latitude) for p in phase.tolist()])
+        start, end, t0, t1, np.array([on_servo_table(labels[p], site.latitude) for p in phase.tolist()])
     )
     seen = refusals.seen(list(labels.values()))
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift
-from gyrobench.system.families.servo_stand import ATTITUDES, LEVEL, U
+from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP
 
 Array = NDArray[np.float64]
 LIMIT = math.radians(1.0)  # of the angle in a level attitude
@@ -21,8 +21,8 @@ CROSS = ("D_IO", "D_OS", "D_IS")
 
 def gravity_along(name: str) -> Array:
     """SF/g along x, y, z at angle 0: +1 along an axis that points down."""
-    x, y = ATTITUDES[name]
-    axis = 0 if abs(x) == U else 1 if abs(y) == U else 2
+    x, y = SERVO_ATTITUDES[name]
+    axis = 0 if abs(x) == UP else 1 if abs(y) == UP else 2
     out = np.zeros(3)
     out[axis] = 1.0 if name.endswith("down") else -1.0
     return out
@@ -76,7 +76,7 @@ def seen(attitudes: Sequence[str]) -> Seen:
 
 def unseen(attitudes: Sequence[str]) -> list[str]:
     """What cannot be seen, said before the run."""
-    known = [n for n in attitudes if n in ATTITUDES]
+    known = [n for n in attitudes if n in SERVO_ATTITUDES]
     if not known:
         return []
     found = seen(known)
@@ -87,9 +87,9 @@ def unseen(attitudes: Sequence[str]) -> list[str]:
 
 def option_problems(attitudes: Sequence[str], earth: Mapping[str, float], time: float) -> list[str]:
     """What is wrong with attitudes and times.  earth: rate along the input axis of the level attitudes, rad/s."""
-    unknown = [n for n in attitudes if n not in ATTITUDES or n.startswith("polar")]
+    unknown = [n for n in attitudes if n not in SERVO_ATTITUDES or n.startswith("polar")]
     if unknown or not attitudes:
-        known = [n for n in ATTITUDES if not n.startswith("polar")]
+        known = [n for n in SERVO_ATTITUDES if not n.startswith("polar")]
         return [f"attitude {', '.join(unknown) or 'none'}: there are {'; '.join(known)}"]
     found = []
     for name, rate in earth.items():

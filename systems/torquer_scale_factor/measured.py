@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from functools import partial
 
-from gyrobench.record.csv_reader import Column, read_measured
-from gyrobench.record.record import Record
+from gyrobench.record.csv_reader import Column
 from gyrobench.record.run_document import ABOUT
-from gyrobench.system.lab_record import measured_run
-from gyrobench.system.system import System
+from gyrobench.system.lab_record import read_record
+from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
 # Torquer of a gyro on a servo table: one row for each current, both senses over the same angle range.
@@ -28,13 +26,4 @@ COLUMNS = (
     Column("range_minus", "rad", "angle range with negative current", required=False),
 )
 TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report")
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """Return the CSV as a record.  Raises DataError, and InvalidValueError for an option that does not fit."""
-    rows, comments = read_measured(data, COLUMNS, time=None)
-    for name, value in {**{k: v for k, v in comments.items() if k in system.options}, **values}.items():
-        if name not in TEXTS:
-            system.set(name, value)
-    texts = {**comments, **values}
-    return Record(rows, {}, measured_run(system, [], {n: texts[n] for n in TEXTS if n in texts}))
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None, texts=TEXTS))

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
 
-from gyrobench import frames
-from gyrobench.record.record import Record
+from gyrobench.system.families.tumble_test import attitudes
 from gyrobench.system.lab_record import read_record
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
 # Single-axis tumble of a floated gyro in torque rebalance: one row for each averaging window.
@@ -38,16 +33,5 @@ TEMPLATE = """\
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
-
-    def attitudes() -> dict[str, str]:
-        faces = frames.tumble_faces(system["latitude"])
-        return {face: "rate" if face.startswith("mount") else "hold" for face in faces}
-
-    return read_record(system, data, values, needed={"k": "...", "latitude": "45.75deg"}, attitudes=attitudes)
+NEEDED = {"k": "...", "latitude": "45.75deg"}
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes))

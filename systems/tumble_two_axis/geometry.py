@@ -19,6 +19,7 @@ from gyrobench.reduction.estimation import regression
 
 Array = NDArray[np.float64]
 NAMES = drift.terms(9)
+ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")  # columns of a record
 #: Gyro axes I, O, S (rows) in plate axes: I = inner axis, O = outer axis at zero.
 FACE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 LEAST = 25  # positions for the harmonic route

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
-from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData
+
+from .geometry import ANGLES
 
 TEMPLATE = """\
 # Two-axis tumble of a floated gyro in torque rebalance: one row for each average at rest, several rows a position.
@@ -31,16 +31,9 @@ TEMPLATE = """\
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean [mA],n,flagged
 """
-ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if not c.name.startswith("angle")),
     *(Column(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
 )
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """Return the CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
-    return read_record(system, data, values, needed={"latitude": "45.75deg", "k": "17.2deg/h/mA"}, columns=COLUMNS)
+NEEDED = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))

@@ -37,7 +37,7 @@ from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import closed, geometry
-from .measured import ANGLES
+from .geometry import ANGLES
 
 __all__ = ["ReductionError", "TwoAxisSetup", "from_record", "reduce"]
 

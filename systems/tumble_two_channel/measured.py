@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
-from gyrobench.record.record import Record
+from gyrobench.system.families.tumble_test import attitudes
 from gyrobench.system.lab_record import read_record
-
-from . import geometry
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
+from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
 # Single-axis tumble of a two-degree-of-freedom gyro, both torquers in rebalance: one row for each averaging window.
@@ -55,16 +49,4 @@ COLUMNS = (
     Column("std_y", "A", "standard deviation of the samples of mean_y", required=False),
 )
 NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/mA"}
-
-
-def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
-    """The CSV as a record in SI, see gyrobench.system.lab_record.
-
-    Raises DataError, and InvalidValueError for an option that does not fit.
-    """
-
-    def attitudes() -> dict[str, str]:
-        known = geometry.faces(system["model"], system["latitude"])
-        return {name: "rate" if name.startswith("mount") else "hold" for name in known}
-
-    return read_record(system, data, values, needed=NEEDED, attitudes=attitudes, columns=COLUMNS)
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, columns=COLUMNS))

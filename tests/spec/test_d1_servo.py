@@ -14,10 +14,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gyrobench import drift, frames
+from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import harmonic, servo_regression
-from gyrobench.system.families.servo_stand import ATTITUDES, LEVEL, attitude
 from gyrobench.system.system import System, load_system
 
 DPH = math.pi / 180.0 / 3600.0
@@ -82,8 +82,8 @@ def test_attitudes_sense_what_the_method_says() -> None:
     """SF/g and Earth rate along x in all twenty attitudes; rows of a rotation."""
     for phi in (math.radians(45.75), math.radians(-30.0)):
         s, c = math.sin(phi), math.cos(phi)
-        for name in ATTITUDES:
-            A = frames.check_rotation(attitude(name, phi), name)
+        for name in SERVO_ATTITUDES:
+            A = frames.check_rotation(on_servo_table(name, phi), name)
             down, earth = A @ -frames.U, A @ frames.pole(phi)
             if name.startswith("polar"):
                 m = 1.0 if name == "polar S" else -1.0
@@ -156,10 +156,10 @@ def test_class_1_and_2(seed: int) -> None:
     p, phi, g = random_gyro(rng), random_latitude(rng), 1.001
     s, c = math.sin(phi), math.cos(phi)
     R, Uz, Ux, Kzx, Kxz = (p[n] for n in ("R", "U_z", "U_x", "K_zx", "K_xz"))
-    for name in ATTITUDES:
+    for name in SERVO_ATTITUDES:
         if name.startswith("polar"):
             continue
-        A = attitude(name, phi)
+        A = on_servo_table(name, phi)
         theta_dot = -W * (A @ frames.pole(phi))[0] - omega_m(p, A @ -frames.U * g)
         if name == "x down":
             expected = W * s - R - Uz * g - Kzx * g * g
@@ -186,7 +186,7 @@ def test_three_term_route(seed: int) -> None:
 
     def rates(p: dict[str, float]) -> list[float]:
         names = ("x down", "x up", "x east, z down")
-        A = [attitude(n, phi) for n in names]
+        A = [on_servo_table(n, phi) for n in names]
         return [float(-W * (a @ frames.pole(phi))[0] - omega_m(p, a @ -frames.U * g)) for a in A]
 
     one = rates(simple)
@@ -208,7 +208,7 @@ def test_three_term_route(seed: int) -> None:
         (("x down", "x up"), ["D_F + γ² D_II", "D_I"]),
         (("x down", "x up", "x east, z down"), ["D_F + γ² D_II", "D_I", "D_S − γ D_II + γ D_SS"]),
         (("x east, y up", "x east, y down", "x east, z up", "x east, z down"), ["D_F", "D_S", "D_O", "D_SS"]),
-        (tuple(n for n in ATTITUDES if not n.startswith("polar")), ["D_F", "D_I", "D_S", "D_O", "D_II", "D_SS"]),
+        (tuple(n for n in SERVO_ATTITUDES if not n.startswith("polar")), ["D_F", "D_I", "D_S", "D_O", "D_II", "D_SS"]),
         (("x north, z up",), ["D_F − γ D_S + γ² D_SS"]),
     ],
 )
@@ -246,7 +246,7 @@ def test_polar_geometry(seed: int) -> None:
         constant = R + m * Uz * g * s + Kzx * (g * s) ** 2 - 0.5 * Kxz * (g * c) ** 2
         truth = rate(p, mount, th, phi, g)
         np.testing.assert_allclose(m * W - constant + wide, truth, rtol=1e-12)
-        axes = np.repeat(attitude(f"polar {mount}", phi)[None], th.size, axis=0)
+        axes = np.repeat(on_servo_table(f"polar {mount}", phi)[None], th.size, axis=0)
         seen = servo_regression.Held(th, th, th, th + 1.0, axes).seen(np.array([0.0, 0.0, -g]))[:, 0, :]
         np.testing.assert_allclose(seen.T, polar_gamma(mount, th, phi, g), atol=1e-12)
         if mount == "S":  # E39: U_x for U_z, K_xz for K_zx in the constant, cos for cos2
@@ -408,7 +408,7 @@ def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
         plan.append({"phase": k, "label": name, "mode": "servo", "face": name})
         n = 144 if name.startswith("polar") else 3
         ends = np.linspace(0.0, (2 if name == "polar S" else -2) * math.pi, n + 1) if n == 144 else np.zeros(n + 1)
-        axes = np.repeat(attitude(name, phi)[None], n, axis=0)
+        axes = np.repeat(on_servo_table(name, phi)[None], n, axis=0)
         w = servo_regression.Held(ends[:-1], ends[1:], np.zeros(n), np.ones(n), axes)
         omega_d = servo_regression.design(w, site, tuple(true)) @ np.array(list(true.values()))
         r = omega_d - W * (axes[:, 0] @ frames.pole(phi))

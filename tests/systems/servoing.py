@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
-from gyrobench.system.families.servo_stand import NOISES, attitude
+from gyrobench.system.families.servo_test import ServoTest
 
 Array = NDArray[np.float64]
 DPH = math.pi / 180.0 / 3600.0  # 1 deg/h in rad/s
@@ -25,7 +26,7 @@ DAY50: dict[str, Any] = {
 DAY500: dict[str, Any] = {
     **DAY50, "site.earth_rate": 10.0 * W50, "time": 172.4, "window": 4.8, "dwell": 48.0,
 }  # fmt: skip
-QUIET: dict[str, Any] = dict.fromkeys(NOISES, 0.0)
+QUIET: dict[str, Any] = dict.fromkeys(ServoTest.noises, 0.0)
 #: Ranges of the coefficients in Hu 1981 (ch. 2), deg/h per g^n; signs are drawn.
 RANGES = {"D_F": (0.05, 0.55), "D_I": (0.5, 1.3), "D_O": (0.1, 0.5), "D_S": (0.5, 1.3), "D_IS": (0.1, 0.2)}
 
@@ -46,7 +47,7 @@ def held(record: Any) -> tuple[servo_regression.Held, Array]:
     labels = {r.phase: r.label for r in record.run.plan if r.mode == "servo"}
     w = record.windows
     rows = np.isin(w["phase"], list(labels))
-    axes = np.array([attitude(labels[p], record.run.options["latitude"]) for p in w["phase"][rows].tolist()])
+    axes = np.array([on_servo_table(labels[p], record.run.options["latitude"]) for p in w["phase"][rows].tolist()])
     return servo_regression.Held(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
 
 

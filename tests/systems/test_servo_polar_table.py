@@ -77,13 +77,10 @@ class Wobbling(type(load_system(NAME))):  # type: ignore[misc]
             "axis_wobble",
         ),
     }
-    wires = (
-        load_system(NAME)
-        .wires.replace("stand.f -> table.f_local", "stand.f -> wobble.f_base\n    wobble.f -> table.f_local")
-        .replace(
-            "stand.omega -> table.omega_local",
-            "stand.omega -> wobble.omega_base\n    wobble.omega -> table.omega_local\n    table.angle -> wobble.angle",
-        )
+    wires = load_system(NAME).wires.replace(
+        "stand -> table: f=f_local omega=omega_local",
+        "stand -> wobble: f=f_base omega=omega_base\n    wobble -> table: f=f_local omega=omega_local\n"
+        "    table -> wobble: angle",
     )
 
 

@@ -151,17 +151,10 @@ class Wobbling(type(load())):  # type: ignore[misc]
             "axis_wobble",
         ),
     }
-    wires = (
-        load()
-        .wires.replace(
-            "site.f -> table.f_local",
-            "site.f -> stand.f_face\n    stand.f -> wobble.f_base\n    wobble.f -> table.f_local",
-        )
-        .replace(
-            "site.omega -> table.omega_local",
-            "site.omega -> stand.omega_face\n    stand.omega -> wobble.omega_base\n"
-            "    wobble.omega -> table.omega_local\n    table.angle -> wobble.angle",
-        )
+    wires = load().wires.replace(
+        "site -> table: f=f_local omega=omega_local",
+        "site -> stand: f=f_face omega=omega_face\n    stand -> wobble: f=f_base omega=omega_base\n"
+        "    wobble -> table: f=f_local omega=omega_local\n    table -> wobble: angle",
     )
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:

@@ -32,7 +32,7 @@ RUNS: list[tuple[list[str], list[str]]] = [
     (["gyro.Dx_yy=0.1deg/h/g2", "gyro.terms_x=10"], ["gyro.Dx_yy = 0.1 deg/h/g2", "fold=true", "Dx_0 + γ² Dx_yy"]),
     (["gyro.Dy_xx=0.1deg/h/g2", "gyro.terms_y=10"], ["gyro.Dy_xx = 0.1 deg/h/g2", "Dy_yy − Dy_xx"]),
     (["gyro.terms_x=7"], ["terms_x = 7"]),
-    (["windows=4"], ["windows = 4: must be >= 5"]),
+    (["windows=4"], ["windows = 4: must be >= 6"]),
     (["k_x=17deg/h"], ["k_x: '17deg/h'", "units that fit"]),
 ]  # fmt: skip
 

@@ -1,4 +1,8 @@
-"""The attitude of an instrument from words: ``E U -N``, or a matrix of direction cosines."""
+"""Attitudes of an instrument at a site: from words (``E U -N``) or a matrix, and the named ones of the servo tests.
+
+>>> C = parse("E U", latitude)              # rows I, O, S in E, N, U
+>>> C = on_servo_table("x down", latitude)  # rows x, y, z with the table at angle 0
+"""
 
 from __future__ import annotations
 
@@ -47,3 +51,39 @@ def parse(text: str, latitude: float) -> Array:
         raise ValueError(f"attitude = '{text}': I and O are {degrees:.3g}° apart, they must be at right angles")
     found = found if len(found) == 3 else [*found, np.cross(found[0], found[1])]
     return frames.check_rotation(np.array(found), f"attitude '{text}'")
+
+
+# ------------------------------------------------------------------------ a gyro that holds its table
+EAST, NORTH, UP, POLE, CROSS = 1, 2, 3, 4, 5  # E, N, U, P, Q as the part fixture counts them; minus: the opposite
+_LEVEL = {
+    f"x {name}, {axis} {way}": (x, y if way == up else -y)
+    for name, x, horizontal in (("east", EAST, -NORTH), ("north", NORTH, EAST), ("west", -EAST, NORTH),
+                                ("south", -NORTH, -EAST))
+    for axis, y, up in (("y", UP, "up"), ("z", horizontal, "down"))
+    for way in ("up", "down")
+}  # fmt: skip
+#: attitude -> directions of x (input axis, along the table axis) and y at angle 0; z = x cross y.  Classes 1, 2, 3 of
+#: Hu 1981.
+SERVO_ATTITUDES: dict[str, tuple[int, int]] = {
+    "x down": (-UP, EAST), "x up": (UP, EAST), **_LEVEL, "polar S": (-POLE, -EAST), "polar N": (POLE, -EAST),
+}  # fmt: skip
+VERTICAL = ("x down", "x up")
+LEVEL = tuple(_LEVEL)
+POLAR = ("polar S", "polar N")
+
+
+def numbered_directions(latitude: float) -> dict[int, Array]:
+    """Return the unit vectors in (E, N, U) by number."""
+    return dict(enumerate(directions(latitude).values(), 1))
+
+
+def axes(x: int, y: int, latitude: float) -> Array:
+    """Return the rows x, y, z = x cross y in (E, N, U) of two numbered directions, minus: the opposite."""
+    known = numbered_directions(latitude)
+    first, second = (np.sign(k) * known[abs(k)] for k in (x, y))
+    return np.array([first, second, np.cross(first, second)])
+
+
+def on_servo_table(name: str, latitude: float) -> Array:
+    """Return the rows x, y, z in (E, N, U) of a named attitude, table at angle 0.  KeyError for an unknown name."""
+    return axes(*SERVO_ATTITUDES[name], latitude)

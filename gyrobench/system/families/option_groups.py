@@ -1,0 +1,48 @@
+"""Options that several tests have, each with its default once: ``options = SITE | TORQUER | type_b("current")``."""
+
+from __future__ import annotations
+
+import math
+
+from gyrobench.system.configurable import Option
+
+SITE = {
+    "latitude": Option(
+        "45.75deg", "rad", "geographic latitude, north positive", -math.pi / 2, math.pi / 2, sets=("site.latitude",)
+    ),
+    "height": Option(0.0, "m", "height above the ellipsoid", sets=("site.height",)),
+    "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity", sets=("site.gravity",)),
+}
+TORQUER = {
+    "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),
+}
+FOLD = {"fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS")}
+SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 0.0)}
+ATTITUDE = {
+    "attitude": Option("E U", str, "I and O (and S) axes: E, N, U, P, Q or minus these, or a matrix of rows"),
+}
+#: name without u_ -> unit and meaning
+_TYPE_B = {
+    "attitude": ("rad", "standard uncertainty of the attitude about each gyro axis"),
+    "axis": ("rad", "standard uncertainty of the table axis against the pole"),
+    "square": ("rad", "standard uncertainty of the right angle between the table axes"),
+    "mount": ("rad", "standard uncertainty of the gyro axes against the fixture"),
+    "wobble": ("rad", "wobble of a table axis twice a turn, std. unc. of its amplitude"),
+    "angle1": ("rad", "error of the angle readings once a turn, std. unc. of its amplitude"),
+    "angle2": ("rad", "error of the angle readings twice a turn, std. unc. of its amplitude"),
+    "unbalance": ("rad", "angle by unbalance of the table at 1 g over the stiffness, std. unc."),
+    "latitude": ("rad", "standard uncertainty of the latitude"),
+    "scale_factor": ("1", "relative standard uncertainty of the torquer scale factor"),
+    "nonlinearity": ("1", "relative torquer nonlinearity at the largest current, standard unc."),
+    "current": ("A", "standard uncertainty of the zero of the current meter"),
+    "time": ("1", "relative standard uncertainty of the time base"),
+}
+
+
+def type_b(*names: str, **meanings: str) -> dict[str, Option]:
+    """Return the options u_NAME, sizes of uncertainties of type B (0 unless set), of the sources of these names.
+
+    meanings: names whose meaning in this test is another one: ``axis="of each mount, about each of its axes"``.
+    """
+    known = {**{n: _TYPE_B[n][1] for n in names}, **meanings}
+    return {f"u_{n}": Option(0.0, _TYPE_B[n][0], text, 0.0) for n, text in known.items()}

@@ -1,0 +1,183 @@
+"""Servo tests: a table that its own gyro holds still, on a stand that gives its axis any direction.
+
+The input axis x of the gyro lies along the table axis, y and z on the face.  The slot stand is between site
+and table: it turns what the site says into the axes x, y, z of the attitude at angle 0, phase by phase (its mount
+number is the number of the phase).  In servo mode the torquer is idle; in all others the slot cage holds the float by
+it.  [LOOP-TABLE-SERVO, MEAS-SERVO]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gyrobench.attitudes import SERVO_ATTITUDES
+from gyrobench.record.csv_reader import WINDOW_COLUMNS
+from gyrobench.system.configurable import Option
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled
+from gyrobench.system.lab_record import read_record
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import Phase, Plan
+from gyrobench.system.sockets import SOCKETS
+from gyrobench.system.system import MeasuredData, Slot
+
+#: table axes (rows) in the axes x, y, z of the attitude at angle 0: the transpose of ON_TABLE
+BASE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+SERVO_TABLE = Socket(
+    "ServoTable",
+    "turntable with one axis that nulls the pickoff of the gyro on it in mode 3",
+    (
+        *SOCKETS["Table"].connectors,
+        inp("u", "V", "pickoff voltage of the gyro"),
+        out("saturated", "1", "1 while the motor is at its limit", optional=True, whole=True),
+    ),
+)
+STAND = Socket(
+    "Stand",
+    "turns what the site says into the axes of the attitude of a phase",
+    (
+        inp("mount", "1", "number of the phase", whole=True),
+        inp("f_face", "m/s2", "specific force, ENU", 3),
+        inp("omega_face", "rad/s", "Earth rate, ENU", 3),
+        out("f", "m/s2", "specific force, attitude axes", 3),
+        out("omega", "rad/s", "Earth rate, attitude axes", 3),
+    ),
+)
+CAGE = Socket(
+    "Cage",
+    "holds the float by the torquer outside servo mode",
+    (
+        inp("u", "V", "pickoff voltage"),
+        inp("mode", "1", "mode of the table", whole=True),
+        out("i", "A", "torquer current"),
+    ),
+)
+#: the gyro on the table whose servo nulls its pickoff
+GYRO = """
+    table -> gyro: omega alpha f
+    gyro -> table: u
+"""
+INDEX_RATE = 5e-3  # rad/s: the cage holds the float up to 8.3e-3
+#: rad/s (8 Hz): brushes hold a turning table M / (J capture_rate2) from null, and must let it within capture_angle
+CAPTURE_RATE = 50.0
+GYRO_TO_TABLE = {"H": "H_g", "J": "J_g", "C": "C_g", "K_sg": "K_g"}  # of the gyro -> what the table is told of it
+SITE_AND_STAND = SITE | {"latitude": replace(SITE["latitude"], sets=("site.latitude", "stand.latitude"))}
+TRACKING = {
+    "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A phase in which the gyro holds the table: attitude, start angle (rad), s of settling, dwell and windows, rad
+    that must be turned at least.
+    """
+
+    attitude: str
+    dwell: float
+    window: float
+    settle: float
+    start: float = 0.0
+    travel: float = 0.0
+
+
+def stand_parameters(directions: Iterable[tuple[int, int]]) -> dict[str, Any]:
+    """Return the mounts of the stand, one for each phase of the plan: numbered directions of x and y."""
+    places = {f"stand.mounts[{k},{j + 1}]": xy[j] for k, xy in enumerate(directions, 1) for j in (0, 1)}
+    return {**places, "stand.base": np.eye(3)}
+
+
+def gyro_on_table(parts: PartValues) -> dict[str, Any]:
+    """Return what the design of the table's servo loop takes of the gyro on it."""
+    return {f"table.{b}": parts[f"gyro.{a}"] for a, b in GYRO_TO_TABLE.items()}
+
+
+class ServoTest(TableTest):
+    """A floated gyro holds the table it stands on; the table angle is read.  A test gives holds().
+
+    slots = ServoTest.with_parts(stand=..., table=..., gyro=..., cage=...)
+    """
+
+    slots: ClassVar[Mapping[str, Slot]] = on_table(stand=STAND, table=SERVO_TABLE, gyro="SdfGyro", cage=CAGE)
+    wires = f"""
+    site -> stand: f=f_face omega=omega_face
+    sequencer -> stand: phase=mount
+    stand -> table: f=f_local omega=omega_local
+    sequencer -> table: mode target face
+    {GYRO}
+    gyro -> cage: u
+    sequencer -> cage: mode
+    cage -> gyro: i
+    table -> sequencer: angle_read=angle in_position
+    gyro -> sampler: u=x saturated=flag
+    {sampled()}
+    """
+    options: ClassVar[dict[str, Option]] = (
+        SITE_AND_STAND
+        | {"settle": Option(10.0, "s", "wait after the loop has closed", 0.5)}
+        | TRACKING
+        | type_b(
+            "unbalance",
+            "time",
+            axis="standard uncertainty of the table axis, about each axis, each phase",
+            mount="standard uncertainty of the input axis against the table axis",
+        )
+    )
+    assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, "stand.base", "stand.mounts")
+    noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "table.rumble")
+    channels: ClassVar[tuple[str, ...]] = ("table.angle", "gyro.u", "gyro.drift")
+
+    def holds(self) -> Sequence[Hold]:
+        """Return the phases in which the gyro holds the table, in their order."""
+        raise NotImplementedError
+
+    def plan(self) -> Plan:
+        """Each hold after a phase that brings the table to its start angle with the float caged."""
+        phases = []
+        for h in self.holds():
+            to = {"label": f"{h.attitude}: to the start", "mode": "index", "target": h.start, "settle": 1.0}
+            phases.append(Phase(face=FACE, dwell=0.1, window=0.1, **to))  # type: ignore[arg-type]
+            phases.append(
+                Phase(h.attitude, "servo", FACE, settle=h.settle, dwell=h.dwell, travel=h.travel, window=h.window)
+            )
+        return Plan(phases, {FACE: ON_TABLE})
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        names = (p.label.partition(":")[0] for p in self.plan().phases)
+        return {
+            **super().parameters(parts),
+            **stand_parameters(SERVO_ATTITUDES[n] for n in names),
+            "table.base": BASE,
+            "table.index_rate": INDEX_RATE,
+            "table.capture_rate": CAPTURE_RATE,
+            **gyro_on_table(parts),
+        }
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        problems = super().check_parameters(parameters)
+        if (count := len(self.plan().phases)) > 49:
+            problems.append(f"the plan has {count} phases, two for each attitude: the stand knows 49")
+        rate, limit = parameters.get("table.index_rate"), parameters.get("cage.i_max")
+        if rate is not None and limit is not None and rate > 0.9 * limit * parameters.get("gyro.k", np.inf):
+            problems.append(
+                f"table.index_rate = {rate:g} rad/s: the cage holds the float up to cage.i_max gyro.k = "
+                f"{limit * parameters['gyro.k']:.3g} rad/s; index more slowly"
+            )
+        return problems
+
+
+def laboratory_data(template: str, known: Sequence[str]) -> MeasuredData:
+    """Return the template and reader of a laboratory's table angles, held in the attitudes ``known``."""
+    columns = tuple(
+        replace(c, unit="V", meaning="pickoff voltage", required=False) if c.name in ("mean", "std") else c
+        for c in WINDOW_COLUMNS
+    )
+    names = dict.fromkeys(known, "servo")
+    needed = {"latitude": "45.75deg"}
+    return MeasuredData(template, partial(read_record, needed=needed, attitudes=lambda _: names, columns=columns))

@@ -1,0 +1,131 @@
+"""Tests of an instrument on a table, phase by phase: slots, wires, site, plan, windows and checks that they share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gyrobench import attitudes, drift, frames, units
+from gyrobench.system.connectors import Socket
+from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import Plan
+from gyrobench.system.system import Option, Slot, System, Windows
+
+Array = NDArray[np.float64]
+FACE = "input axis along the table axis"
+#: gyro axes I, O, S (rows) in table axes: I = z_T, O = x_T, S = y_T
+ON_TABLE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+SDF_NOISES = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
+
+
+def on_table(**sockets: str | Socket | Slot) -> dict[str, Slot]:
+    """Return the slots of a test on a table: site and sequencer, those given, sampler.
+
+    sockets: a Slot with its part, or a socket, whose part with_parts() names.
+    """
+    given = {name: s if isinstance(s, Slot) else Slot(s) for name, s in sockets.items()}
+    plain = {name: Slot(name.capitalize(), name) for name in ("site", "sequencer", "sampler")}
+    return {"site": plain["site"], "sequencer": plain["sequencer"], **given, "sampler": plain["sampler"]}
+
+
+def sampled(slot: str = "sampler", angle: str = "table: angle_read") -> str:
+    """Return the wires of a sampler: its windows from the plan, and the angle ("slot: output") at their ends."""
+    source, _, output = angle.partition(": ")
+    return f"""
+    {source} -> {slot}: {output}=angle
+    sequencer -> {slot}: gate window phase
+    """
+
+
+#: the table at its site, moved by the plan
+TABLE = """
+    site -> table: f=f_local omega=omega_local
+    sequencer -> table: mode target face
+    table -> sequencer: angle_read=angle in_position
+"""
+
+
+class TableTest(System):
+    """The sequencer moves the table through the plan; the sampler averages a reading over windows of each phase.
+
+    A test gives the slots, with the parts it is made with, the wires of its instrument, plan(), base() where the table
+    does not stand level, and the reduction.
+    """
+
+    slots: ClassVar[Mapping[str, Slot]] = on_table(table="Table")
+    wires = TABLE + sampled()
+    options: ClassVar[dict[str, Option]] = SITE
+    assumed: ClassVar[tuple[str, ...]] = ("table.base", "gyro.mount")
+    windows = Windows.of("sampler")
+    done = "sequencer.done"
+    channel_period = 10.0
+
+    def base(self) -> Array:
+        """Return the table axes (rows) in east, north, up at angle 0."""
+        return np.eye(3)
+
+    def planned_faces(self, parameters: Mapping[str, Any]) -> dict[str, ArrayLike]:
+        """Return the mounts of the plan (gyro axes in table axes) as the sequencer has them, by name."""
+        plan = self.plan()
+        planned = plan.faces if isinstance(plan, Plan) else {}
+        given = zip(planned, parameters.get("sequencer.faces", []), strict=False)
+        return {**planned} | {name: np.reshape(face, (3, 3)) for name, face in given}
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        return {**self.plan().parameters(), **self.owned(), "table.base": self.base()}
+
+    def check(self) -> list[str]:
+        return frames.gravity_problems(self["gravity"]) if self["gravity"] else []
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        """Mounts of the plan and of the parts that are no rotations."""
+        matrices: dict[str, ArrayLike] = {
+            f"sequencer.faces, {n}": face for n, face in self.planned_faces(parameters).items()
+        }
+        matrices |= {n: m for n, m in parameters.items() if n.endswith((".mount", ".base")) and np.shape(m) == (3, 3)}
+        return frames.rotation_problems(matrices)
+
+
+class OpenLoopTest(TableTest):
+    """A floated gyro on a table without a loop: its pickoff is read."""
+
+    slots: ClassVar[Mapping[str, Slot]] = on_table(table="Table", gyro="SdfGyro")
+    wires = (
+        TableTest.wires
+        + """
+    table -> gyro: omega alpha f
+    gyro -> sampler: u=x saturated=flag
+    """
+    )
+    open: ClassVar[tuple[str, ...]] = ("gyro.i",)
+    noises: ClassVar[tuple[str, ...]] = SDF_NOISES
+
+
+def equatorial_problems(parameters: Mapping[str, Any], latitude: float) -> list[str]:
+    """Return by how much the table axis sees Earth rate, where it is not at right angles to the pole (1 degree)."""
+    axis = np.asarray(parameters.get("table.base", frames.equatorial_base(latitude)))[2]
+    along = float(axis @ frames.pole(latitude))
+    if abs(along) <= math.radians(1.0):
+        return []
+    rate = along * frames.EARTH_RATE / units.factor("deg/h")
+    return [f"table.base: the axis must be at right angles to the pole (1°); it sees {rate:.3g} °/h of Earth rate"]
+
+
+def fold_problems(parameters: Mapping[str, Any], fold: bool) -> list[str]:
+    """Return which squares of the simulated gyro no test at constant |g| sees, unless they may be folded."""
+    return [] if fold else drift.fold_problems(parameters, "gyro.")
+
+
+def attitude_problems(text: str, latitude: float) -> list[str]:
+    """Return why an option is no attitude (:func:`gyrobench.attitudes.parse`), as a sentence."""
+    try:
+        attitudes.parse(text, latitude)
+    except ValueError as error:
+        return [str(error)]
+    return []
