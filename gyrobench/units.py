@@ -20,6 +20,7 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import Any
 
 from gyrobench.errors import GyrobenchError
 
@@ -269,3 +270,22 @@ def display(name: str) -> str:
     for pattern, printed in _SHOW:
         text = re.sub(pattern, printed, text)
     return text
+
+
+FAST = 0.01  # rad/s; above it rates are shown in degrees a second
+
+
+def format_quantity(value: Any, unit: str) -> str:
+    """Return a value in SI as a person writes it: angles in degrees, rates in degrees an hour or a second."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(format_quantity(v, unit) for v in value)}]"
+    if not isinstance(value, int | float) or unit in ("int", "str"):
+        return str(value)
+    if unit == "rad":
+        return f"{convert(value, 'rad', 'deg'):.9g}°"
+    if unit == "rad/s":
+        name = "deg/s" if abs(value) > FAST else "deg/h"
+        return f"{convert(value, 'rad/s', name):.9g} {name.replace('deg', '°')}"
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"

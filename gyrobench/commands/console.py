@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import display_path
-from gyrobench.report.plain_text import align_columns, format_quantity
+from gyrobench.report.plain_text import align_columns
+from gyrobench.units import format_quantity
 
 
 def print_note(text: str) -> None:

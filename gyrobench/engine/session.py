@@ -26,6 +26,7 @@ from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts
+from gyrobench.system.setup_errors import setup_errors
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
@@ -84,6 +85,7 @@ class Session:
         self.notes: list[str] = []
         paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
         self.swapped = sorted(parts or {})
+        self.said: set[str] = set()
         self.bench = bench
         self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
@@ -163,8 +165,12 @@ class Session:
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
         if problems := system.check_parameters(parameters):
             raise InvalidConfigurationError(system.name, problems)
+        errors = setup_errors(self.assembly, system, seed, self.base, parameters)
+        self._warn(system, [f"simulated set-up error: {e.sentence()}" for e in errors])
         linear = self._linear(system, parameters, notes) if system.loops else None
         document = self._document(system, seed, parameters, notes)
+        if errors:
+            document.setup_errors = errors
         if linear is not None:
             document.linear = linear
         every = max(1, round(system.channel_period / system.step))
@@ -207,8 +213,6 @@ class Session:
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
         """Return the linear models for run.json; its warnings go to the log immediately, and into the notes."""
-        import logging
-
         from gyrobench.linear.linear_model import LinearizationError, loops
         from gyrobench.packaging import load_part
 
@@ -220,10 +224,18 @@ class Session:
             return load_part(self.names[slot], self.bench)
 
         models, warnings = loops(self.assembly, parameters, part_of, system.step)
-        for text in warnings:
-            logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
+        self._warn(system, warnings)
         notes += warnings
         return models
+
+    def _warn(self, system: System, texts: Iterable[str]) -> None:
+        """Tell the user at once, and once, what a report will say later."""
+        import logging
+
+        for text in texts:
+            if text not in self.said:
+                self.said.add(text)
+                logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
 
     def _finish(
         self,

@@ -17,6 +17,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, WithJsonSchema
 
+from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
@@ -86,6 +87,30 @@ class PartInfo(Entry):
     target: str = Field(default="", description="native, python, or foreign: not built from a part of the bench")
     fmi: str = ""
     sha256: str = Field(default="", description="SHA-256 of the FMU file")
+
+
+class SetupError(Entry):
+    """A parameter that was set past the option that owns it, or past the method: the test does not know of it."""
+
+    parameter: str = Field(description="slot.parameter")
+    value: Value = Field(description="of the run, SI")
+    assumed: Value = Field(description="what plan and reduction assume, SI")
+    unit: str = ""
+    option: str = Field(default="", description="that owns the parameter; empty: the method assumes its value")
+
+    def comparison(self) -> str:
+        """Return what is simulated beside what the test assumes, as a person writes it."""
+        value, assumed = (units.format_quantity(v, self.unit) for v in (self.value, self.assumed))
+        option = f" (option {self.option})" if self.option else ""
+        text = f"{self.parameter} = {value}, while plan and reduction assume {assumed}{option}"
+        return text.replace(" -", " −").replace("[-", "[−")
+
+    def sentence(self) -> str:
+        """Return the comparison, and what to write for a test that knows of the value."""
+        if not self.option:
+            return f"{self.comparison()}. No option changes what they assume."
+        value = units.format_quantity(self.value, self.unit).replace("°", "deg").replace(" ", "")
+        return f"{self.comparison()}. To change the whole test: --set {self.option}={value}."
 
 
 class LinearModel(Entry):
@@ -184,6 +209,7 @@ class RunDocument(Document):
     parts: dict[str, PartInfo] = Field(default_factory=dict, description="slot -> FMU")
     parameters: dict[str, Value] = Field(default_factory=dict, description="slot.parameter -> value, SI")
     changed: list[str] = Field(default_factory=list, description="options, parameters and slots that were set")
+    setup_errors: list[SetupError] = Field(default_factory=list, description="what was set past options and method")
     units: dict[str, str] = Field(default_factory=dict, description="recorded channel -> unit")
     plan: list[PlanRow] = Field(default_factory=list)
     notes: list[str] = Field(default_factory=list, description="said before the run")

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gyrobench import units
 from gyrobench.report.numbers import write_number
 from gyrobench.result import NO_VERDICT, Result, SuiteResult
-
-FAST = 0.01  # rad/s; above it rates are shown in degrees a second
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> list[str]:
@@ -19,20 +16,6 @@ def align_columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "
         indent + "  ".join(x.ljust(w) if k in left else x.rjust(w) for k, (x, w) in enumerate(zip(r, widths))).rstrip()  # noqa: B905
         for r in rows
     ]
-
-
-def format_quantity(value: Any, unit: str) -> str:
-    """Return a value in SI as a person writes it: angles in degrees, rates in degrees an hour or a second."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if not isinstance(value, int | float) or unit in ("int", "str"):
-        return str(value)
-    if unit == "rad":
-        return f"{units.convert(value, 'rad', 'deg'):.9g}°"
-    if unit == "rad/s":
-        name = "deg/s" if abs(value) > FAST else "deg/h"
-        return f"{units.convert(value, 'rad/s', name):.9g} {name.replace('deg', '°')}"
-    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"
 
 
 def format_result(result: Result) -> str:

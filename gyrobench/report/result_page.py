@@ -7,18 +7,20 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.run_document import ABOUT
+from gyrobench.record.run_document import ABOUT, SetupError
 from gyrobench.report import diagnostics_section, method_section, plots, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     Answer,
     Cell,
     Column,
+    Items,
     Page,
     Picture,
     Row,
     Section,
     Table,
+    Text,
     number_cell,
     pictures,
     text_cell,
@@ -40,6 +42,7 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
     with styled():
         sections = [
             Section("The answer", "answer", [answer(doc)]),
+            Section("Simulated set-up errors", "setup-errors", setup_errors(doc)),
             Section("Coefficients", "coefficients", coefficients(doc)),
             Section("What was measured", "measured", _measured(doc, record or {})),
             Section("Can it be believed", "believed", []),
@@ -123,6 +126,18 @@ def answer(doc: Json) -> Answer:
     table = Table(columns, rows, "Verdict per requirement.") if rows else None
     rule = doc["decision_rule"] if rows or doc["verdict"] != NO_VERDICT else ""
     return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
+
+
+def setup_errors(doc: Json) -> list[Any]:
+    """Return what was set past the options of the test; nothing where nothing was."""
+    errors = [SetupError.model_validate(e) for e in doc["provenance"].get("setup_errors") or []]
+    if not errors:
+        return []
+    text = (
+        "The instrument or its set-up was simulated otherwise than the test assumes. The estimates, their u and their "
+        "verdicts hold for a set-up without these errors."
+    )
+    return [Text(text), Items([e.sentence() for e in errors], warn=True)]
 
 
 def coefficients(doc: Json) -> list[Any]:

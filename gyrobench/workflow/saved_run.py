@@ -10,6 +10,7 @@ from pathlib import Path
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System
@@ -38,6 +39,7 @@ def reduce_run(system: System, record: Record, limits: Specification | None) -> 
     result = system.reduce(record, limits)
     wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
     result.provenance = {**record.run.as_dict(), "wires": wires}
+    check_truth(result, set_values(record.run))
     return result
 
 

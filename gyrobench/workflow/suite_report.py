@@ -15,6 +15,7 @@ from gyrobench.bench import Bench, UsageError
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods
+from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS
 from gyrobench.result import DriftTestResult, SuiteResult
 from gyrobench.system.suite import Suite
@@ -118,6 +119,8 @@ def write_suite_report(
         )  # fmt: skip
         if suite["instrument"]:
             result.instrument = suite["instrument"]
+        runs = [RunDocument.model_validate(m.result.provenance) for m in members.values()]
+        check_truth(result, list(dict.fromkeys(cause for run in runs for cause in set_values(run))))
     document.write(folder)
     with record_kept(folder):
         paths = write_report(result, folder, None, spec, formats)

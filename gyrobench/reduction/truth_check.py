@@ -1,0 +1,46 @@
+"""Simulated results that miss their truth: said first, with what was set and may explain it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gyrobench.record.run_document import RunDocument
+from gyrobench.result import Coefficient, Result
+
+LIMIT = 5.0  # of |z|: by chance once in two million
+
+
+def check_truth(result: Result, causes: Sequence[str]) -> None:
+    """Put a warning before all others where an estimate is more than five standard uncertainties from the truth.
+
+    causes: what was set and may explain it, see :func:`set_values`.
+    """
+    far = [c for c in result.coefficients if c.z is not None and abs(c.z) > LIMIT]
+    if not far:
+        return
+    far.sort(key=lambda c: -abs(c.z or 0.0))
+    why = f"Set and may explain it: {'; '.join(causes)}." if causes else "Nothing was set: the model or its u is wrong."
+    result.warnings.insert(
+        0,
+        f"The result misses the simulated truth by more than five standard uncertainties: {_shown(far)}. That is no "
+        f"chance; the coefficients, their u and every verdict on them are not to be used. {why}",
+    )
+
+
+def _shown(far: Sequence[Coefficient], most: int = 4) -> str:
+    text = ", ".join(f"{c.name} (z = {c.z:+,.1f})" for c in far[:most]).replace("-", "−")
+    return text + (f" and {len(far) - most} more" if len(far) > most else "")
+
+
+def set_values(run: RunDocument) -> list[str]:
+    """Return what was set in a run: set-up errors first, then parts that were swapped, then values in SI."""
+    errors = {e.parameter.partition("[")[0]: e for e in run.setup_errors}
+    causes = [f"set-up error {e.comparison()}" for e in run.setup_errors]
+    for name in run.changed:
+        slot, colon, _ = name.partition(": part")
+        if colon:
+            causes.append(f"part {run.parts[slot].name} in slot {slot}" if slot in run.parts else name)
+        elif name.partition("[")[0] not in errors:
+            value = run.parameters.get(name, run.options.get(name))
+            causes.append(f"{name} = {value:.6g} (SI)" if isinstance(value, float) else name)
+    return causes
