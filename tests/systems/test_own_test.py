@@ -1,0 +1,87 @@
+"""A new test method from a family, in a bench of one's own: the file of the guide, from the folder to the report."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench.bench import standard_folder
+from gyrobench.commands.catalog import init_bench
+from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.rebalance_test import RebalanceTest
+from gyrobench.system.system import load_system
+
+Command = Callable[..., tuple[int, str, str]]
+EXAMPLE = standard_folder() / "docs" / "guides" / "own_test" / "system.py"
+NAME = "six_position"
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A new bench with the example as its only system."""
+    folder = tmp_path / "mine"
+    init_bench(folder, [])
+    (folder / "systems" / NAME).mkdir(parents=True)
+    shutil.copy(EXAMPLE, folder / "systems" / NAME)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_it_is_short() -> None:
+    assert len(EXAMPLE.read_text("utf-8").splitlines()) <= 40
+
+
+def test_from_a_folder_to_a_report(bench: Path, command: Command) -> None:
+    """Six coefficients of the standard gyro with their uncertainties; halving the step changes none of them."""
+    code, out, err = command("run", NAME, "--set", "u_scale_factor=1e-4", "--check-step", "--seed", 4)
+    assert code == 0, err
+    (folder,) = (bench / "reports" / "out" / NAME).iterdir()
+    assert (folder / "report.pdf").stat().st_size > 10_000 and "misses" not in out
+    result = json.loads((folder / "result.json").read_text("utf-8"))
+    found = {c["name"]: c for c in result["coefficients"]}
+    assert list(found) == ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS"]
+    assert found["D_I"]["truth"] == pytest.approx(-0.9) and found["D_I"]["unit"] == "°/h/g"
+    assert all(abs(c["z"]) < 4.0 and 1e-4 < c["u"] < 5e-3 for c in found.values())
+    assert {line["source"] for line in result["budget"]} >= {"torquer scale factor"}
+    assert result["step_check"]["worst"] < 1e-3
+    page = (folder / "report.html").read_text("utf-8")
+    assert "Six-position test" in page and "mass unbalance along the spin axis" in page
+
+
+def test_what_comes_along_from_the_family(bench: Path, command: Command) -> None:
+    """Options, checks, order of execution and set-up errors, without a word of them in the file."""
+    code, out, _ = command("show", NAME)
+    assert code == 0
+    for text in ("latitude", "45.75°", "torquer scale factor for the reduction", "loops are cut at", "N -E"):
+        assert text in out
+    code, _, err = command("run", NAME, "--set", "gravity=9.5m/s2")
+    assert code == 2 and "gravity 9.5 m/s² lies outside 9.7..9.9 m/s²" in err
+    code, _, err = command("run", NAME, "--set", "gyro.mount=[[1,0,0],[0,1,0],[0,0,-1]]")
+    assert code == 2 and "gyro.mount: determinant is -1" in err
+    code, out, _ = command("run", NAME, "--set", "site.latitude=0deg", "--set", "dwell=100s")
+    assert code == 0
+    assert "misses the simulated truth" in out and "site.latitude = 0°, while plan and reduction assume 45.75°" in out
+
+
+def test_a_family_without_parts_is_refused(bench: Path) -> None:
+    file = bench / "systems" / NAME / "system.py"
+    line = next(n for n in file.read_text("utf-8").splitlines() if "with_parts" in n)
+    file.write_text(file.read_text("utf-8").replace(line, line.replace('gyro="floated_gyro", ', "")), encoding="utf-8")
+    with pytest.raises(InvalidConfigurationError, match=r'slot gyro: no part; name it by with_parts\(gyro="..."\)'):
+        load_system(NAME, bench)
+    file.write_text(EXAMPLE.read_text("utf-8").replace("rebalance=", "balance="), encoding="utf-8")
+    with pytest.raises(InvalidConfigurationError, match="no slot 'balance' in RebalanceTest; slots: site, sequencer"):
+        load_system(NAME, bench)
+
+
+def test_groups_of_options() -> None:
+    assert SITE["latitude"].sets == ("site.latitude",) and set(SITE) <= set(RebalanceTest.options)
+    sizes = type_b("current", mount="of the gyro in its fixture")
+    assert sizes["u_current"].unit == "A" and sizes["u_mount"].doc == "of the gyro in its fixture"
+    with pytest.raises(KeyError):
+        type_b("temperature")
