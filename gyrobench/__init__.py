@@ -1,0 +1,59 @@
+"""FMI co-simulation bench for inertial instruments and stabilized platforms.
+
+    import gyrobench as gb
+
+    run = gb.load("tumble_single_axis", latitude="45.75deg").run(seed=3)
+    run.result["D_I"].estimate
+
+The calls are those of :mod:`gyrobench.library`, which is imported when the first of them is used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gyrobench.library import (
+        Comparison,
+        Experiment,
+        GyrobenchError,
+        Record,
+        Result,
+        Run,
+        SuiteExperiment,
+        SuiteRun,
+        compare,
+        load,
+        load_suite,
+        open_run,
+        reduce,
+    )
+
+__all__ = [
+    "Comparison",
+    "Experiment",
+    "GyrobenchError",
+    "Record",
+    "Result",
+    "Run",
+    "SuiteExperiment",
+    "SuiteRun",
+    "compare",
+    "load",
+    "load_suite",
+    "open_run",
+    "reduce",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is used of the library."""
+    if name not in __all__:
+        raise AttributeError(f"module 'gyrobench' has no attribute '{name}'; it offers {', '.join(__all__)}")
+    import importlib
+
+    return getattr(importlib.import_module("gyrobench.library"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

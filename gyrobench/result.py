@@ -6,9 +6,16 @@ Numbers are in surface units (the unit stands beside them); nothing here compute
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from gyrobench.bench import UsageError, suggest_names
+from gyrobench.notebook import Displayed, data_frame
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas
 
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
@@ -36,6 +43,23 @@ class Coefficient:
     limit: Limit | None = None
     verdict: str = NO_VERDICT  # pass | fail | inconclusive | no specification given
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
+
+
+#: what :meth:`Result.array` reads of a coefficient
+NUMBERS: Mapping[str, Callable[[Coefficient], float | None]] = {
+    "estimate": lambda c: c.estimate,
+    "u": lambda c: c.u,
+    "k": lambda c: c.k,
+    "low": lambda c: c.interval[0],
+    "high": lambda c: c.interval[1],
+    "t": lambda c: c.t,
+    "p": lambda c: c.p,
+    "u_a": lambda c: c.u_a,
+    "dof": lambda c: c.dof,
+    "closed": lambda c: c.closed,
+    "truth": lambda c: c.truth,
+    "z": lambda c: c.z,
+}
 
 
 @dataclass
@@ -107,9 +131,13 @@ class Response:
     curves: list[dict[str, Any]] = field(default_factory=list)
 
 
-@dataclass(kw_only=True)
-class Result:
+@dataclass(kw_only=True, repr=False)
+class Result(Displayed):
     """What results of every kind hold; a reduction returns one of the kinds below.
+
+        result["D_I"].estimate, result["D_I"].interval      a coefficient by its name
+        result.array("estimate"), result.covariance()       numpy arrays, in the order of result.names
+        result.frame(), result.frame("series")              pandas data frames
 
     Every field is JSON-able through :meth:`as_dict`.  result.json has the same keys for every kind: empty, 0 or 1 where
     a kind does not have them.
@@ -141,6 +169,66 @@ class Result:
         if not self.kind:
             raise TypeError("a result is a DriftTestResult, a LoopResult or a SuiteResult")
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.system}: {len(self.coefficients)} coefficients, {self.verdict}>"
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the coefficients, in their order."""
+        return [c.name for c in self.coefficients]
+
+    def __getitem__(self, name: str) -> Coefficient:
+        """Return a coefficient by its name.  Raises UsageError."""
+        for c in self.coefficients:
+            if c.name == name:
+                return c
+        raise UsageError(f"{name}: no such coefficient of {self.system}; {suggest_names(str(name), self.names)}")
+
+    def array(self, column: str = "estimate") -> np.ndarray[Any, Any]:
+        """Return a number of every coefficient, in the unit of each; NaN where there is none.  Raises UsageError.
+
+        column: estimate, u, k, low, high, t, p, u_a, dof, closed, truth or z.
+        """
+        import numpy as np
+
+        if column not in NUMBERS:
+            raise UsageError(f"{column}: no number of a coefficient; {suggest_names(str(column), NUMBERS)}")
+        return np.array([np.nan if v is None else v for v in map(NUMBERS[column], self.coefficients)], dtype=float)
+
+    def covariance(self) -> np.ndarray[Any, Any]:
+        """Return the covariance of the estimates, u_i u_j r_ij, in the units of the coefficients.
+
+        Raises UsageError for a result without correlations: the estimates of a loop are made one by one.
+        """
+        import numpy as np
+
+        correlation = getattr(self, "correlation", None)
+        if not correlation:
+            raise UsageError(f"{self.system}: its estimates have no correlation, each is made by itself")
+        u = self.array("u")
+        return np.asarray(correlation, dtype=float) * np.outer(u, u)
+
+    def frame(self, table: str = "coefficients") -> pandas.DataFrame:
+        """Return the coefficients, or the points of all series ("series"), as a data frame.
+
+        Raises MissingPackageError without pandas, and UsageError for another table.
+        """
+        if table == "coefficients":
+            texts = {"meaning": [c.meaning for c in self.coefficients], "unit": [c.unit for c in self.coefficients]}
+            numbers: dict[str, Any] = {name: self.array(name) for name in NUMBERS}
+            verdicts = {"verdict": [c.verdict for c in self.coefficients]}
+            return data_frame({"name": self.names, **texts, **numbers, **verdicts}, {}, "name")
+        if table != "series":
+            raise UsageError(f"{table}: no table of a result; there are: coefficients, series")
+        series: list[Series] = getattr(self, "series", [])
+        rows = [(s, k) for s in series for k in range(len(s.x))]
+        columns: dict[str, list[Any]] = {"series": [s.label for s, _ in rows]}
+        for name in ("t", "x", "y", "fit", "residual"):
+            columns[name] = [v[k] if k < len(v) else None for s, k in rows for v in [getattr(s, name)]]
+        units = {"t": "s", "x": ", ".join(dict.fromkeys(s.x_unit for s in series))}
+        y_unit = ", ".join(dict.fromkeys(s.y_unit for s in series))
+        return data_frame(columns, {**units, **dict.fromkeys(("y", "fit", "residual"), y_unit)})
+
     def as_dict(self) -> dict[str, Any]:
         """Return the content of result.json, with the kind."""
         return {"kind": self.kind, **ABSENT, **asdict(self)}
@@ -166,7 +254,7 @@ class Result:
         return cls(**values)
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class DriftTestResult(Result):
     """Coefficients of an instrument from a regression over windows, with its residuals and its error budget."""
 
@@ -189,7 +277,7 @@ class DriftTestResult(Result):
     repeatability: dict[str, Any] = field(default_factory=dict)
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class LoopResult(Result):
     """Measures of a loop, a platform or an estimator, each by itself: responses, steps, drift."""
 
@@ -222,7 +310,7 @@ class SuiteComparison:
     pairs_apart: int  # E_n > 1
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class SuiteResult(Result):
     """Several tests of one instrument: weighted means of what they have in common, and whether the methods agree."""
 

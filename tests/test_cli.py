@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gyrobench.bench import Bench, standard_folder
@@ -70,7 +72,7 @@ def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
     names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
-    assert len(names) == 10
+    assert len(names) == 11
     for name in names:
         code, text, _ = gyrobench(name, "--help")
         assert code == 0
@@ -260,6 +262,54 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
     again = json.loads((tmp_path / "r" / "result.json").read_bytes())
     assert again["coefficients"] == json.loads(before)["coefficients"]
     assert gyrobench("report", "r")[0] == 0 and (tmp_path / "r" / "report.html").is_file()
+
+
+def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+    shutil.copytree(runs / "a", tmp_path / "a")
+    code, out, _ = gyrobench("record", "a", "--to", "csv", "--out", "t")
+    assert (code, out.split()) == (0, ["t/windows.csv", "t/channels.csv"])
+    record = Record.load(tmp_path / "a")
+    for name, columns in (("windows", record.windows), ("channels", record.channels)):
+        head, *rows = (tmp_path / "t" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        assert [h.split(" [")[0] for h in head.split(",")] == list(columns)
+        table = np.array([[float(x) for x in r.split(",")] for r in rows])
+        assert all(np.array_equal(table[:, k], v) for k, v in enumerate(columns.values()))  # bit for bit
+        assert {"mean [A]", "phase", "angle_end [rad]"} <= set(head.split(",")) or "gyro.u [V]" in head.split(",")
+    assert gyrobench("record", "a", "--to", "csv")[1].split() == ["a/csv/windows.csv", "a/csv/channels.csv"]
+    assert Record.load(tmp_path / "a").same_data(record)  # the run stays a record
+    code, _, err = gyrobench("record", "nothing", "--to", "csv")
+    assert code == 2 and "nothing: no run there" in err
+
+
+# --------------------------------------------------------------------------------- completion
+COMPLETED = [
+    ("gyrobench run tumble_t", ["tumble_two_axis", "tumble_two_channel"]),
+    (f"gyrobench run {NAME} --set lat", ["latitude="]),
+    (f"gyrobench run {NAME} --set gy", ["gyro."]),
+    (f"gyrobench run {NAME} --set rate=1 --set gyro.whi", ["gyro.white="]),
+    (f"gyrobench run {NAME} --set gyr.D", []),
+    (f"gyrobench show {NAME} --part reb", ["rebalance="]),
+    (f"gyrobench run {NAME} --spec floa", ["floated_gyro"]),
+    ("gyrobench show drift_test_suite --set tes", ["tests="]),
+    ("gyrobench run --set lat", []),
+    ("gyrobench build floated_", ["floated_gyro"]),
+    ("gyrobench init x --copy eight", ["eight_position"]),
+    ("gyrobench rec", ["record"]),
+]
+
+
+@pytest.mark.parametrize(("line", "words"), COMPLETED, ids=[line for line, _ in COMPLETED])
+def test_the_shell_completes(
+    line: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["gyrobench"])
+    monkeypatch.setenv("_GYROBENCH_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - 1))
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert capsys.readouterr().out.split() == words
 
 
 def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:

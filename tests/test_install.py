@@ -71,7 +71,7 @@ def test_the_wheel_holds_tool_and_standard_bench(wheel: Path) -> None:
     for room in ("components", "systems", "docs", "reports/specs", "reports/templates"):
         files = [f for f in (ROOT / room).rglob("*") if f.is_file() and "__pycache__" not in f.parts]
         assert files and {f"gyrobench/_bench/{f.relative_to(ROOT)}" for f in files} <= inside
-    assert "gyrobench/_bench/reports/result.schema.json" in inside
+    assert {"gyrobench/_bench/reports/result.schema.json", "gyrobench/py.typed"} <= inside
     odd = [n for n in inside if re.search(r"__pycache__|/out/|\.fmu$|^(tests|fmus)/|\.pyc$", n)]
     assert not odd
 

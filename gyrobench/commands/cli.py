@@ -6,64 +6,39 @@ import json
 import os
 import sys
 import traceback
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.commands.completion import complete_copy, complete_part
+from gyrobench.commands.options import (
+    Data,
+    Engine,
+    Force,
+    Form,
+    Json,
+    Map,
+    Out,
+    Part,
+    Resume,
+    Seed,
+    Set,
+    Spec,
+    Strict,
+    System,
+    Table,
+    Target,
+)
 from gyrobench.workflow.user_errors import exit_code, user_message
 
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-
-System = Annotated[str, typer.Argument(metavar="SYSTEM", help="Name of a system, see gyrobench list.")]
-Json = Annotated[bool, typer.Option("--json", help="JSON on standard output, and nothing else there.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  Repeatable.",
-    ),
-]
-Part = Annotated[
-    list[str] | None, typer.Option("--part", metavar="SLOT=FMU|PART", help="Another part, or an FMU file, in a slot.")
-]
-Map = Annotated[
-    list[str] | None, typer.Option("--map", metavar="SLOT=FILE", help="Names and units of a foreign FMU (.toml).")
-]
-Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0)]
-Spec = Annotated[str | None, typer.Option("--spec", metavar="NAME|FILE", help="Acceptance specification to judge by.")]
-Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
-Data = Annotated[
-    list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; of a suite its runs.  Repeatable.")
-]
-Force = Annotated[bool, typer.Option("--force", help="Replace another run in --out.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Continue this run where it was interrupted.")]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
-
-
-class Engine(StrEnum):
-    native = "native"
-    reference = "reference"
-
-
-class Target(StrEnum):
-    native = "native"
-    python = "python"
-
-
-class Form(StrEnum):
-    ssp = "ssp"
-    container = "container"
-
 
 echo = typer.echo
 
@@ -156,7 +131,9 @@ def show(
 
 @app.command()
 def build(
-    parts: Annotated[list[str] | None, typer.Argument(metavar="PART", help="Names of parts.")] = None,
+    parts: Annotated[
+        list[str] | None, typer.Argument(metavar="PART", help="Names of parts.", autocompletion=complete_part)
+    ] = None,
     every: Annotated[bool, typer.Option("--all", help="Every part of the bench.")] = False,
     target: Annotated[
         Target, typer.Option(help="native: C, needs nothing where it runs; python: needs Python and numpy there.")
@@ -321,6 +298,28 @@ def compare(
 
 
 @app.command()
+def record(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    to: Annotated[Table, typer.Option("--to", help="csv: windows.csv and channels.csv, SI, units in the header.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder; default csv/ in the run.")] = None,
+) -> None:
+    """Write the record of a run as tables for other programs.
+
+    A row of windows.csv is a completed window (its columns: docs/systems.md), one of channels.csv a time; names are
+    those of the record, "gyro.u [V]" with the SI unit where it is not 1.  Numbers read back bit for bit.
+
+    \b
+    Example: gyrobench record reports/out/tumble_single_axis/1a2b3c4d --to csv --out tables
+    """
+    from gyrobench.record.record import Record
+    from gyrobench.workflow.inputs import require_run
+
+    assert to is Table.csv
+    for file in Record.load(require_run(folder)).to_csv(out or folder / "csv"):
+        echo(display_path(file))
+
+
+@app.command()
 def export(
     system: System,
     to: Annotated[Form, typer.Option("--to", help="ssp: FMUs and wiring in one archive; container: one FMU.")],
@@ -366,7 +365,12 @@ def init(
     name: Annotated[Path, typer.Argument(metavar="NAME", help="Folder to make.")],
     copy: Annotated[
         list[str] | None,
-        typer.Option("--copy", metavar="PART|SYSTEM", help="Copy this part or system to change it.  Repeatable."),
+        typer.Option(
+            "--copy",
+            metavar="PART|SYSTEM",
+            help="Copy this part or system to change it.  Repeatable.",
+            autocompletion=complete_copy,
+        ),
     ] = None,
 ) -> None:
     """Create a bench on top of the standard one.

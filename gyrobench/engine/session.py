@@ -26,6 +26,7 @@ from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts
+from gyrobench.system.recorded_units import recorded_units
 from gyrobench.system.setup_errors import setup_errors
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
@@ -272,15 +273,6 @@ class Session:
             keeper.done()
         return record
 
-    def _units(self) -> dict[str, str]:
-        """SI units of the recorded channels, as far as their sockets or their FMUs name them."""
-        found = {}
-        for name in self.program.channel.names:
-            slot, bound = self.assembly.output(name)
-            connector = self.assembly.bindings[slot].socket.connector(bound.element.split("[")[0])
-            found[name] = connector.unit if connector is not None and connector.unit else bound.unit
-        return found
-
     def _document(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> RunDocument:
         """Return what run.json says of a run before its end."""
         parts = {
@@ -309,7 +301,8 @@ class Session:
             parameters=parameters,
             changed=[*(f"{s}: part" for s in self.swapped), *system.given],
             options=dict(system.values),
-            units=self._units(),
+            units=recorded_units(self.assembly, {name: name for name in self.program.channel.names}),
+            window_units=recorded_units(self.assembly, system.windows.columns if system.windows else {}),
             plan=[PlanRow(**row) for row in system.plan().rows()],
             versions=dict(package_versions()),
             notes=[*self.notes, *notes, *system.warnings()],

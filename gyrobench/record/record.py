@@ -13,13 +13,19 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gyrobench.bench import UsageError
 from gyrobench.files import sha256, write_whole
+from gyrobench.notebook import Displayed, data_frame
 from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocument, read_run
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = np.ndarray[Any, Any]
 WHOLE = ("phase", "n", "flagged")  # integer columns
@@ -45,15 +51,16 @@ def write_table(stem: Path, columns: dict[str, Array]) -> Path:
         text.unlink(missing_ok=True)
         return parquet
 
-    def write(p: Path) -> None:
-        with p.open("w", newline="", encoding="utf-8") as f:
-            writer = csv.writer(f)
-            writer.writerow(columns)
-            writer.writerows(zip(*([repr(x) for x in c.tolist()] for c in columns.values()), strict=True))
-
-    write_whole(text, write)
+    write_whole(text, partial(_write_csv, list(columns), list(columns.values())))
     parquet.unlink(missing_ok=True)
     return text
+
+
+def _write_csv(header: list[str], columns: list[Array], path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as f:
+        writer = csv.writer(f)
+        writer.writerow(header)
+        writer.writerows(zip(*([repr(x) for x in c.tolist()] for c in columns), strict=True))
 
 
 def remove_table(stem: Path) -> None:
@@ -78,9 +85,14 @@ def read_table(stem: Path) -> dict[str, Array] | None:
     return None
 
 
-@dataclass
-class Record:
-    """What a run left: windows, channels and where they come from (run.json)."""
+@dataclass(repr=False)
+class Record(Displayed):
+    """What a run left: windows, channels and where they come from (run.json).
+
+    record.windows["mean"], record.channels["gyro.u"]    numpy arrays, SI
+    record.frame("windows"), record.frame("channels")    pandas data frames, units in attrs["units"]
+    record.to_csv(folder)                                windows.csv and channels.csv, units in the header
+    """
 
     windows: dict[str, Array] = field(default_factory=dict)
     channels: dict[str, Array] = field(default_factory=dict)
@@ -118,6 +130,44 @@ class Record:
         if windows is None:
             raise RecordError(f"{folder}: has run.json but neither record.parquet nor record.csv")
         return cls(windows, channels or {}, run, folder)
+
+    def __repr__(self) -> str:
+        samples = len(next(iter(self.channels.values()), ()))
+        windows = len(next(iter(self.windows.values()), ()))
+        signals = max(0, len(self.channels) - 1)
+        state = "" if self.complete else ", incomplete"
+        return f"<Record of {self.run.system}: {windows} windows, {signals} channels of {samples} samples{state}>"
+
+    def table(self, name: str) -> tuple[dict[str, Array], dict[str, str]]:
+        """Return the columns of "windows" or "channels" and their SI units, "" where not known.  Raises UsageError."""
+        tables = {"windows": (self.windows, self.run.window_units), "channels": (self.channels, self.run.units)}
+        if name not in tables:
+            raise UsageError(f"{name}: no table of a record; there are: {', '.join(tables)}")
+        columns, units = tables[name]
+        return columns, {c: "s" if c == "time" else units.get(c, "") for c in columns}
+
+    def frame(self, table: str = "windows") -> pandas.DataFrame:
+        """Return "windows" or "channels" as a data frame, SI; its ``attrs["units"]`` says the units.
+
+        Raises MissingPackageError without pandas, and UsageError for another table.
+        """
+        return data_frame(*self.table(table))
+
+    def to_csv(self, folder: Path) -> list[Path]:
+        """Write windows.csv and channels.csv into a folder, those that have rows; return the files.
+
+        SI, "name [unit]" in the header (no unit where it is 1 or not known); numbers read back bit for bit.
+        """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        files = []
+        for name in ("windows", "channels"):
+            columns, units = self.table(name)
+            if columns:
+                header = [f"{c} [{units[c]}]" if units[c] not in ("", "1") else c for c in columns]
+                write_whole(folder / f"{name}.csv", partial(_write_csv, header, list(columns.values())))
+                files.append(folder / f"{name}.csv")
+        return files
 
     def same_data(self, other: Record) -> bool:
         """True when windows and channels are equal bit for bit."""

@@ -211,6 +211,7 @@ class RunDocument(Document):
     changed: list[str] = Field(default_factory=list, description="options, parameters and slots that were set")
     setup_errors: list[SetupError] = Field(default_factory=list, description="what was set past options and method")
     units: dict[str, str] = Field(default_factory=dict, description="recorded channel -> unit")
+    window_units: dict[str, str] = Field(default_factory=dict, description="column of the windows -> unit, SI")
     plan: list[PlanRow] = Field(default_factory=list)
     notes: list[str] = Field(default_factory=list, description="said before the run")
     linear: LinearModels | None = Field(default=None, description="of a system with loops")

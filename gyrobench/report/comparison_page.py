@@ -148,6 +148,13 @@ def page(doc: Json) -> Page:
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
 
 
+def side_tables(doc: Json) -> list[Table]:
+    """The tables that stand side by side: runs, ranking, estimates and differences."""
+    ranked = ranking_section.section(doc, [_letter(k) for k in range(len(doc["runs"]))]).blocks
+    blocks = [_runs(doc), *ranked, *_estimates(doc), *_differences(doc)]
+    return [b for b in blocks if isinstance(b, Table)]
+
+
 def _letter(k: int) -> str:
     return LETTERS[k] if k < len(LETTERS) else f"R{k + 1}"
 

@@ -50,6 +50,18 @@ def _agreement(result: SuiteResult) -> list[str]:
     return [*table, "", f"methods: {result.suite.consistency}", *result.summary]
 
 
+def format_comparison(comparison: Mapping[str, Any]) -> str:
+    """Return the estimates of all runs, a line for each coefficient, and the ranking where there is one."""
+    rows = [["coefficient", *(str(run["name"]) for run in comparison["runs"]), "unit"]]
+    for m in comparison["measures"]:
+        shown = [write_number(r and r["estimate"], r and r["u"]).text for r in m["runs"]]
+        marked = [d is not None and d["significant"] for d in m["differences"]]
+        rows.append([m["name"], *(s + (" *" if k else "  ") for s, k in zip(shown, marked, strict=True)), m["unit"]])
+    note = "* differs from the first run by more than the expanded uncertainty of the difference"
+    table = align_columns(rows, {0, len(rows[0]) - 1})
+    return "\n".join([*table, "", note, *([format_ranking(comparison)] if comparison["ranking"] else [])])
+
+
 def format_ranking(comparison: Mapping[str, Any]) -> str:
     """Return the runs of a comparison in the order of the measure that ranks them; empty where none does."""
     ranked = comparison["ranking"]

@@ -72,7 +72,9 @@ def read_record(
         windows.setdefault("std", np.full(count, np.nan))
         windows.setdefault("n", np.ones(count, dtype=np.int64))
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
-    return Record(windows, {}, measured_run(system, plan, {n: said[n] for n in texts if n in said}))
+    run = measured_run(system, plan, {n: said[n] for n in texts if n in said})
+    run.window_units = {c.name: c.unit for c in columns if c.name in windows}
+    return Record(windows, {}, run)
 
 
 def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, str]) -> RunDocument:

@@ -79,7 +79,10 @@ def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
         return [parse(f"{name}[{k}]", v, unit, kind) for k, v in enumerate(value, 1)]
     if kind is str:
         return str(value)
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidValueError(f"{name} = {value!r}: a number is expected, or a text with number and unit") from None
     if not math.isfinite(number):
         raise InvalidValueError(f"{name} = {number}: must be finite")
     if kind in (int, bool):

@@ -27,11 +27,18 @@ def load_test(name: str, step: float | None = None) -> System | Suite:
 
 def load_saved_test(folder: Path) -> System | Suite:
     """Return the system or suite of a run with its default values.  Raises RecordError for a folder without a run."""
-    from gyrobench.record.run_document import FILE, RecordError, read_run
+    from gyrobench.record.run_document import read_run
+
+    return load_test(read_run(require_run(folder)).system)
+
+
+def require_run(folder: Path) -> Path:
+    """Return the folder of a run.  Raises RecordError for a folder without one."""
+    from gyrobench.record.run_document import FILE, RecordError
 
     if not (folder / FILE).is_file():
         raise RecordError(f"{folder}: no run there (no {FILE}); runs are in {Bench.find().out}/SYSTEM/")
-    return load_test(read_run(folder).system)
+    return folder
 
 
 def suite_members(suite: Suite) -> dict[str, System]:

@@ -39,7 +39,7 @@ def reduce_measured(
     system: System,
     data: Path,
     values: Mapping[str, str],
-    spec: str | None = None,
+    spec: str | Path | None = None,
     out: Path | None = None,
     force: bool = False,
     in_memory: bool = False,

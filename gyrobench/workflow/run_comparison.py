@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.notebook import data_frame
 from gyrobench.report import FORMATS, ResultError
 from gyrobench.result import Result
 from gyrobench.workflow.run_folders import short_names
 
+if TYPE_CHECKING:
+    import pandas
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Named results laid side by side; the first is the baseline.
 
@@ -22,8 +26,32 @@ class Comparison:
     """
 
     results: Sequence[tuple[str, Result]]
-    document: Mapping[str, Any]
+    document: dict[str, Any]
     note: str = ""
+
+    def __str__(self) -> str:
+        from gyrobench.report.plain_text import format_comparison
+
+        return format_comparison(self.document)
+
+    def _repr_html_(self) -> str:
+        from gyrobench.report.notebook_html import comparison_html
+
+        return comparison_html(self.document, self.note)
+
+    def frame(self) -> pandas.DataFrame:
+        """Return a row for each coefficient of each run: estimate, u, and the difference to the baseline with its U.
+
+        Raises MissingPackageError without pandas.
+        """
+        rows = []
+        for m in self.document["measures"]:
+            for run, value, difference in zip(self.document["runs"], m["runs"], m["differences"], strict=True):
+                v, d = value or {}, difference or {}
+                row = {"name": m["name"], "unit": m["unit"], "run": run["name"]}
+                row |= {"estimate": v.get("estimate"), "u": v.get("u"), "difference": d.get("value")}
+                rows.append(row | {"U": d.get("U"), "significant": d.get("significant")})
+        return data_frame({key: [row[key] for row in rows] for key in rows[0]}, {})
 
     def write(self, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
         """Write comparison.json, .html and .pdf into a folder; return their paths."""

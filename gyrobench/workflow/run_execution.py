@@ -34,7 +34,7 @@ class RunRequest:
     step: float | None = None
     out: Path | None = None
     force: bool = False
-    spec: str | None = None
+    spec: str | Path | None = None
     check_step: bool = False
     isolate: tuple[str, ...] = ()
     resume: bool = False

@@ -9,12 +9,11 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
-from gyrobench.reduction.suite.method_comparison import Member, combine_methods
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS
 from gyrobench.result import DriftTestResult, SuiteResult
@@ -23,6 +22,9 @@ from gyrobench.workflow.inputs import find_specification, load_limits
 from gyrobench.workflow.run_folders import prepare_folder, short_names
 from gyrobench.workflow.saved_run import write_report
 from gyrobench.workflow.user_errors import PostRunError, record_kept
+
+if TYPE_CHECKING:
+    from gyrobench.reduction.suite.method_comparison import Member
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
 def reduce_runs(
     suite: Suite,
     runs: Sequence[Path],
-    spec: str | None = None,
+    spec: str | Path | None = None,
     out: Path | None = None,
     force: bool = False,
     formats: Sequence[str] = FORMATS,
@@ -104,6 +106,8 @@ def write_suite_report(
     suite: Suite, folder: Path, document: SuiteDocument, spec: Path | None, formats: Sequence[str] = FORMATS
 ) -> SuiteOutcome:
     """Write run.json and the report from the results of the tests."""
+    from gyrobench.reduction.suite.method_comparison import combine_methods
+
     members = {n: _load_member(folder / test.folder, test.folder) for n, test in document.tests.items()}
     document.tests = {n: member.test for n, member in members.items()}
     for name in suite.about:  # what the suite is not told the tests may say
@@ -129,6 +133,7 @@ def write_suite_report(
 
 def _load_member(folder: Path, label: str) -> Member:
     """Return a test of a suite from its folder.  Raises RecordError for a result that cannot be read."""
+    from gyrobench.reduction.suite.method_comparison import Member
     from gyrobench.report import load
 
     file = folder / "result.json"

@@ -108,10 +108,12 @@ def record_kept(
                 raise
             save()
         if folder is None:
-            kept, go_on = "the record is kept in memory", "attribute 'record' of this error holds it"
-        else:
-            kept = f"the record is kept in {display_path(folder)}"
-            go_on = f"gyrobench report {display_path(folder)}"
+            kept = "the record is kept in memory, in the attribute 'record' of this error"
+            if isinstance(error, KeyboardInterrupt):
+                raise CommandInterrupted(f"interrupted; {kept}", record) from error
+            raise PostRunError(f"{user_message(error)}\n{kept}", record) from error
+        kept = f"the record is kept in {display_path(folder)}"
+        go_on = f"gyrobench report {display_path(folder)}"
         if isinstance(error, KeyboardInterrupt):
             raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}", record) from error
         raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}", record) from error

@@ -1,0 +1,174 @@
+"""Results, records and comparisons as HTML fragments for a notebook: no script, no file, no network.
+
+The tables and figures are those of the reports; colours follow the notebook's light or dark theme.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from gyrobench import notebook
+from gyrobench.record.record import Record
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import Cell, Column, Row, Table, text_cell
+from gyrobench.result import NO_VERDICT, Result, SuiteResult
+
+THEME = {  # colour of the report -> that of the notebook, if it has one
+    "ink": "var(--jp-content-font-color1, var(--vscode-editor-foreground, #1f2328))",
+    "muted": "var(--jp-content-font-color2, var(--vscode-descriptionForeground, #5b6168))",
+    "grid": "var(--jp-border-color1, #d5d9de)",
+    "shade": "var(--jp-layout-color2, #eef1f4)",
+    "page": "var(--jp-layout-color1, #ffffff)",
+    "blue": "#0072b2",
+    "vermilion": "#d55e00",
+    "green": "#009e73",
+    "purple": "#cc79a7",
+}
+MARKS = {"pass": ("✓ ", "#00805d"), "fail": ("✗ ", "#c04a00"), "inconclusive": ("? ", "#8a6800")}
+MAX_ROWS = 6  # of a record's windows
+MAX_CHANNELS = 4  # drawn
+
+
+def fragment(*blocks: str) -> str:
+    """Return blocks of HTML in a frame that defines the colours."""
+    colours = "".join(f"--{name}:{value};" for name, value in THEME.items())
+    style = f"{colours}color:var(--ink);max-width:60rem;font-variant-numeric:tabular-nums"
+    return f'<div class="gyrobench" style="{style}">{"".join(blocks)}</div>'
+
+
+def paragraph(text: str, strong: bool = False) -> str:
+    weight = "font-weight:600;" if strong else ""
+    return f'<p style="{weight}margin:.4em 0">{escape(text)}</p>'
+
+
+def warning_list(warnings: Sequence[str]) -> str:
+    """Return warnings as a list, "" where there are none."""
+    items = "".join(f"<li>⚠ {escape(w)}</li>" for w in warnings)
+    return f'<ul style="list-style:none;padding-left:0;margin:.4em 0">{items}</ul>' if items else ""
+
+
+def table_html(table: Table) -> str:
+    """Return a table of a report; numbers stand under each other at their decimal sign."""
+    border = "border-bottom:1px solid var(--grid);"
+    head = "".join(
+        f'<th style="{border}text-align:{"right" if c.number else "left"};padding:.2em .6em">{escape(c.head)}'
+        f"{f' / {escape(c.unit)}' if c.unit else ''}</th>"
+        for c in table.columns
+    )
+    rows = []
+    for row in table.rows:
+        if row.group:
+            group = f'<th colspan="{len(table.columns)}" style="text-align:left;font-weight:400;color:var(--muted)">'
+            rows.append(f"<tr>{group}{escape(row.group)}</th></tr>")
+        else:
+            cells = "".join(map(_cell, row.cells, table.columns))
+            rows.append(f"<tr>{cells}</tr>")
+    caption = f'<p style="font-size:.85em;color:var(--muted);margin:.3em 0 0">{escape(table.caption)}</p>'
+    body = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    return f'<div style="overflow-x:auto;margin:.5em 0">{body}{caption if table.caption else ""}</div>'
+
+
+def _cell(cell: Cell, column: Column) -> str:
+    if cell.number:
+        rest = f'<span style="display:inline-block;text-align:left;width:{column.width}ch">{escape(cell.rest)}</span>'
+        return f'<td style="text-align:right;white-space:nowrap;padding:.15em .6em">{escape(cell.whole)}{rest}</td>'
+    mark, colour = MARKS.get(cell.mark, ("", ""))
+    style = f"color:{colour};font-weight:600;" if mark else "font-weight:600;" if cell.mark == "strong" else ""
+    align = "right" if column.number else "left"
+    return f'<td style="{style}text-align:{align};padding:.15em .6em">{mark}{escape(cell.text)}</td>'
+
+
+def figure_html(svg: str) -> str:
+    """Return a figure of a report, "" where there is none."""
+    from gyrobench.report.style import themed
+
+    return f'<div style="margin:.6em 0">{themed(svg)}</div>' if svg else ""
+
+
+@notebook.html.register
+def result_html(result: Result) -> str:
+    """Return verdict, warnings, coefficients with u, interval and verdict, and the figure of the fit or the loop."""
+    from gyrobench.report.result_json import document
+    from gyrobench.report.result_page import coefficients
+
+    doc = document(result)
+    verdict = f"Verdict: {result.verdict}." if result.verdict != NO_VERDICT else f"{NO_VERDICT.capitalize()}."
+    head = [paragraph(result.title, strong=True), paragraph(" ".join([verdict, *result.summary[:1]]))]
+    methods = [paragraph(f"Methods: {result.suite.consistency}.")] if isinstance(result, SuiteResult) else []
+    tables = [table_html(t) for t in coefficients(doc)]
+    return fragment(*head, *methods, warning_list(result.warnings), *tables, figure_html(_main_figure(doc)))
+
+
+def _main_figure(doc: Mapping[str, Any]) -> str:
+    """Return the first loop or response, else the richest fit with its residuals, as SVG; "" where there is none."""
+    from gyrobench.report import plots, responses
+    from gyrobench.report.style import styled
+
+    key = f"nb{doc['report_id']}"  # unique in the notebook
+    with styled():
+        drawn = sorted(doc.get("responses") or [], key=lambda r: r["kind"] != "loop")
+        if drawn:
+            return responses.draw([("measured", drawn[0])], key, curves=drawn[0]["curves"])
+        curves = [s for s in doc["series"] if plots.is_curve(s)]
+        if not curves:
+            return ""
+        points = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
+        axis = points.most_common(1)[0][0]
+        alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
+        return plots.fit(alike[:2], key, alike, curves)
+
+
+@notebook.html.register
+def record_html(record: Record) -> str:
+    """Return the first windows, the range of each channel, and the first channels against time."""
+    from gyrobench.report import plots
+    from gyrobench.report.style import styled
+
+    run = record.run
+    origin = "measured" if run.measured else f"seed {run.seed}, step {run.step:g} s"
+    state = "" if record.complete else f" Not complete: {run.problem or 'the run did not end'}."
+    blocks = [paragraph(f"Record of {run.system}", strong=True), paragraph(f"{run.title}; {origin}.{state}")]
+    blocks += [table_html(t) for t in (_first_windows(record), _channel_ranges(record)) if t.rows]
+    if len(record.channels) > 1:
+        names = [n for n in record.channels if n != "time"][:MAX_CHANNELS]
+        key = f"nb{abs(hash((run.system, run.seed, tuple(run.tables.values()), id(record)))):x}"
+        with styled():
+            blocks.append(figure_html(plots.channels(record.channels, names, run.units, key)))
+    return fragment(*blocks)
+
+
+def _first_windows(record: Record) -> Table:
+    columns, units = record.table("windows")
+    count = len(next(iter(columns.values()), ()))
+    rows = [Row([_number(v[k].item()) for v in columns.values()]) for k in range(min(count, MAX_ROWS))]
+    caption = f"Windows 1 to {len(rows)} of {count}, SI."
+    return Table([Column(n, "" if units[n] == "1" else units[n]) for n in columns], rows, caption)
+
+
+def _channel_ranges(record: Record) -> Table:
+    columns, units = record.table("channels")
+    rows = [
+        Row([text_cell(name), text_cell(units[name]), *(_number(float(f())) for f in (v.min, v.mean, v.max))])
+        for name, v in columns.items()
+        if len(v) and name != "time"
+    ]
+    time: Any = columns.get("time", ())
+    span = f", t = {time[0]:.6g} to {time[-1]:.6g} s" if len(time) else ""
+    heads = ("channel", "unit", "smallest", "mean", "largest")
+    return Table([Column(h) for h in heads], rows, f"Channels, {len(time)} samples each{span}; SI.")
+
+
+def _number(value: float | int) -> Cell:
+    written = write_number(value, significant=6)
+    return Cell(written.text, written.whole, written.rest, written.full, number=True)
+
+
+def comparison_html(doc: dict[str, Any], note: str) -> str:
+    """Return what differs between runs in results: ranking, estimates, differences to the baseline."""
+    from gyrobench.report.comparison_page import side_tables
+
+    blocks = [paragraph("Comparison; the first run is the baseline", strong=True)]
+    return fragment(*blocks, warning_list([note] if note else []), *map(table_html, side_tables(doc)))
