@@ -19,10 +19,10 @@ def _unit(assembly: Assembly, output: str) -> str:
     connector = socket.connector(bound.element.split("[")[0])
     if connector is not None and connector.unit:
         return connector.unit
-    signals = {c.name for c in socket.connectors if c.causality == "input" and not c.unit}
+    signal = next((c.name for c in socket.connectors if c.causality == "input" and not c.unit), None)
     if connector is not None:
         for wire in assembly.connections:
-            if wire.target == slot and wire.input.element.split("[")[0] in signals:
+            if wire.target == slot and wire.input.element.split("[")[0] == signal:
                 source = assembly.bindings[wire.source].socket.connector(wire.output.element.split("[")[0])
                 return source.unit if source is not None and source.unit else wire.output.unit
     return bound.unit
