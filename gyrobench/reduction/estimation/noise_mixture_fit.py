@@ -1,8 +1,7 @@
 """Least squares whose noise - white, Gauss-Markov or both - is estimated from the same data, with honest intervals.
 
 Each candidate noise model (:func:`gyrobench.reduction.estimation.noise.cells`) gives a generalized least squares
-estimate, its
-covariance and a restricted likelihood (REML, the scale integrated out):
+estimate, its covariance and a restricted likelihood (REML, the scale integrated out):
 
     log L = -1/2 [ log|R| + log|X' R^-1 X| + (n - p) log(v' R^-1 v) ]
 
@@ -11,9 +10,8 @@ noise models that the data cannot tell apart goes into u.  A single "best" model
 regressors swallow a good part of the slow noise they are to be judged by.  Deterministic; no iteration.
 
 The prior is a population of instruments (constants of gyrobench.reduction.estimation.noise).  Given a candidate the
-estimate is
-a t of n - p degrees of freedom exactly (scale with the Jeffreys prior), so 95 % intervals hold the truth of 95 % of
-the instruments of that population, whatever the design; of one certain instrument they may hold it more or less
+estimate is a t of n - p degrees of freedom exactly (scale with the Jeffreys prior), so 95 % intervals hold the truth of
+95 % of the instruments of that population, whatever the design; of one certain instrument they may hold it more or less
 often.  tests/benchmarks/coverage.py counts, for every test method; its README has the figures.
 
 Standard uncertainty u: standard deviation of the mixture, or the 95 % half width over 1.96 where heavy tails make
@@ -25,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +34,7 @@ from gyrobench.reduction.estimation.regression import Design, RegressionError, c
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
+BLOCK = 1_000_000  # numbers that are whitened at a time
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -213,7 +213,7 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
         low, high = np.where(excess > 0.0, x, low), np.where(excess > 0.0, high, x)
         density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
         step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
-        new = np.where((step > low) & (step < high) & (k < 12), step, (low + high) / 2.0)
+        new = np.where((step >= low) & (step <= high) & (k < 12), step, (low + high) / 2.0)
         done = bool(np.all(np.abs(new - x) <= 1e-9 * high))
         x = new
         if done:
@@ -253,9 +253,11 @@ def _whitened(t0: Array, t1: Array, columns: Array, grid: noise.Cells, which: sl
 def _moments(t0: Array, t1: Array, columns: Array, grid: noise.Cells) -> tuple[Array, Array, Array, Array]:
     """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model; some at a time."""
     p, size = columns.shape[1] - 1, grid.tau.size // np.unique(grid.reading).size
+    many = size * max(1, BLOCK // (columns.size * size))
+    starts = [0, *range(size, grid.tau.size, many)]  # the first models have no reading errors, which is quicker
     parts = []
-    for start in range(0, grid.tau.size, size):
-        Z, logdet = _whitened(t0, t1, columns, grid, slice(start, start + size))
+    for start, end in pairwise([*starts, grid.tau.size]):
+        Z, logdet = _whitened(t0, t1, columns, grid, slice(start, end))
         zx, zy = Z[:, :, :p], Z[:, :, p]
         xy, yy = np.einsum("gnp,gn->gp", zx, zy), np.einsum("gn,gn->g", zy, zy)
         parts.append((zx.transpose(0, 2, 1) @ zx, xy, yy, logdet))
