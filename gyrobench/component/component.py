@@ -19,7 +19,7 @@ After the last one ``outputs`` is evaluated and all is checked to be finite but 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -49,7 +49,7 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.math import Dual, lift
 from gyrobench.component.numerics import normal, phi1
-from gyrobench.component.vectors import Vector
+from gyrobench.component.vectors import Vector, is_finite
 
 RESERVED = ("der", "noise", "instance")
 
@@ -100,12 +100,16 @@ class Component:
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in found.values() if isinstance(d, Noise)]
         cls._by_name = {s.name: s for s in cls.layout}
-        cls._watched = [s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory]
+        cls._inputs = _by_variable(s for s in cls.layout if s.section == "input")
+        cls._watched = _by_variable(
+            s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory
+        )
 
     _own: ClassVar[dict[str, Any]] = {}
     _functions: ClassVar[dict[str, Any]] = {}
     _by_name: ClassVar[dict[str, Scalar]] = {}
-    _watched: ClassVar[list[Scalar]] = []  # must be finite after each step
+    _inputs: ClassVar[dict[str, list[Scalar]]] = {}  # variable -> its elements; must be finite before each step
+    _watched: ClassVar[dict[str, list[Scalar]]] = {}  # and these after it
 
     def __init__(self, name: str = "", **parameters: Any) -> None:
         self.instance = name or type(self).__name__
@@ -262,7 +266,7 @@ class Component:
                 if wrong:
                     raise ComponentError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
         self._evaluate_start()
-        self._finite()
+        self._require_finite(self._watched, self.t)
         self._running = True
 
     def _evaluate_start(self) -> None:
@@ -287,11 +291,7 @@ class Component:
             raise ComponentError(f"{self.instance}: a step before initialization has succeeded")
         if not (math.isfinite(t) and math.isfinite(step) and step > 0.0):
             raise ComponentError(f"{self.instance}: a step must be positive and finite, not {step:g} s")
-        for s in self.layout:
-            if s.section == "input":
-                x = self._at(s)
-                if not math.isfinite(x):
-                    raise ComponentError(f"{self.instance}: input {s.name} is {x:g} at t = {t:.9g} s")
+        self._require_finite(self._inputs, t)
         largest = getattr(self, "step", step)
         n = max(1, math.ceil(step / largest - 1e-9))
         h = step / n
@@ -309,13 +309,15 @@ class Component:
                     self._guard(piece)
         self.outputs()
         self._dirty = False
-        self._finite()
+        self._require_finite(self._watched, self.t)
 
-    def _finite(self) -> None:
-        for s in self._watched:
-            x = self._at(s)
-            if not math.isfinite(x):
-                raise ComponentError(f"{self.instance}: {s.section} {s.name} is {x:g} at t = {self.t:.9g} s")
+    def _require_finite(self, watched: Mapping[str, list[Scalar]], t: float) -> None:
+        """Raise ComponentError naming the first scalar that is not finite."""
+        values = self.__dict__
+        for name, scalars in watched.items():
+            if not is_finite(values[name]):
+                s = next(s for s in scalars if not math.isfinite(self._at(s)))
+                raise ComponentError(f"{self.instance}: {s.section} {s.name} is {self._at(s):g} at t = {t:.9g} s")
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:
@@ -395,6 +397,13 @@ class Component:
             k4 = self._flow()
             sums = [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
             move(sums, dt / 6.0)
+
+
+def _by_variable(scalars: Iterable[Scalar]) -> dict[str, list[Scalar]]:
+    found: dict[str, list[Scalar]] = {}
+    for s in scalars:
+        found.setdefault(s.path[0], []).append(s)
+    return found
 
 
 def _dig(x: Any, path: tuple[Any, ...]) -> Any:

@@ -6,6 +6,7 @@ A matrix is a vector of rows.  Products are summed from left to right, first pro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -54,9 +55,15 @@ class Vector(list[Any]):
         """The transpose of a matrix."""
         return Vector([Vector(column) for column in zip(*self, strict=True)])
 
-    def __getitem__(self, k: Any) -> Any:
-        found = list.__getitem__(self, k)
-        return Vector(found) if isinstance(k, slice) else found
+    def __getitem__(self, k: Any, _get: Any = list.__getitem__) -> Any:  # bound here: it is called at every turn
+        return Vector(_get(self, k)) if type(k) is slice else _get(self, k)
+
+
+def is_finite(x: Any) -> bool:
+    """Say whether a number, or each element of an array, is finite."""
+    if not isinstance(x, list):
+        return math.isfinite(x)
+    return all(map(is_finite if x and isinstance(x[0], list) else math.isfinite, x))
 
 
 def copied(x: Any) -> Any:
