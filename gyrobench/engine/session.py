@@ -85,13 +85,15 @@ class Session:
                 raise InvalidValueError(f"isolate: no slot '{slot}'; slots: {', '.join(self.system.slots)}")
         self.notes: list[str] = []
         paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
-        self.swapped = sorted(parts or {})
+        self.swaps = {slot: Path(part).stem for slot, part in (parts or {}).items()}
+        self.swapped = sorted(self.swaps)
         self.said: set[str] = set()
         self.bench = bench
         self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
         self.notes += self.assembly.notes
         self.program = build_program(self.assembly)
+        self.gains = [c.gain for c in self.assembly.connections]
         self.base = defaults(self.assembly)
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
         self.engine = self._choose(engine)
@@ -168,6 +170,9 @@ class Session:
             raise InvalidConfigurationError(system.name, problems)
         errors = setup_errors(self.assembly, system, seed, self.base, parameters)
         self._warn(system, [f"simulated set-up error: {e.sentence()}" for e in errors])
+        self._warn(system, notes)
+        if [c.gain for c in self.assembly.connections] != self.gains:  # factors of wires follow the parts
+            self.program, self.gains = build_program(self.assembly), [c.gain for c in self.assembly.connections]
         linear = self._linear(system, parameters, notes) if system.loops else None
         document = self._document(system, seed, parameters, notes)
         if errors:
@@ -213,7 +218,8 @@ class Session:
         return self._finish(state, system, document, out, problem, keeper)
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
-        """Return the linear models for run.json; its warnings go to the log immediately, and into the notes."""
+        """Return the linear models for run.json; what they say against the run is told at once, and noted."""
+        from gyrobench.linear.frequency_response import missed_crossovers
         from gyrobench.linear.linear_model import LinearizationError, loops
         from gyrobench.packaging import load_part
 
@@ -225,6 +231,14 @@ class Session:
             return load_part(self.names[slot], self.bench)
 
         models, warnings = loops(self.assembly, parameters, part_of, system.step)
+        models.wanted = system.crossovers()
+        if models.missing:
+            asked = ", ".join(f"{loop} {f:.4g} Hz" for loop, f in models.wanted.items())
+            unknown = f"; whether the loop crosses where it was asked to ({asked}) is not known before the run"
+            warnings = [w + (unknown if asked else "") for w in warnings]
+        else:
+            causes = [*(f"part {self.swaps[s]} in {s}" for s in self.swapped), *system.given]
+            models.warnings = warnings = [*warnings, *missed_crossovers(models, models.wanted, causes)]
         self._warn(system, warnings)
         notes += warnings
         return models

@@ -149,6 +149,8 @@ class LinearModels(Entry):
     missing: str = Field(default="", description="why there is no linear model")
     closed: LinearPair = Field(default_factory=LinearPair, description="from the excitations to the channels")
     loops: dict[str, OpenLoop] = Field(default_factory=dict)
+    wanted: dict[str, float] = Field(default_factory=dict, description="loop -> crossover asked for, Hz")
+    warnings: list[str] = Field(default_factory=list, description="what the models say against the run, said before it")
 
 
 class DataFile(Entry):

@@ -12,7 +12,7 @@ from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError, flatten, nest, parse
-from gyrobench.system.wiring import Assembly
+from gyrobench.system.wiring import Assembly, follow_factors
 
 Starts = dict[str, list[tuple[Bound, Any]]]  # by slot, in the FMU's own units
 
@@ -87,6 +87,7 @@ def resolve(
     """What is set in each FMU, all parameters for run.json (SI, arrays nested), and notes.
 
     In rising order of rank: the FMU's start value, the seed of the slot, what the system derives, what the user set.
+    Factors of wires that follow the parts are set in the assembly.
     base: :func:`defaults` of the assembly.  Raises InvalidValueError.
     """
     chosen: dict[str, Any] = {}
@@ -111,6 +112,7 @@ def resolve(
     for name, value in system.overrides.items():
         overrides.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
     parts = PartValues(system, base, {**raw, **overrides})
+    follow_factors(assembly, system, parts)
     for name, value in system.flat_parameters(parts).items():
         where_known = name.endswith("?")
         name = name.rstrip("?")

@@ -99,7 +99,8 @@ class System(Configurable):
     slots: ClassVar[Mapping[str, Slot]] = {}
     wires: ClassVar[str] = ""
     open: ClassVar[tuple[str, ...]] = ()  # "slot.input" left at its start value on purpose: no note says so
-    factors: ClassVar[Mapping[str, float]] = {}  # of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too)
+    #: of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too), or a function of the parts that gives it
+    factors: ClassVar[Mapping[str, float | Callable[[PartValues], float]]] = {}
     raw: ClassVar[Mapping[str, Any]] = {}  # "slot.variable" -> start value in the FMU's own unit
     windows: ClassVar[Windows | None] = None
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
@@ -165,6 +166,10 @@ class System(Configurable):
         parts: the values that the parts in the slots have, ``parts["gyro.k"]``, for gains and plans that follow them.
         A scalar named "slot.parameter?" is set where the part has it, and not missed where it has not.
         """
+        return {}
+
+    def crossovers(self) -> dict[str, float]:
+        """Return the crossover (Hz) that the options ask for, by loop; the linear model is held against it."""
         return {}
 
     def check(self) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
 from gyrobench.system.execution_order import Link, Order, execution_order, feedthrough
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System
 
@@ -95,6 +96,19 @@ def _end(text: str) -> tuple[str, str]:
     return slot, name
 
 
+def _gain(factor: float, out: Bound, inp: Bound) -> float:
+    """Return the gain between the variables of a wire with this factor, SI to SI."""
+    return factor if out.gain == inp.gain else factor * out.gain / inp.gain
+
+
+def follow_factors(assembly: Assembly, system: System, parts: PartValues) -> None:
+    """Set the gains of the wires whose factor follows the parts."""
+    following = {wire: float(f(parts)) for wire, f in system.factors.items() if callable(f)}
+    for k, c in enumerate(assembly.connections):
+        if c.wire in following:
+            assembly.connections[k] = replace(c, gain=_gain(following[c.wire], c.output, c.input))
+
+
 def _elements(ports: Mapping[str, Bound], name: str) -> dict[str, Bound]:
     """Elements of a connector by their index text ("" for a scalar or a single element)."""
     if name in ports:
@@ -146,12 +160,13 @@ class _Layer:
         if known and not units.same_dimension(ua, ub):
             self.problems.append(f"{wire}: {ua} into {ub}: the dimensions differ, and the wire has no factor")
             return
-        factor = self.system.factors.get(wire, 1.0)  # may turn one quantity into another
+        given = self.system.factors.get(wire, 1.0)  # may turn one quantity into another
+        factor = 1.0 if callable(given) else given  # one that follows the parts comes with their values
         source = self.bindings[a].socket.connector(x.split("[")[0])
         whole = source is not None and source.whole
         for index, out in outputs.items():
             inp = inputs[index]
-            gain = factor if out.gain == inp.gain else factor * out.gain / inp.gain
+            gain = _gain(factor, out, inp)
             if inp.kind != "Real" and (gain != 1.0 or (out.kind == "Real" and not whole)):
                 self.problems.append(
                     f"{wire}: {out.kind} with factor {gain:g} into the {inp.kind} input {inp.variable}"

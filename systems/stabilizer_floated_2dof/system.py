@@ -9,15 +9,14 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.families.loop_test import STABILIZER, OneAxisTest, data_sheet, hold, noises, torquer
+from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.system import Option, Slot
 
 from .closed import Loop
 
-K_SG = 10.0  # V/rad, pickoffs
 RANGE = 0.1  # rad, of the pickoffs
-K_Y = 0.0832909904  # rad/s/A, torquer about y (17.180 deg/h/mA): it turns the platform about x
 CAGE = 12.0  # A/V, from u_y to the torquer about x: the second channel follows the case with about 10 1/s
 MOTORS = {  # 27 V make 2.7 N.m in both; the ideal one at once, without lag and back EMF
     "ideal": {"k_t": 1.0, "R": 10.0, "L": 0.0, "k_e": 0.0},
@@ -38,7 +37,7 @@ def loop_of(parameters: Mapping[str, Any]) -> Loop | None:
     return Loop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
 
 
-class StabilizerFloated2dof(System):
+class StabilizerFloated2dof(OneAxisTest):
     """The gyro's case is fixed to the platform and its rotor keeps its direction; the x pickoff gives the angle of the
     platform, a lag-lead network and a motor turn it back.  A current in the torquer about y precesses the rotor about
     x, and the platform follows.  The second channel, u_y, is caged by its own torquer.
@@ -50,34 +49,15 @@ class StabilizerFloated2dof(System):
 
     title = "Stabilizer with a floated two-degree-of-freedom gyro"
     spec = ("STAB-FLOATED-2DOF",)
-    slots = {
-        "exciter": Slot("Excitation", "exciter"),
-        "motion": Slot("Motion", "base_motion"),
-        "load": Slot("Load", "load_torque"),
-        "platform": Slot("PlatformAxis", "platform_single_axis"),
-        "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
-        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
-    }
-    wires = """
-        exciter.motion_angle -> motion.motion_angle
-        exciter.motion_rate -> motion.motion_rate
-        exciter.motion_acceleration -> motion.motion_acceleration
-        exciter.torque -> load.torque
+    slots = OneAxisTest.slots | {"gyro": Slot("TwoAxisGyro", "gyro_2dof"), **STABILIZER}
+    wires = OneAxisTest.wires + """
         exciter.command[1] -> gyro.i_y
-        exciter.test[1] -> stabilizer.test
-        motion.omega -> platform.omega_b
-        motion.alpha -> platform.alpha_b
-        motion.f -> platform.f_b
-        load.M[1] -> platform.M_load
-        platform.omega -> gyro.omega
-        platform.f -> gyro.f
         gyro.M_react[1] -> platform.M_gyro
         gyro.u_y -> gyro.i_x
         gyro.u_x -> stabilizer.u
-        stabilizer.v -> platform.v
-    """
-    factors = {"exciter.command[1] -> gyro.i_y": 1.0 / K_Y, "gyro.u_y -> gyro.i_x": CAGE}
-    loops = {"stabilizer": "stabilizer.u"}
+    """  # fmt: skip
+    #: the torquer about y turns the platform about x
+    factors = {"exciter.command[1] -> gyro.i_y": torquer("gyro.k_y", 10), "gyro.u_y -> gyro.i_x": CAGE}
     options = {
         "J_x": Option(0.5, "kg.m2", "inertia of the platform"),
         "stiffness": Option(8250.0, "N.m/rad", "K_m K_x: motor with amplifier, times pickoff"),
@@ -92,21 +72,16 @@ class StabilizerFloated2dof(System):
         "command": Option(5e-3, "rad/s", "rate commanded by the torquer of the gyro"),
         "base": Option("1deg", "rad", "amplitude of the base up to 1 Hz", 0.0),
         "test": Option(1e-3, "V", "amplitude of the test sines from 15 Hz on; below it grows, as the loop leaves less"),
-        "hold": Option(30.0, "s", "length of the drift hold", 1.0),
+        **hold(30.0),
         "blow": Option(0.0, "N.m", "torque of a last, large disturbance; 0: none"),
         "blow_time": Option(0.1, "s", "how long it acts", 1e-3),
     }
-    noises = tuple(f"gyro.{n}_{c}" for n in ("turn_on", "markov", "white", "pickoff") for c in "xy")
+    noises = noises(channels=("_x", "_y"))
     step = 1e-4
     channel_period = 1e-3
-    done = "exciter.done"
-    channels = (
-        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "exciter.test[1]",
-        "exciter.motion_angle[1]", "platform.attitude", "platform.omega[1]", "platform.saturated",
-        "gyro.saturated", "stabilizer.e",
-    )  # fmt: skip
+    channels = (*OneAxisTest.channels, "platform.saturated", "gyro.saturated", "stabilizer.e")
 
-    def plan(self) -> LoopPlan:
+    def phases(self) -> list[LoopPhase]:
         settle = 3.0  # s: the slowest pole of the default loop, -4.96 1/s, leaves exp(-7) in the second half
         phases = [
             LoopPhase("load step", "torque", "step", 1, self["load"], settle=1.0, dwell=3.0),
@@ -120,36 +95,36 @@ class StabilizerFloated2dof(System):
                 LoopPhase("blow", "torque", "step", 1, self["blow"], settle=0.5, dwell=self["blow_time"]),
                 LoopPhase("after the blow", dwell=3.0),
             ]
-        return LoopPlan(phases)
+        return phases
 
-    def parameters(self, parts: PartValues) -> dict[str, Any]:
-        motor = MOTORS.get(self["motor"], MOTORS["ideal"])
-        amplifier = self["stiffness"] / (K_SG * motor["k_t"] / motor["R"])  # counts to K_m
+    def design(self, parts: PartValues) -> dict[str, Any]:
+        motor = parts.all_given({f"platform.{n}": v for n, v in self.motor().items()})
+        pickoff = parts["gyro.K_sg_x"]
+        torque = motor["platform.k_t"] / motor["platform.R"] * parts["platform.ratio"]  # N.m/V
         return {
-            **self.plan().parameters(),
             "platform.J": self["J_x"],
             "platform.viscous?": self["viscous"],
-            **{f"platform.{n}?": v for n, v in motor.items()},
+            **{f"{n}?": v for n, v in motor.items()},
             "platform.v_max?": V_MAX,
             "platform.i_max?": I_MAX,
-            "gyro.K_sg_x": K_SG,
-            "gyro.K_sg_y": K_SG,
-            "gyro.u_max": RANGE * K_SG,
-            "gyro.k_y": K_Y,
-            "stabilizer.K": self["K_G"] * amplifier,
+            "gyro.u_max": RANGE * pickoff,
+            "gyro.k_y": data_sheet(parts["gyro.k_y"], 10),
+            "stabilizer.K": self["K_G"] * (self["stiffness"] / (pickoff * torque)),  # the amplifier counts to K_m
             **{f"stabilizer.{n}?": self[n] for n in TIMES},
             "stabilizer.v_max?": V_MAX,
         }
 
+    def motor(self) -> dict[str, float]:
+        return MOTORS.get(self["motor"], MOTORS["ideal"])
+
+    def crossovers(self) -> dict[str, float]:
+        """That of the closed form, where its loop is stable."""
+        loop = Loop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
+        return {"stabilizer": loop.margin()[0] / (2.0 * math.pi)} if loop.stable() else {}
+
     def check(self) -> list[str]:
         """Refusals of values; an unstable loop is let run, warned with its pole."""
-        problems = [
-            f"{n} = {self[n]:g} {self.options[n].unit}: must be > 0"
-            for n in ("J_x", "stiffness", "K_G", "T1", "T2")
-            if not self[n] > 0.0
-        ]
-        if self["motor"] not in MOTORS:
-            problems.append(f"motor = {self['motor']}: must be one of {', '.join(MOTORS)}")
+        problems = self.not_positive("J_x", "stiffness", "K_G", "T1", "T2") + self.no_choice(motor=MOTORS)
         most = V_MAX * MOTORS["ideal"]["k_t"] / MOTORS["ideal"]["R"]
         if abs(self["load"]) >= most:
             problems.append(

@@ -8,19 +8,19 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.families.loop_test import STABILIZER, OneAxisTest, data_sheet, torquer
+from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.system import Option, Slot
 
 from .closed import Axis
 
 KINDS = ("integrating", "rate-integrating", "rate")
-TORQUER = 0.083387953  # rad/s/A, scale factor of floated_gyro (17.2 deg/h/mA)
 LIGHT = 0.3  # damping up to which 5-34 may be taken
 SWEEP = (0.05, 0.1, 0.2, 0.5, 1.0)  # Hz
 
 
-class StabilizerSdf(System):
+class StabilizerSdf(OneAxisTest):
     """The gyro itself resists a torque about the axis: its float yields by b, and H b' holds the axis.  Without spring
     and damper the axis leans like a spring H2/J, with a damper it creeps by M C/H2, with a spring it feels like an
     inertia J0 + H2/K.
@@ -30,35 +30,14 @@ class StabilizerSdf(System):
 
     title = "Stabilizer with a gyro of one degree of freedom"
     spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
-    slots = {
-        "exciter": Slot("Excitation", "exciter"),
-        "motion": Slot("Motion", "base_motion"),
-        "load": Slot("Load", "load_torque"),
-        "platform": Slot("PlatformAxis", "platform_single_axis"),
-        "gyro": Slot("SdfGyro", "floated_gyro"),
-        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
-    }
-    wires = """
-        exciter.motion_angle -> motion.motion_angle
-        exciter.motion_rate -> motion.motion_rate
-        exciter.motion_acceleration -> motion.motion_acceleration
-        exciter.torque -> load.torque
-        exciter.test[1] -> stabilizer.test
+    slots = OneAxisTest.slots | {"gyro": Slot("SdfGyro", "floated_gyro"), **STABILIZER}
+    wires = OneAxisTest.wires + """
         exciter.command[1] -> gyro.i
-        motion.omega -> platform.omega_b
-        motion.alpha -> platform.alpha_b
-        motion.f -> platform.f_b
-        load.M[1] -> platform.M_load
-        platform.omega -> gyro.omega
         platform.alpha -> gyro.alpha
-        platform.f -> gyro.f
-        gyro.h_I -> platform.h_gyro
-        gyro.M_I -> platform.M_gyro
+        gyro -> platform: h_I=h_gyro M_I=M_gyro
         gyro.u -> stabilizer.u
-        stabilizer.v -> platform.v
-    """
-    factors = {"exciter.command[1] -> gyro.i": 1.0 / TORQUER}
-    loops = {"stabilizer": "stabilizer.u"}
+    """  # fmt: skip
+    factors = {"exciter.command[1] -> gyro.i": torquer("gyro.k", 9)}
     options = {
         "kind": Option("rate-integrating", str, f"kind of gyro: {', '.join(KINDS)}"),
         "M": Option(10.0, "N.m", "disturbance torque"),
@@ -74,12 +53,8 @@ class StabilizerSdf(System):
         "offload": Option(0.0, "N.m/rad", "torque of the motor for the float angle; 0: no motor"),
         "viscous": Option(0.0, "N.m.s/rad", "viscous friction of the axis against the base"),
     }
-    done = "exciter.done"
     step = 1e-3
-    channels = (
-        "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "exciter.test[1]",
-        "exciter.motion_angle[1]", "platform.attitude", "platform.omega[1]", "gyro.b", "stabilizer.e",
-    )  # fmt: skip
+    channels = (*OneAxisTest.channels, "gyro.b", "stabilizer.e")
     channel_period = 1e-2
 
     def axis(self) -> Axis:
@@ -89,7 +64,7 @@ class StabilizerSdf(System):
         k = self["K"] if kind == "rate" else 0.0
         return Axis(self["J0"], self["J"], self["H"], c, k, self["M"])
 
-    def plan(self) -> LoopPlan:
+    def phases(self) -> list[LoopPhase]:
         """Torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
         phases = [
             LoopPhase("load", "torque", "step", amplitude=self["M"], settle=0.1, dwell=self["time"]),
@@ -102,13 +77,12 @@ class StabilizerSdf(System):
             phases += sweep("base", "motion", SWEEP, 0.02, periods=4)
         if self["offload"] > 0.0:
             phases += sweep("loop", "test", SWEEP, 1e-3, periods=4)
-        return LoopPlan(phases)
+        return phases
 
-    def parameters(self, parts: PartValues) -> dict[str, Any]:
+    def design(self, parts: PartValues) -> dict[str, Any]:
         p = self.axis()
         drifts = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "markov", "white", "pickoff")
         return {
-            **self.plan().parameters(),
             "platform.J": p.J0,
             "platform.viscous": self["viscous"],
             **{f"platform.{k}?": v for k, v in {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0, "v_max": 1e9}.items()},
@@ -120,7 +94,7 @@ class StabilizerSdf(System):
             "gyro.K": p.K,
             "gyro.stop": self["float_stop"],
             "gyro.reaction": True,
-            "gyro.k": TORQUER,
+            "gyro.k": data_sheet(parts["gyro.k"]),
             "gyro.K_sg": 1.0,
             "gyro.u_max": 1e3,
             "gyro.step?": 1.0,
@@ -132,12 +106,9 @@ class StabilizerSdf(System):
         }
 
     def check(self) -> list[str]:
-        problems = []
-        if self["kind"] not in KINDS:
-            return [f"kind = {self['kind']}: must be one of {', '.join(KINDS)}"]
-        for name in ("J0", "J", "H", "M", "time", "float_stop"):
-            if not self[name] > 0.0:
-                problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be > 0")
+        if problems := self.no_choice(kind=KINDS):
+            return problems
+        problems = self.not_positive("J0", "J", "H", "M", "time", "float_stop")
         for name in ("C", "K", "offload", "viscous"):
             if not self[name] >= 0.0:
                 problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be >= 0")

@@ -6,21 +6,22 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.families.loop_test import FLOWN, LoopTest
+from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.plan import LIMIT
+from gyrobench.system.system import Option, Slot
 
 DEG = math.pi / 180.0
-G0 = 9.80665
 PHASES = ("erection", "rest", "acceleration", "turn", "loop", "roll")
 LAWS = ("switches", "linear")
-LIMIT = 99  # phases of a plan
 PITCH_RATE, ROLL_RATE = 36.0 * DEG, 60.0 * DEG  # of the loop and the roll
 
 
-class VerticalGyroBench(System):
+class VerticalGyroBench(LoopTest):
     """A vertical gyro is erected from a tilt, rests, and then flies an acceleration, a turn, a loop and a roll; what it
     shows is compared with the vehicle's true pitch and roll.
 
@@ -35,18 +36,14 @@ class VerticalGyroBench(System):
         "gyro": Slot("VerticalGyro", "vertical_gyro"),
         "erection": Slot("ErectionController", "erection_controller"),
     }
-    wires = """
-        exciter.phase -> motion.phase
-        exciter.gate -> motion.gate
-        motion.omega -> gyro.omega
-        motion.f -> gyro.f
-        gyro.e_x -> erection.e_x
-        gyro.e_y -> erection.e_y
-        gyro.f_inner -> erection.f_inner
-        gyro.turn -> erection.turn
-        erection.T_x -> gyro.T_x
-        erection.T_y -> gyro.T_y
+    wires = (
+        FLOWN
+        + """
+        motion -> gyro: omega f
+        gyro -> erection: e_x e_y f_inner turn
+        erection -> gyro: T_x T_y
     """
+    )
     options = {
         "phases": Option(" ".join(PHASES), str, f"what is flown, of: {' '.join(PHASES)}"),
         "tilt": Option("2deg", "rad", "tilt of the rotor at the start, about x", 0.0),
@@ -65,7 +62,6 @@ class VerticalGyroBench(System):
         "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0),
     }
     noises = ("gyro.white", "gyro.white_y")
-    done = "exciter.done"
     step = 1e-2
     channels = (
         "exciter.phase", "exciter.gate", "motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll",
@@ -76,18 +72,16 @@ class VerticalGyroBench(System):
     def flown(self) -> list[str]:
         return [str(p) for p in self["phases"].replace(",", " ").split()]
 
-    def plan(self) -> LoopPlan:
+    def phases(self) -> list[LoopPhase]:
         """The phases asked for; before each manoeuvre the vehicle rests for as long (the erection needs no wait)."""
         wait = self["time"]
         lengths = {"loop": 2.0 * math.pi / PITCH_RATE, "roll": 2.0 * math.pi / ROLL_RATE}
-        return LoopPlan(
-            [
-                LoopPhase(p, settle=0.0 if p in ("erection", "rest") else wait, dwell=lengths.get(p, wait))
-                for p in self.flown()
-            ]
-        )
+        return [
+            LoopPhase(p, settle=0.0 if p in ("erection", "rest") else wait, dwell=lengths.get(p, wait))
+            for p in self.flown()
+        ]
 
-    def parameters(self, parts: PartValues) -> dict[str, Any]:
+    def design(self, parts: PartValues) -> dict[str, Any]:
         table: dict[str, list[float]] = {n: [0.0] * LIMIT for n in ("forward", "turn", "pitch", "roll")}
         rows = {
             "acceleration": ("forward", self["acceleration"]),
@@ -100,13 +94,13 @@ class VerticalGyroBench(System):
                 name, value = rows[p]
                 table[name][k] = value
         return {
-            **self.plan().parameters(),
             **{f"motion.{n}": x for n, x in table.items()},
             "motion.speed": self["speed"],
             "motion.latitude": self["latitude"],
             "motion.earth_rate": self["earth_rate"],
             "gyro.tilt": [self["tilt"], 0.0],
             "gyro.ring": self["ring"],
+            "erection.H?": parts["gyro.H"],
             "erection.law": LAWS.index(self["law"]) if self["law"] in LAWS else 0,
             "erection.rate": self["rate"],
             "erection.dead_zone": self["dead_zone"],
@@ -117,11 +111,7 @@ class VerticalGyroBench(System):
 
     def check(self) -> list[str]:
         problems = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.flown() if p not in PHASES]
-        if self["law"] not in LAWS:
-            problems.append(f"law = {self['law']}: must be {' or '.join(LAWS)}")
-        for name in ("rate", "gain", "time"):
-            if not self[name] > 0.0:
-                problems.append(f"{name} = {self[name]:g} {self.options[name].unit}: must be > 0")
+        problems += self.no_choice(law=LAWS) + self.not_positive("rate", "gain", "time")
         if self["tilt"] > 60.0 * DEG and self["fast_time"] == 0.0:
             problems.append(
                 f"tilt = {self['tilt'] / DEG:.3g}°: beyond 60° the switches are of no use; give a fast start, fast_time"

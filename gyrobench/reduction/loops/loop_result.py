@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.linear.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
@@ -135,12 +136,12 @@ class LoopFindings:
             model = models.of(kind)
             if model is None:
                 continue
-            dense = m.model_response(model, span)[:, 0, 0]
+            dense = model_response(model, span)[:, 0, 0]
             found = m.margins(span, dense)
             rows.append(found.row(label))
             curves.append(_curve(label, span, dense))
             if found.crossover is not None:
-                self._agreement(points, m.model_response(model, at)[:, 0, 0], found, (label, title), up_to)
+                self._agreement(points, model_response(model, at)[:, 0, 0], found, (label, title), up_to)
             if kind == "discrete":
                 self._conditional(title, found)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
@@ -154,7 +155,13 @@ class LoopFindings:
             closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
             self.measure(f"f_c{key}", "crossover frequency", "Hz", *values["crossover"], closed=closest[1])
             self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
+            self._missed(title, *values["crossover"], self.linear.wanted.get(loop) if self.linear.missing else None)
         return points
+
+    def _missed(self, title: str, crossover: float, u: float, wanted: float | None) -> None:
+        """Warn of a crossover that is not the one asked for, where no linear model said so before the run."""
+        if wanted is not None and abs(crossover - wanted) > TOLERANCE * wanted + uncertainty.NORMAL * u:
+            self.warnings.append(f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for.")
 
     def _agreement(
         self, points: Sequence[Point], model: Any, found: m.Margins, names: tuple[str, str], up_to: float
@@ -329,7 +336,7 @@ class LoopFindings:
             ranked_by=ranked_by,
             responses=self.responses,
         )
-        result.warnings += [n for n in run.notes if "unstable" in n or "linear model" in n]
+        result.warnings += self.linear.warnings
         return run_metadata.finish(result, self.record)
 
 

@@ -1,9 +1,8 @@
 """Frequency responses and stability margins, of linear models and of measured points alike.
 
-A model is what gyrobench.linear.linear_model writes into run.json: A, B, C, D with the names of inputs and outputs
-and a step
-(s; 0: continuous).  Margins come from python-control on a dense frequency response, for both kinds of model and for
-points interpolated between measured frequencies: what is compared is found in one way.
+A model is what gyrobench.linear.linear_model writes into run.json.  Margins come from python-control on a dense
+frequency response, for models and for points interpolated between measured frequencies: what is compared is found in
+one way.
 """
 
 from __future__ import annotations
@@ -16,24 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.linear.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Point
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DENSE = 2000  # points of a response on which margins are looked for
-
-
-def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
-    """Frequency response of a model: array (frequency, output, input)."""
-    a, b, c, d = (np.asarray(m, float) for m in (model.A, model.B, model.C, model.D))
-    n = len(model.states)
-    a, b, c = a.reshape(n, n), b.reshape(n, len(model.inputs)), c.reshape(len(model.outputs), n)
-    d = d.reshape(len(model.outputs), len(model.inputs))
-    s = 2j * np.pi * np.asarray(f, float)
-    s = np.exp(s * model.step) if model.step else s
-    solved = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
-    return np.asarray(c @ solved + d)
 
 
 def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:

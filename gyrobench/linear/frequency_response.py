@@ -1,0 +1,70 @@
+"""Frequency responses of linear models, and where their loops cross: before the run against what was asked for.
+
+A model is what gyrobench.linear.linear_model writes into run.json: A, B, C, D with the names of inputs and outputs and
+a step (s; 0: continuous).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.record.run_document import LinearModel, LinearModels
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+POINTS = 2000  # of a response in which crossovers are looked for
+SPAN = 100.0  # they are looked for up to this factor from the crossover asked for
+TOLERANCE = 0.05  # relative, of a crossover
+
+
+def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
+    """Frequency response of a model: array (frequency, output, input)."""
+    a, b, c, d = (np.asarray(m, float) for m in (model.A, model.B, model.C, model.D))
+    n = len(model.states)
+    a, b, c = a.reshape(n, n), b.reshape(n, len(model.inputs)), c.reshape(len(model.outputs), n)
+    d = d.reshape(len(model.outputs), len(model.inputs))
+    s = 2j * np.pi * np.asarray(f, float)
+    s = np.exp(s * model.step) if model.step else s
+    solved = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
+    return np.asarray(c @ solved + d)
+
+
+def crossovers(model: LinearModel, wanted: float) -> list[tuple[float, float]]:
+    """Return where a loop falls through 1: (Hz, phase margin in degrees), up to :data:`SPAN` from ``wanted`` Hz."""
+    top = min(SPAN * wanted, 0.499 / model.step) if model.step else SPAN * wanted
+    f = np.geomspace(wanted / SPAN, top, POINTS)
+    response = model_response(model, f)[:, 0, 0]
+    size, turn = np.log(np.abs(response)), np.degrees(np.unwrap(np.angle(response)))
+    found = []
+    for k in np.flatnonzero((size[:-1] > 0.0) & (size[1:] <= 0.0)):
+        share = size[k] / (size[k] - size[k + 1])
+        phase = turn[k] + share * (turn[k + 1] - turn[k])
+        found.append((float(f[k] * (f[k + 1] / f[k]) ** share), float((phase + 360.0) % 360.0 - 180.0)))
+    return found
+
+
+def missed_crossovers(models: LinearModels, wanted: Mapping[str, float], causes: Sequence[str]) -> list[str]:
+    """Return a sentence for each loop that will not cross where it was asked to.
+
+    wanted: loop -> Hz.  causes: what was set or swapped, for the reader to look at.
+    """
+    because = f"; set or swapped: {', '.join(causes)}" if causes else ""
+    found = []
+    for name, f in wanted.items():
+        model = models.loops[name].discrete if name in models.loops else None
+        if model is None:
+            continue
+        there = crossovers(model, f)
+        if not there:
+            found.append(f"loop {name}: asked to cross at {f:.4g} Hz, its gain does not fall through 1{because}")
+            continue
+        at, margin = min(there, key=lambda c: abs(np.log(c[0] / f)))
+        if abs(at / f - 1.0) > TOLERANCE:
+            found.append(
+                f"loop {name}: it will cross at {at:.3g} Hz with a phase margin of {margin:.0f}°, not at the "
+                f"{f:.4g} Hz asked for{because}"
+            )
+    return found
