@@ -219,7 +219,7 @@ class Session:
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
         """Return the linear models for run.json; what they say against the run is told at once, and noted."""
-        from gyrobench.linear.frequency_response import missed_crossovers
+        from gyrobench.linear.crossovers import missed_crossovers
         from gyrobench.linear.linear_model import LinearizationError, loops
         from gyrobench.packaging import load_part
 

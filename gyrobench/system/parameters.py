@@ -123,7 +123,8 @@ def resolve(
         if bound is not None:
             chosen[name] = _si(name, value, bound)
         elif not where_known:
-            notes.append(f"{slot} has no parameter '{parameter}' (set by {system.name}); it stays as it is")
+            text = f"{slot} has no parameter '{parameter.partition('[')[0]}' (set by {system.name}); it stays as it is"
+            notes += [] if text in notes else [text]
     notes += parts.notes
     chosen.update(overrides)
     starts: Starts = {slot: [] for slot in assembly.bindings}

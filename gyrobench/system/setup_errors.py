@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from gyrobench import units
@@ -31,7 +32,8 @@ def setup_errors(
     told = system.with_values({})
     for name in past:
         del told.overrides[name]
-    assumed = resolve(assembly, told, seed, base)[1]
+    apart = replace(assembly, connections=list(assembly.connections))  # factors of wires stay those of the run
+    assumed = resolve(apart, told, seed, base)[1]
     errors = []
     for name, option in owners.items():
         if _base(name) not in parameters:

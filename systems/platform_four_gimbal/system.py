@@ -7,8 +7,8 @@ from typing import Any
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
-from gyrobench.system.families.loop_test import TwoGyroTest, three
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.families.loop_test import AXES, TwoGyroTest, three
+from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
@@ -28,7 +28,10 @@ class PlatformFourGimbal(TwoGyroTest):
     title = "Four-gimbal platform"
     spec = ("PLATFORM-4GIMBAL", "PLATFORM-3GIMBAL-2DOF")
     tones = (2.5, 5.0, 7.0, 10.0, 14.0)  # Hz
-    slots = TwoGyroTest.slots | {"platform": Slot("FourGimbalPlatform", "platform_four_gimbal")}
+    slots = TwoGyroTest.with_parts(
+        motion="manoeuvre", load="load_torque", gyro_a="gyro_2dof", gyro_b="gyro_2dof",
+        decoupler="decoupler_t2", **dict.fromkeys(AXES, "stabilizer_lead_lag"),
+    ) | {"platform": Slot("FourGimbalPlatform", "platform_four_gimbal")}  # fmt: skip
     open = ("gyro_a.i_x", "gyro_a.i_y", "gyro_b.i_x", "gyro_b.i_y")  # left at their start values
     options = TwoGyroTest.options | {
         "flight": Option("crossing", str, f"what is flown: {', '.join(FLIGHTS)}"),
@@ -53,10 +56,10 @@ class PlatformFourGimbal(TwoGyroTest):
         """Steps and sweeps, with a load, and the hold; only the hold before a flight that begins out of the null."""
         return [*(self.steps() if self["load"] != 0.0 and not self.flown().inner else []), self.drift()]
 
-    def plan(self) -> LoopPlan:
+    def phases(self) -> list[LoopPhase]:
         """The flight comes last, but where it begins out of the null, which would not wait."""
         legs = flight_plan.phases(self.flown().legs)
-        return LoopPlan([*legs, *self.at_rest()] if self.flown().inner else [*self.at_rest(), *legs])
+        return [*legs, *self.at_rest()] if self.flown().inner else [*self.at_rest(), *legs]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         flown = self.flown()

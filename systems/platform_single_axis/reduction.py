@@ -10,7 +10,6 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import Value, rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
-from gyrobench.reduction.run_metadata import number
 from gyrobench.result import LoopResult, Specification
 
 MRAD = 1e-3
@@ -72,9 +71,10 @@ def _ride(found: LoopFindings) -> list[str]:
     meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
-    k = number(found.record.run, "k", "gyro.k")
+    p = found.record.run.parameters
+    k = p.get("gyro.k") or (1.0 / p["stabilizer.K_u"] if p.get("stabilizer.K_u") else None)  # or what the design took
     if k is not None:
-        _estimator(found, ride, k)
+        _estimator(found, ride, float(k))
     base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
     return [
         f"A base that {base} leaves {error.value / ARCSEC:.3g}″ "

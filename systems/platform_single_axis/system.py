@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import PROFILE, STABILIZER, OneAxisTest, data_sheet, noises
+from gyrobench.system.families.loop_test import PROFILE, OneAxisTest, data_sheet, noises
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -26,11 +26,11 @@ class PlatformSingleAxisLoop(OneAxisTest):
 
     title = "Stabilized platform on one axis, estimator in the loop"
     spec = ("PLATFORM-1AXIS", "GYRO-REBALANCE", "EST-KF-GEN")
-    slots = OneAxisTest.slots | {
+    slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "rebalance": Slot("Rebalance", "rebalance_analog"),
         "estimator": Slot("Estimator", "estimator_none"),
-        **STABILIZER,
+        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
     }
     wires = OneAxisTest.wires + """
         exciter.command[1] -> stabilizer.command

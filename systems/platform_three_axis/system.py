@@ -53,11 +53,11 @@ class PlatformThreeAxis(ThreeAxisTest):
 
     title = "Three-axis stabilized platform"
     spec = ("PLATFORM-3AXIS-DYN", "PLATFORM-3AXIS-KIN", "DECOUPLE-T2", "DECOUPLE-BENCH-83MIL", "GYRO-OA-COUPLING-Y2")
-    slots = LoopTest.slots | {
+    slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "platform": Slot("Platform", "platform_three_axis"),
         **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in GYROS},
         "decoupler": Slot("Decoupler", "decoupler_t2"),
-        **ThreeAxisTest.stabilizers,
+        **{axis: Slot("Stabilizer", "stabilizer_lead_lag") for axis in AXES},
     }
     wires = MOVED + ThreeAxisTest.wires + "\n".join(COMMANDS) + "".join(
         f"""

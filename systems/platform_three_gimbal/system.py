@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
-from gyrobench.system.families.loop_test import TwoGyroTest, three, torquer
+from gyrobench.system.families.loop_test import AXES, TwoGyroTest, three, torquer
 from gyrobench.system.flight_plan import Leg
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option
 
@@ -39,6 +39,10 @@ class PlatformThreeGimbal(TwoGyroTest):
     title = "Three-gimbal platform with two gyros"
     spec = ("PLATFORM-3GIMBAL-2DOF", "RESOLVER-AZ", "DECOUPLE-T2")
     tones = (1.5, 2.5, 4.0, 5.5, 7.0, 9.0, 13.0, 18.0)  # Hz
+    slots = TwoGyroTest.with_parts(
+        motion="manoeuvre", load="load_torque", platform="platform_three_gimbal_2dof", gyro_a="gyro_2dof",
+        gyro_b="gyro_2dof", decoupler="decoupler_t2", **dict.fromkeys(AXES, "stabilizer_lead_lag"),
+    )  # fmt: skip
     wires = TwoGyroTest.wires + "\n".join(COMMANDS)
     factors = COMMANDS
     options = TwoGyroTest.options | {
@@ -77,10 +81,13 @@ class PlatformThreeGimbal(TwoGyroTest):
                 found.append(Leg(label, time, rest=rest, **{name: angle / time}))
         return found
 
-    def plan(self) -> LoopPlan:
-        """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
+    def at_rest(self) -> list[LoopPhase]:
         command = LoopPhase("command", "command", "step", 3, self["command"], settle=2 * self.wait, dwell=1.0)
-        return LoopPlan([*flight_plan.phases(self.legs()), *self.steps(), command, self.drift()])
+        return [*self.steps(), command, self.drift()]
+
+    def phases(self) -> list[LoopPhase]:
+        """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
+        return [*flight_plan.phases(self.legs()), *self.at_rest()]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         found = super().design(parts) | flight_plan.parameters(self.legs())

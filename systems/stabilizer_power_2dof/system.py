@@ -31,7 +31,7 @@ class StabilizerPower2dof(LoopTest):
 
     title = "Power gyro stabilizer with a two-degree-of-freedom gyro"
     spec = ("STAB-POWER-2DOF",)
-    slots = LoopTest.slots | {
+    slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "stabilizer": Slot("Stabilizer", "stabilizer_power"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
     }

@@ -36,14 +36,12 @@ class VerticalGyroBench(LoopTest):
         "gyro": Slot("VerticalGyro", "vertical_gyro"),
         "erection": Slot("ErectionController", "erection_controller"),
     }
-    wires = (
-        FLOWN
-        + """
+    wires = f"""
+        {FLOWN}
         motion -> gyro: omega f
         gyro -> erection: e_x e_y f_inner turn
         erection -> gyro: T_x T_y
     """
-    )
     options = {
         "phases": Option(" ".join(PHASES), str, f"what is flown, of: {' '.join(PHASES)}"),
         "tilt": Option("2deg", "rad", "tilt of the rotor at the start, about x", 0.0),

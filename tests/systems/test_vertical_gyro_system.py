@@ -120,7 +120,7 @@ def test_lock_without_ring_ends_the_run(session):
     "values, message",
     [
         ({"phases": "erection dive"}, "phases: 'dive' is none of erection, rest"),
-        ({"law": "on-off"}, "law = on-off: must be switches or linear"),
+        ({"law": "on-off"}, "law = on-off: must be one of switches, linear"),
         ({"rate": 0.0}, "rate = 0 rad/s: must be > 0"),
         ({"tilt": "70deg"}, "tilt = 70°: beyond 60° the switches are of no use; give a fast start"),
         ({"ring": 0}, "ring = 0: without the follow-up ring the gimbals lock in the loop"),
@@ -131,6 +131,8 @@ def test_refuses(values, message):
         load_system(NAME).with_values(values).refuse()
 
 
-def test_gyro_and_erection_must_agree_on_H(session):
+def test_erection_follows_the_gyro_and_must_agree_with_it_on_H(session):
+    record = session.run({"gyro.H": 0.7, "phases": "rest", "time": 1.0}, seed=1)
+    assert record.run.parameters["erection.H"] == 0.7
     with pytest.raises(InvalidConfigurationError, match=r"gyro.H = 0.7 and erection.H = 0.5 N.m.s"):
-        session.run({"gyro.H": 0.7}, seed=1)
+        session.run({"gyro.H": 0.7, "erection.H": 0.5}, seed=1)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.linear.frequency_response import model_response
+from gyrobench.record.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Point
 

@@ -1,35 +1,16 @@
-"""Frequency responses of linear models, and where their loops cross: before the run against what was asked for.
-
-A model is what gyrobench.linear.linear_model writes into run.json: A, B, C, D with the names of inputs and outputs and
-a step (s; 0: continuous).
-"""
+"""Where the loops of a linear model cross, before the run, against where they were asked to."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.run_document import LinearModel, LinearModels
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 POINTS = 2000  # of a response in which crossovers are looked for
 SPAN = 100.0  # they are looked for up to this factor from the crossover asked for
-TOLERANCE = 0.05  # relative, of a crossover
-
-
-def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
-    """Frequency response of a model: array (frequency, output, input)."""
-    a, b, c, d = (np.asarray(m, float) for m in (model.A, model.B, model.C, model.D))
-    n = len(model.states)
-    a, b, c = a.reshape(n, n), b.reshape(n, len(model.inputs)), c.reshape(len(model.outputs), n)
-    d = d.reshape(len(model.outputs), len(model.inputs))
-    s = 2j * np.pi * np.asarray(f, float)
-    s = np.exp(s * model.step) if model.step else s
-    solved = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
-    return np.asarray(c @ solved + d)
 
 
 def crossovers(model: LinearModel, wanted: float) -> list[tuple[float, float]]:
