@@ -1,0 +1,112 @@
+"""The guides as a reader follows them: every command and every line of code, from an empty folder."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.bench import standard_folder
+from gyrobench.commands.cli import main
+
+GUIDES = standard_folder() / "docs" / "guides"
+README = standard_folder() / "README.md"
+BLOCK = re.compile(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", re.M | re.S)
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Runs a line of a guide, a gyrobench command or cd, from the folder where the one before left off."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(line: str) -> None:
+        program, *words = shlex.split(line)
+        if program == "cd":
+            os.chdir(words[0])
+            return
+        assert program == "gyrobench", line
+        monkeypatch.setattr(sys, "argv", [program, *words])
+        try:
+            main()
+        except SystemExit as end:
+            assert not end.code, line
+
+    return run
+
+
+def follow(guide: Path, command: Callable[[str], None]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Do what a guide says, in its order; return the names its code leaves, and the files it writes."""
+    names: dict[str, Any] = {}
+    files: dict[str, str] = {}
+    for language, file, text in BLOCK.findall(guide.read_text(encoding="utf-8")):
+        if file:
+            Path(file).parent.mkdir(parents=True)
+            Path(file).write_text(text, encoding="utf-8")
+            files[file] = text
+        elif language == "sh":
+            for line in text.splitlines():
+                command(line)
+        else:
+            exec(compile(text, str(guide), "exec"), names)
+    return names, files
+
+
+def test_a_part_a_test_and_their_noise(command: Callable[[str], None], tmp_path: Path) -> None:
+    names, files = follow(GUIDES / "write_a_system.md", command)
+    assert len(files["components/warm_gyro/model.py"].splitlines()) == 15
+    assert files["systems/six_position/system.py"] == (GUIDES / "own_test" / "system.py").read_text(encoding="utf-8")
+    bench = tmp_path / "mybench"
+    assert {f.name for f in bench.iterdir() if (f / "report.html").is_file()} == {"first", "second"}
+    # what the page says of the two reductions
+    page = (GUIDES / "write_a_system.md").read_text(encoding="utf-8")
+    plain, model = np.abs(names["z_plain"]), np.abs(names["z_model"])
+    assert f"| rms of z | {names['rms_plain']:.1f} | {names['rms_model']:.1f} |" in page
+    assert f"| largest size of z | {plain.max():.1f} | {model.max():.1f} |" in page
+    assert f"of 30 (usual: 1 or 2) | {(plain > 2.0).sum()} | {(model > 2.0).sum()} |" in page
+    hit = [[c.interval[0] <= c.truth <= c.interval[1] for c in run.result.coefficients] for run in names["runs"]]
+    assert sorted(row.count(False) for row in hit) == [0, 0, 0, 0, 3]
+    whiteness = {t.name: t.p for t in names["runs"][0].result.tests}["Ljung-Box, residuals"]
+    assert whiteness == pytest.approx(0.09, abs=0.005)
+    assert model.shape == (5, 6) and names["rms_plain"] > 3.0 * names["rms_model"]
+
+
+@pytest.mark.skipif(not README.is_file(), reason="the wheel has no README.md")
+def test_the_part_of_the_readme_is_built(command: Callable[[str], None], tmp_path: Path) -> None:
+    (text,) = re.findall(r"^```python\n(class .*?)^```$", README.read_text(encoding="utf-8"), re.M | re.S)
+    command("gyrobench init mine")
+    command("cd mine")
+    folder = tmp_path / "mine" / "components" / "tilted_lag"
+    folder.mkdir()
+    names = "from gyrobench.component import Component, Input, Output, Parameter, Rotation, State\n\n"
+    (folder / "model.py").write_text(names + text, encoding="utf-8")
+    command("gyrobench build tilted_lag")
+    command("gyrobench validate fmus/tilted_lag.fmu")
+
+
+def test_the_notebook_runs_and_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads((GUIDES / "first_runs.ipynb").read_text(encoding="utf-8"))
+    cells = [c for c in notebook["cells"] if c["cell_type"] == "code"]
+    assert all(c["outputs"] == [] and c["execution_count"] is None for c in cells), "its outputs are cleared"
+    names: dict[str, Any] = {}
+    shown = []
+    for cell in cells:
+        tree = ast.parse("".join(cell["source"]))
+        last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, "cell", "exec"), names)
+        if isinstance(last, ast.Expr):  # what a notebook shows beneath the cell
+            value = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+            shown.append(value._repr_html_() if hasattr(value, "_repr_html_") else repr(value))
+    assert len(shown) == len(cells) and all(shown)
+    assert "mass unbalance" in shown[1] and "<svg" in shown[1] and "significant" in shown[5]
+    assert 0.5 < float(names["np"].sqrt((names["z"] ** 2).mean().mean())) < 2.0
+    assert {f.name for f in (tmp_path / "first_report").iterdir()} >= {"report.html", "report.pdf", "run.json"}
