@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
+from collections.abc import Callable
 
 import pytest
 
@@ -22,3 +24,28 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and CREATED in os.environ:
         shutil.rmtree(os.environ.pop(CREATED), ignore_errors=True)
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run a gyrobench command: exit code, standard output, standard error.  Anything but an exit fails the test.
+
+    pages: a run or reduction writes its HTML and PDF too, which takes two seconds.
+    """
+
+    def run(*words: object, pages: bool = False) -> tuple[int, str, str]:
+        from gyrobench.commands import cli
+
+        plain = [] if pages or words[0] not in ("run", "reduce") else ["--no-report"]
+        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words), *plain])
+        capsys.readouterr()
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err or "GYROBENCH_TRACEBACK" in os.environ
+        return code, out, err
+
+    return run

@@ -5,14 +5,12 @@ from __future__ import annotations
 import ast
 import builtins
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from gyrobench.bench import standard_folder
-from gyrobench.commands import cli
 from gyrobench.commands.catalog import init_bench
 from gyrobench.record.record import Record
 
@@ -76,7 +74,7 @@ FAILURES = {
 
 
 @pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
     """Runs a command in a bench with a system ``own``: exit code, standard output, standard error."""
     init_bench(tmp_path / "mine", [])
     folder = tmp_path / "mine" / "systems" / "own"
@@ -84,18 +82,7 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     (folder / "system.py").write_text(SYSTEM, encoding="utf-8")
     monkeypatch.chdir(tmp_path / "mine")
     monkeypatch.delenv("GYROBENCH_TRACEBACK", raising=False)
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
-        capsys.readouterr()
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return code, *capsys.readouterr()
-
-    return run
+    return command
 
 
 @pytest.mark.parametrize("raises", FAILURES)
@@ -129,7 +116,7 @@ def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: 
 
 def test_a_figure_that_cannot_be_drawn(gyrobench: Call) -> None:
     """The failure is in gyrobench's drawing: its line is named, as there is none of the user's."""
-    code, out, err = gyrobench("run", "own", "--set", "raises=figure", "--out", "r")
+    code, out, err = gyrobench("run", "own", "--set", "raises=figure", "--out", "r", pages=True)
     assert (code, out) == (3, "") and "Traceback" not in err
     assert "gyrobench: report not complete:\n  - report.html: " in err and "gyrobench/report/" in err
     assert "  - report.pdf: " in err and "after correcting the cause: gyrobench report r" in err
@@ -140,7 +127,7 @@ def test_a_template_of_the_users_own_that_fails(gyrobench: Call) -> None:
     Path("reports/templates").mkdir()
     template = Path("reports/templates/report.html.j2").resolve()
     template.write_text("<p>\n{{ nothing.there }}", encoding="utf-8")
-    code, _, err = gyrobench("run", "own", "--out", "r")
+    code, _, err = gyrobench("run", "own", "--out", "r", pages=True)
     assert code == 3 and "Traceback" not in err
     assert f"  - report.html: {template}:2: UndefinedError: 'nothing' is undefined\n" in err
     assert "report.pdf" not in err and Path("r/report.pdf").is_file()

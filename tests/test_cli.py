@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,23 +27,11 @@ QUICK = ["--set", "rate=2deg/s", "--set", "dwell=60", "--set", "windows=36"]
 TINY = ["--set", "rate=30deg/s", "--set", "dwell=2", "--set", "settle=0.5", "--set", "windows=12"]
 
 
-def call(words: tuple[object, ...], capture: Any, patch: pytest.MonkeyPatch) -> tuple[int, str, str]:
-    patch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
-    capture.readouterr()
-    try:
-        cli.main()
-        code = 0
-    except SystemExit as end:
-        code = int(end.code or 0)
-    out, err = capture.readouterr()
-    return code, out, err
-
-
 @pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
     """Runs a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    return lambda *words: call(words, capsys, monkeypatch)
+    return command
 
 
 @pytest.fixture(scope="module")
@@ -223,7 +210,7 @@ def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
 
 
 def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Path) -> None:
-    code, out, err = gyrobench("run", NAME, *TINY, "--json")
+    code, out, err = gyrobench("run", NAME, *TINY, "--json", pages=True)
     assert code == 0
     (folder,) = (tmp_path / "reports" / "out" / NAME).iterdir()
     assert json.loads(out) == json.loads((folder / "result.json").read_text(encoding="utf-8"))
@@ -251,10 +238,10 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
 
 def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Call, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
-    assert gyrobench(*run)[0] == 0
+    assert gyrobench(*run, pages=True)[0] == 0
     assert (tmp_path / "r" / "report.html").is_file() and (tmp_path / "r" / "report.pdf").is_file()
     before = (tmp_path / "r" / "result.json").read_bytes()
-    code, out, _ = gyrobench(*run, "--no-report")
+    code, out, _ = gyrobench(*run, "--no-report", pages=True)
     assert code == 0 and out.rstrip().endswith("r/result.json") and "D_I" in out
     assert {f.name for f in (tmp_path / "r").iterdir()} == {
         "run.json", "record.parquet", "channels.parquet", "result.json",
@@ -379,7 +366,7 @@ def test_interrupted_step_check_still_gives_the_report(
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
-    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r")
+    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r", pages=True)
     assert code == 130
     assert "r/report.html" in out and "the report is without it" in err
     assert json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["step_check"] == {}
@@ -487,7 +474,7 @@ def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> 
     # 17 °/h/mA both ways, at eight currents, by arithmetic
     rows = "".join(f"{i},{17 * i},{17 * i},360,360\n" for i in (0.5, 1, 2, 4, 6, 8, 10, 12))
     (tmp_path / "t.csv").write_text(template + rows, encoding="utf-8")
-    code, out, err = gyrobench("reduce", "torquer_scale_factor", "--data", "t.csv", "--out", "r")
+    code, out, err = gyrobench("reduce", "torquer_scale_factor", "--data", "t.csv", "--out", "r", pages=True)
     assert code == 0, err
     assert "K_LS " in out and "r/report.html" in out
     (k,) = [

@@ -39,22 +39,10 @@ TWO = words("tumble_single_axis", "fixed_position")
 
 
 @pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
+    """Runs a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, arguments)])
-        capsys.readouterr()
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
-
-    return call
+    return command
 
 
 @pytest.fixture(scope="module")
@@ -289,7 +277,7 @@ def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
     for k, number in enumerate((17, 17, 18)):
         text = [f"# {x}".replace("gyro 17", f"gyro {number}") for x in (*about, "k = 17.2deg/h/mA", "attitude = E U")]
         Path(f"{k}.csv").write_text("\n".join([*text, "t_start [s],t_end [s],mean [mA]", *rows]), encoding="utf-8")
-        assert gyrobench("reduce", "fixed_position", "--data", f"{k}.csv", "--out", f"run{k}")[0] == 0
+        assert gyrobench("reduce", "fixed_position", "--data", f"{k}.csv", "--out", f"run{k}", pages=not k)[0] == 0
         runs.append(f"run{k}")
     page = Path("run0/report.html").read_text(encoding="utf-8")
     assert "22 °C, warm for 4 h" in page and "wanted before signing: laboratory, equipment" in page

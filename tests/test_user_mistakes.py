@@ -20,21 +20,10 @@ POWER = ["run", "stabilizer_power_2dof"]
 
 
 @pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
     """Runs a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words)])
-        capsys.readouterr()
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return code, *capsys.readouterr()
-
-    return run
+    return command
 
 
 PROFILES = {
@@ -94,7 +83,7 @@ def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) ->
 
 def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_common(gyrobench: Call) -> None:
     """The bench of estimators has one step only, that of its readings."""
-    code, out, err = gyrobench(*BENCH, "--check-step", "--out", "a")
+    code, out, err = gyrobench(*BENCH, "--check-step", "--out", "a", pages=True)
     assert code == 3 and "step check: " in err and "the report is without it" in err
     assert "a/report.html" in out and Path("a/report.html").is_file()
 

@@ -20,6 +20,7 @@ from gyrobench.commands.options import (
     Form,
     Json,
     Map,
+    NoReport,
     Out,
     Part,
     Resume,
@@ -185,9 +186,7 @@ def run(
     ] = None,
     spec: Spec = None,
     strict: Strict = False,
-    no_report: Annotated[
-        bool, typer.Option("--no-report", help="Record and result.json only: no HTML, no PDF, for many runs.")
-    ] = False,
+    no_report: NoReport = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
     ] = None,
@@ -238,6 +237,7 @@ def reduce(
     ] = False,
     spec: Spec = None,
     strict: Strict = False,
+    no_report: NoReport = False,
     out: Out = None,
     force: Force = False,
     as_json: Json = False,
@@ -252,6 +252,7 @@ def reduce(
     """
     from gyrobench.commands import print_runs
     from gyrobench.commands.arguments import parse_settings
+    from gyrobench.report import FORMATS
     from gyrobench.workflow.inputs import load_test
 
     test = load_test(system)
@@ -260,7 +261,9 @@ def reduce(
 
         echo(empty_record(test).rstrip("\n"))
         return
-    exit_on_fail(print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json), strict)
+    formats = ("json",) if no_report else FORMATS
+    verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats)
+    exit_on_fail(verdict, strict)
 
 
 @app.command()
@@ -387,7 +390,7 @@ def init(
 def main() -> None:
     """Run a command; an error ends in one message and an exit code, and with GYROBENCH_TRACEBACK=1 in a traceback."""
     try:
-        app(standalone_mode=True)
+        app(prog_name="gyrobench", standalone_mode=True)
     except KeyboardInterrupt:
         print("gyrobench: interrupted", file=sys.stderr)
         sys.exit(130)

@@ -52,6 +52,9 @@ Spec = Annotated[
         autocompletion=complete_specification,
     ),
 ]
+NoReport = Annotated[
+    bool, typer.Option("--no-report", help="Record and result.json only: no HTML, no PDF, for many runs.")
+]
 Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
 Data = Annotated[
     list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; of a suite its runs.  Repeatable.")

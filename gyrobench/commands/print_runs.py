@@ -10,6 +10,7 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.commands import console
 from gyrobench.commands.arguments import apply_values
 from gyrobench.commands.progress_display import ProgressDisplay
+from gyrobench.report import FORMATS
 from gyrobench.report.plain_text import format_ranking, format_result
 from gyrobench.result import NO_VERDICT
 from gyrobench.system.suite import Suite
@@ -49,6 +50,7 @@ def reduce(
     out: Path | None,
     force: bool = False,
     as_json: bool = False,
+    formats: Sequence[str] = FORMATS,
 ) -> str:
     """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict."""
     if isinstance(test, Suite):
@@ -57,14 +59,14 @@ def reduce(
         if not data:
             raise UsageError(f"name the runs: gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
-        return _print_outcome(reduce_runs(test, data, spec, out, force), as_json)
+        return _print_outcome(reduce_runs(test, data, spec, out, force, formats), as_json)
     from gyrobench.workflow.measured_run import reduce_measured
 
     if not data:
         raise UsageError(f"name the record: gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
     if len(data) > 1:
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
-    return _print_outcome(reduce_measured(test, data[0], values, spec, out, force), as_json)
+    return _print_outcome(reduce_measured(test, data[0], values, spec, out, force, formats=formats), as_json)
 
 
 def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:

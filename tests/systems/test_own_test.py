@@ -38,7 +38,7 @@ def test_it_is_short() -> None:
 
 def test_from_a_folder_to_a_report(bench: Path, command: Command) -> None:
     """Six coefficients of the standard gyro with their uncertainties; halving the step changes none of them."""
-    code, out, err = command("run", NAME, "--set", "u_scale_factor=1e-4", "--check-step", "--seed", 4)
+    code, out, err = command("run", NAME, "--set", "u_scale_factor=1e-4", "--check-step", "--seed", 4, pages=True)
     assert code == 0, err
     (folder,) = (bench / "reports" / "out" / NAME).iterdir()
     assert (folder / "report.pdf").stat().st_size > 10_000 and "misses" not in out

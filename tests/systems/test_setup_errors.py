@@ -45,7 +45,7 @@ def test_a_site_that_the_test_does_not_know(
     part = ["--part", f"gyro={foreign('vendor_gyro')}", "--map", f"gyro={MAPPING}"] if gyro == "vendor" else []
     folder = tmp_path / "run"
     words = [*SHORTENED, "--set", "site.latitude=-33.86deg", "--set", "gyro.D_I=0.9deg/h/g", *part]
-    code, out, err = command("run", NAME, *words, "--out", folder)
+    code, out, err = command("run", NAME, *words, "--out", folder, pages=True)
     assert code == 0, err
     told = [line for line in caplog.messages if "set-up error" in line]
     assert told == [f"{NAME}: simulated set-up error: {SOUTH}. To change the whole test: --set latitude=-33.86deg."]
@@ -67,7 +67,9 @@ def test_a_site_that_the_test_does_not_know(
 
 
 def test_the_same_by_the_option_is_no_error(command: Command, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    code, out, err = command("run", NAME, *SHORTENED, "--set", "latitude=-33.86deg", "--out", tmp_path / "run")
+    code, out, err = command(
+        "run", NAME, *SHORTENED, "--set", "latitude=-33.86deg", "--out", tmp_path / "run", pages=True
+    )
     assert code == 0 and "set-up error" not in caplog.text + err and "misses" not in out
     run = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))
     assert "setup_errors" not in run

@@ -200,7 +200,7 @@ def test_run_and_show(command: Command, tmp_path: Path) -> None:
     code, out, err = command("show", NAME)
     assert code == 0 and "current_source" in out and "+100 mA" in out, err
     more = [w for n, v in SHORT.items() for w in ("--set", f"{n}={v}")]
-    code, out, err = command("run", NAME, *more, "--out", tmp_path / "run")
+    code, out, err = command("run", NAME, *more, "--out", tmp_path / "run", pages=True)
     assert code == 0 and "K_3/K_1" in out, err
     assert (tmp_path / "run" / "report.html").exists()
 

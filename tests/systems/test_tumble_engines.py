@@ -56,7 +56,7 @@ def test_order_cuts_and_delays_are_the_same_everywhere(command: Command, tmp_pat
         source, target = (end.split(".")[0] for end in w.split(" -> "))
         assert (place[source] >= place[target]) == (w in delayed), w
 
-    code, _, err = command("run", NAME, *values, "--out", tmp_path)
+    code, _, err = command("run", NAME, *values, "--out", tmp_path, pages=True)
     assert code == 0, err
     recorded = json.loads((tmp_path / "run.json").read_text("utf-8"))
     reported = json.loads((tmp_path / "result.json").read_text("utf-8"))["provenance"]

@@ -212,7 +212,7 @@ def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
 
 def test_report_and_plan(command: Command, tmp_path: Path) -> None:
     words = [w for k, v in SHORT.items() for w in ("--set", f"{k}={v}")]
-    code, out, err = command("run", NAME, *words, "--set", "harmonic=true", "--out", tmp_path)
+    code, out, err = command("run", NAME, *words, "--set", "harmonic=true", "--out", tmp_path, pages=True)
     assert code == 0, err
     assert "D_IS" in out
     page = (tmp_path / "report.html").read_text("utf-8")
