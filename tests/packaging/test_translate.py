@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -204,12 +205,19 @@ def test_accepted_and_equal(written: Written, tmp_path: Path) -> None:
     native_fmu.free()
 
 
+def warnings(source: Path) -> str:
+    """What the compiler says with all warnings on; -O1 sees the flow of values, and is quicker than the build's -O3."""
+    cc = compiler.command(compiler.this_platform())
+    assert cc is not None
+    flags = ("-Wall", "-Wextra", "-Wpedantic", "-O1", "-c", f"-I{source.parent}", "-o", str(source.with_suffix(".o")))
+    return subprocess.run([*cc, *compiler.FLAGS, *flags, source], capture_output=True, text=True, check=True).stderr
+
+
 def strict(cls: type[Component], folder: Path) -> None:
     for fmi in (2, 3):
         for name, text in native_target.source_files(cls, "guid", fmi).items():
             (folder / name).write_text(text, encoding="utf-8")
-        platform = compiler.this_platform()
-        compiler.compile_library(folder / f"fmi{fmi}.c", folder / "x.so", (folder,), platform, strict=True)
+        assert warnings(folder / f"fmi{fmi}.c") == ""
 
 
 def test_parts_compile_without_warnings(part: str, tmp_path: Path) -> None:
