@@ -78,12 +78,16 @@ def vector(x: Sequence[Any]) -> Vector:
 
 def dot(a: Any, b: Any) -> Any:
     """Return the scalar product of two vectors of one length."""
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
+    pairs = zip(a, b, strict=True)
+    x, y = next(pairs)
+    total = x * y
+    for x, y in pairs:
         total = total + x * y
     return total
 
 
 def cross(a: Any, b: Any) -> Vector:
     """Return the vector product of two vectors of three."""
-    return Vector([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    return Vector([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
