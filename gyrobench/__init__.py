@@ -46,13 +46,15 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """Import what is used of the library."""
-    if name not in __all__:
-        raise AttributeError(f"module 'gyrobench' has no attribute '{name}'; it offers {', '.join(__all__)}")
-    import importlib
+if not TYPE_CHECKING:  # a type checker would take any name for one of the module
 
-    return getattr(importlib.import_module("gyrobench.library"), name)
+    def __getattr__(name: str) -> Any:
+        """Import what is used of the library."""
+        if name not in __all__:
+            raise AttributeError(f"module 'gyrobench' has no attribute '{name}'; it offers {', '.join(__all__)}")
+        import importlib
+
+        return getattr(importlib.import_module("gyrobench.library"), name)
 
 
 def __dir__() -> list[str]:

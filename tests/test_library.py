@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,6 +18,7 @@ import pytest
 import gyrobench as gb
 from gyrobench.commands.catalog import init_bench
 from gyrobench.commands.cli import main
+from gyrobench.engine.session import RunError
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult
 from gyrobench.workflow.user_errors import PostRunError
@@ -142,6 +144,7 @@ def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:
     frame = both.frame()
     assert set(frame["run"]) == set(names) and {"estimate", "u", "difference", "U"} <= set(frame)
     assert "estimator_moving_average" in str(both)
+    assert "EstimatorMovingAverage" in shown(both) and "<svg" in both._repr_html_()
     assert both.write(folder / "c")["html"].is_file()
 
 
@@ -245,6 +248,21 @@ def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monke
     assert "0 windows, 1 channels" in str(bare)
     with pytest.raises(gb.GyrobenchError, match="bare has no reduction"):
         bare.result  # noqa: B018
+
+
+def test_an_interrupted_run_holds_what_was_recorded(folder: Path) -> None:
+    """Ctrl-C in a notebook: an error with the record until then, in memory or, with out, in the folder to resume."""
+
+    def interrupt(status: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    test = gb.load(NAME)
+    with pytest.raises(RunError, match="interrupted at t") as error:
+        test.run(progress=interrupt)
+    assert error.value.record is not None and not error.value.record.complete and list(folder.iterdir()) == []
+    with pytest.raises(PostRunError, match="the record until then is kept in r"):
+        test.run(out="r", progress=interrupt)
+    assert repr(gb.open_run("r").record).endswith("incomplete>")
 
 
 # ------------------------------------------------------------------------------------------- notebook

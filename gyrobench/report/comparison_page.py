@@ -155,6 +155,14 @@ def side_tables(doc: Json) -> list[Table]:
     return [b for b in blocks if isinstance(b, Table)]
 
 
+def side_figure(doc: Json, key: str) -> str:
+    """A loop, else the first response of the runs, all runs in it, with ids that begin with ``key``; "" without one."""
+    loops_first = sorted(doc["responses"], key=lambda r: all(run is None or run["kind"] != "loop" for run in r["runs"]))
+    with styled():
+        blocks = responses.side_by_side({**doc, "responses": loops_first[:1]}, _letter)
+    return next((p.svg.replace(f"{p.key}-", f"{key}-") for b in blocks for p in b.items), "")
+
+
 def _letter(k: int) -> str:
     return LETTERS[k] if k < len(LETTERS) else f"R{k + 1}"
 

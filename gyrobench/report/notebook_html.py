@@ -67,7 +67,8 @@ def table_html(table: Table) -> str:
             cells = "".join(map(_cell, row.cells, table.columns))
             rows.append(f"<tr>{cells}</tr>")
     caption = f'<p style="font-size:.85em;color:var(--muted);margin:.3em 0 0">{escape(table.caption)}</p>'
-    body = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    body = '<table style="font:inherit;font-size:.92em;border-collapse:collapse">'
+    body += f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     return f'<div style="overflow-x:auto;margin:.5em 0">{body}{caption if table.caption else ""}</div>'
 
 
@@ -77,8 +78,9 @@ def _cell(cell: Cell, column: Column) -> str:
         return f'<td style="text-align:right;white-space:nowrap;padding:.15em .6em">{escape(cell.whole)}{rest}</td>'
     mark, colour = MARKS.get(cell.mark, ("", ""))
     style = f"color:{colour};font-weight:600;" if mark else "font-weight:600;" if cell.mark == "strong" else ""
-    align = "right" if column.number else "left"
-    return f'<td style="{style}text-align:{align};padding:.15em .6em">{mark}{escape(cell.text)}</td>'
+    align = f"text-align:{'right' if column.number else 'left'};"
+    align += "min-width:9em;" if column.wide else "white-space:nowrap;"
+    return f'<td style="{style}{align}padding:.15em .6em">{mark}{escape(cell.text)}</td>'
 
 
 def figure_html(svg: str) -> str:
@@ -167,8 +169,9 @@ def _number(value: float | int) -> Cell:
 
 
 def comparison_html(doc: dict[str, Any], note: str) -> str:
-    """Return what differs between runs in results: ranking, estimates, differences to the baseline."""
-    from gyrobench.report.comparison_page import side_tables
+    """Return ranking, estimates and differences to the baseline, and the first response that several runs have."""
+    from gyrobench.report.comparison_page import side_figure, side_tables
 
-    blocks = [paragraph("Comparison; the first run is the baseline", strong=True)]
-    return fragment(*blocks, warning_list([note] if note else []), *map(table_html, side_tables(doc)))
+    head = [paragraph("Comparison; the first run is the baseline", strong=True), warning_list([note] if note else [])]
+    figure = figure_html(side_figure(doc, f"nb{doc['report_id']}"))
+    return fragment(*head, *map(table_html, side_tables(doc)), figure)
