@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import signal
@@ -18,7 +19,7 @@ import pytest
 import gyrobench as gb
 from gyrobench.commands.catalog import init_bench
 from gyrobench.commands.cli import main
-from gyrobench.engine.session import RunError
+from gyrobench.engine.session import RunError, Session
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult
 from gyrobench.workflow.user_errors import PostRunError
@@ -133,6 +134,27 @@ def test_values_stay_with_their_experiment_and_progress_is_called() -> None:
     second = test.set("dwell", 60).run(seed=1)
     assert (first.record.run.options["dwell"], second.record.run.options["dwell"]) == (40.0, 60.0)
     assert "dwell" in str(test) and "dwell" in repr(test)
+
+
+def test_fmus_stay_loaded_between_runs_and_are_freed(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Session] = []
+    make = Session.__init__
+
+    def counted(self: Session, *args: Any, **more: Any) -> None:
+        make(self, *args, **more)
+        opened.append(self)
+
+    monkeypatch.setattr(Session, "__init__", counted)
+    test = gb.load(NAME, TINY)
+    records = [test.run(seed=seed).record for seed in (1, 2, 1)]
+    assert len(opened) == 1 and records[0].same_data(records[2]) and not records[0].same_data(records[1])
+    assert opened[0].folder.is_dir()
+    changed = test.set("gyro.D_I", "0.5deg/h/g").run(seed=1)
+    assert len(opened) == 2 and not opened[0].folder.exists() and changed.result["D_I"].truth == pytest.approx(0.5)
+    assert changed.record.same_data(gb.load(NAME, TINY).set("gyro.D_I", "0.5deg/h/g").run(seed=1).record)
+    del test
+    gc.collect()
+    assert not any(session.folder.exists() for session in opened)
 
 
 def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import Keeper
@@ -17,6 +18,9 @@ from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_
 from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
 from gyrobench.workflow.saved_run import RunOutcome, reduce_run, write_report
 from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
+
+if TYPE_CHECKING:
+    from gyrobench.engine.session import Session
 
 
 @dataclass(frozen=True)
@@ -42,22 +46,32 @@ class RunRequest:
     formats: tuple[str, ...] = FORMATS
 
 
-def execute_run(request: RunRequest, system: System, feedback: Feedback = SILENT) -> RunOutcome:
+def open_session(request: RunRequest, system: System) -> Session:
+    """Return a system with its FMUs loaded.  Raises UsageError, and what Session raises."""
+    from gyrobench.engine.session import Session
+
+    require_slots(system).refuse()
+    check_fmu_files(request.parts)
+    return Session(
+        system, request.parts, request.maps, engine=request.engine, isolate=request.isolate, bench=Bench.find().folder
+    )
+
+
+def execute_run(
+    request: RunRequest, system: System, feedback: Feedback = SILENT, prepared: Session | None = None
+) -> RunOutcome:
     """Run a system with its values set; write record and report, unless the request keeps them in memory.
+
+    prepared: the session of an earlier run of the same system, values, parts, engine and isolated slots.
 
     Raises what Session.run raises, and PostRunError for whatever goes wrong after the run: its text names the folder
     of the record, its attribute ``record`` holds it.
     """
-    from gyrobench.engine.session import RunError, RunInterrupted, Session
+    from gyrobench.engine.session import RunError, RunInterrupted
 
     spec = find_specification(request.spec)
     limits = load_limits(spec)
-    require_slots(system).refuse()
-    check_fmu_files(request.parts)
-    bench = Bench.find().folder
-    with Session(
-        system, request.parts, request.maps, engine=request.engine, isolate=request.isolate, bench=bench
-    ) as session:
+    with open_session(request, system) if prepared is None else contextlib.nullcontext(prepared) as session:
         step = request.step or system.step
         folder: Path | None = None
         keeper: Keeper | None = None

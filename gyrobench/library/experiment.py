@@ -1,70 +1,36 @@
-"""Tests and loops from Python: load, set, run, reduce, compare.
-
-    import gyrobench as gb
-
-    test = gb.load("tumble_single_axis", latitude="45.75deg")
-    test.set("gyro.D_I", "0.9deg/h/g")
-    run = test.run(seed=3)                       # in memory; out="folder" keeps record and result.json
-    run.result["D_I"].estimate, run.record.windows["mean"], run.record.frame("windows")
-    run.report("folder")                         # record, result.json, report.html, report.pdf
-    gb.compare(run, test.run(seed=4))            # shows itself in a notebook, prints as a table
-    gb.reduce("tumble_single_axis", "data.csv", latitude="45.75deg", k="17.2deg/h/mA")
-    gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
-
-The bench is the nearest folder above the working folder with components/, systems/ and reports/, as for the command.
-Every error meant for people is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a part or a
-system passes as it is before a run, and after it as a PostRunError that holds the record.
-"""
+"""A system ready to run, and what a run of it leaves."""
 
 from __future__ import annotations
 
 import contextlib
 import operator
+import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from gyrobench.bench import UsageError
-from gyrobench.errors import GyrobenchError
 from gyrobench.notebook import html
 from gyrobench.record.record import Record
 from gyrobench.report.notebook_html import fragment, paragraph, table_html
 from gyrobench.report.page_model import Column, Row, Table, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
-from gyrobench.result import Result, SuiteResult
-from gyrobench.system.suite import Suite
+from gyrobench.result import Result
 from gyrobench.system.system import System
 from gyrobench.system.values import parse
 from gyrobench.units import format_quantity
 from gyrobench.workflow.feedback import Feedback
-from gyrobench.workflow.inputs import load_test, require_run
+from gyrobench.workflow.inputs import require_run
 from gyrobench.workflow.measured_run import reduce_measured
-from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
-from gyrobench.workflow.run_execution import RunRequest, execute_run
+from gyrobench.workflow.run_comparison import read_result
+from gyrobench.workflow.run_execution import RunRequest, execute_run, open_session
 from gyrobench.workflow.run_folders import prepare_folder
 from gyrobench.workflow.saved_run import RunOutcome, write_report
-from gyrobench.workflow.suite_execution import execute_suite
-from gyrobench.workflow.suite_report import SuiteOutcome, reduce_runs
 
 if TYPE_CHECKING:
     from gyrobench.engine.run_driver import Status
-
-__all__ = [
-    "Comparison",
-    "Experiment",
-    "GyrobenchError",
-    "Record",
-    "Result",
-    "Run",
-    "SuiteExperiment",
-    "SuiteRun",
-    "compare",
-    "load",
-    "load_suite",
-    "open_run",
-    "reduce",
-]
+    from gyrobench.engine.session import Session
 
 KEPT = ("json",)  # of the report, in a folder named by ``out``; Run.report writes the rest
 File = str | Path
@@ -121,41 +87,29 @@ class Run:
         return html(self._result if self._result is not None else self.record)
 
 
-@dataclass(frozen=True, repr=False)
-class SuiteRun:
-    """The report of a suite, and the runs of its tests by name."""
+@dataclass(frozen=True)
+class _Prepared:
+    """The session of an experiment, for its next run; key: engine and isolated slots."""
 
-    result: SuiteResult
-    folder: Path
-    runs: Mapping[str, Run] = field(default_factory=dict)
-    failed: str = ""  # which tests have no result
-
-    @property
-    def name(self) -> str:
-        """Name of the folder."""
-        return self.folder.name
-
-    def __str__(self) -> str:
-        return format_result(self.result)
-
-    def __repr__(self) -> str:
-        return f"<SuiteRun of {', '.join(self.runs)}: {self.result.suite.consistency}, {self.folder}>"
-
-    def _repr_html_(self) -> str | None:
-        return html(self.result)
+    key: tuple[str | None, tuple[str, ...]]
+    system: System
+    session: Session
+    close: Callable[[], object]
 
 
 class Experiment:
     """A system with its values and parts, ready to run.
 
-    values: option -> value, SI.  system: what ``systems/NAME/system.py`` declares, with these values.
+    values: option -> value, SI.  system: what ``systems/NAME/system.py`` declares, with these values.  Its FMUs stay
+    loaded between runs of the same values; after a change of a part's or a system's file, load it again.
     """
 
     def __init__(self, system: System, parts: Mapping[str, File], maps: Mapping[str, File]) -> None:
         self.system = system
         self.parts = {slot: str(part) for slot, part in parts.items()}
-        self.maps = _mapping_files(maps)
+        self.maps = mapping_files(maps)
         self._given: dict[str, str] = {}  # as given, for the reader of measured data
+        self._prepared: _Prepared | None = None
 
     @property
     def name(self) -> str:
@@ -174,6 +128,7 @@ class Experiment:
         """
         self.system.set(name, value)
         self._given[name] = str(value)
+        self._release()
         return self
 
     def run(
@@ -203,11 +158,28 @@ class Experiment:
         if out is None and (force or resume):
             raise UsageError("force, resume: name the folder of the run in out")
         request = RunRequest(
-            parts=self.parts, maps=self.maps, seed=_seed(seed), engine=engine, step=_step(step),
-            out=_path(out), force=force, resume=resume, spec=spec,
+            parts=self.parts, maps=self.maps, seed=checked_seed(seed), engine=engine, step=step_of(step),
+            out=path_of(out), force=force, resume=resume, spec=spec,
             check_step=check_step, isolate=tuple(isolate), in_memory=out is None, formats=KEPT,
         )  # fmt: skip
-        return _finished(execute_run(request, self.system.with_values({}), _feedback(progress)))
+        key = (engine, request.isolate)
+        if self._prepared is None or self._prepared.key != key:
+            self._release()
+            system = self.system.with_values({})
+            session = open_session(request, system)
+            self._prepared = _Prepared(key, system, session, weakref.finalize(self, session.close))
+        try:
+            outcome = execute_run(request, self._prepared.system, feedback_of(progress), self._prepared.session)
+        except BaseException:  # an isolated FMU may be gone
+            self._release()
+            raise
+        return finished(outcome)
+
+    def _release(self) -> None:
+        """Free the FMUs of the run before."""
+        if self._prepared is not None:
+            self._prepared.close()
+            self._prepared = None
 
     def reduce(
         self,
@@ -228,9 +200,9 @@ class Experiment:
             raise UsageError(f"{file}: no such file of measured data")
         outcome = reduce_measured(
             self.system.with_values({}), file, {**self._given, **circumstances}, spec,
-            _path(out), force, out is None, KEPT,
+            path_of(out), force, out is None, KEPT,
         )  # fmt: skip
-        return _finished(outcome)
+        return finished(outcome)
 
     def _shown(self, option: str) -> str:
         unit = self.system.options[option].unit
@@ -255,113 +227,6 @@ class Experiment:
         return fragment(paragraph(self.system.title, strong=True), table_html(table))
 
 
-class SuiteExperiment:
-    """A suite with its values and parts, ready to run; a value goes to every test that has it."""
-
-    def __init__(self, suite: Suite, parts: Mapping[str, File], maps: Mapping[str, File]) -> None:
-        self.suite = suite
-        self.parts = {slot: str(part) for slot, part in parts.items()}
-        self.maps = _mapping_files(maps)
-
-    @property
-    def name(self) -> str:
-        """Name of the suite."""
-        return self.suite.name
-
-    def set(self, name: str, value: Any) -> Self:
-        """Set an option of the suite, of its tests, or a parameter of a part; returns the suite."""
-        self.suite.set(name, value)
-        return self
-
-    def run(
-        self,
-        out: File,
-        seed: int = 1,
-        *,
-        step: float | str | None = None,
-        spec: File | None = None,
-        force: bool = False,
-        resume: bool = False,
-        progress: Callable[[Status], None] | None = None,
-    ) -> SuiteRun:
-        """Run all tests, each in a folder inside ``out``, and write their reports and that of the suite.
-
-        ``failed`` of what is returned names the tests without a result.  Raises errors of type GyrobenchError.
-        """
-        request = RunRequest(
-            parts=self.parts, maps=self.maps, seed=_seed(seed), step=_step(step), out=Path(out), force=force,
-            resume=resume, spec=spec,
-        )  # fmt: skip
-        return _finished_suite(execute_suite(request, self.suite, _feedback(progress)))
-
-    def reduce(
-        self, runs: Iterable[Run | File], out: File, *, spec: File | None = None, force: bool = False
-    ) -> SuiteRun:
-        """Write the report of the suite from runs that exist, each in a folder.  Raises UsageError."""
-        folders = []
-        for number, run in enumerate(runs, 1):
-            folder = run.folder if isinstance(run, Run) else Path(run)
-            if folder is None:
-                raise UsageError(
-                    f"run {number} of the suite is in memory only; keep each in a folder: run(out='FOLDER')"
-                )
-            folders.append(folder)
-        return _finished_suite(reduce_runs(self.suite, folders, spec, Path(out), force))
-
-    def __repr__(self) -> str:
-        return f"<SuiteExperiment {self.name}: {', '.join(self.suite.tests())}>"
-
-
-def load(
-    name: File,
-    values: Mapping[str, Any] | None = None,
-    *,
-    parts: Mapping[str, File] | None = None,
-    maps: Mapping[str, File] | None = None,
-    **options: Any,
-) -> Experiment:
-    """Return a system of the bench, or of an SSP archive, ready to run.
-
-    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
-    mapping file of a foreign FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
-    """
-    test = load_test(str(name))
-    if isinstance(test, Suite):
-        raise UsageError(f"{name} is a suite of tests: gyrobench.load_suite('{name}')")
-    experiment = Experiment(test, parts or {}, maps or {})
-    for key, value in {**(values or {}), **options}.items():
-        experiment.set(key, value)
-    return experiment
-
-
-def load_suite(
-    name: str,
-    values: Mapping[str, Any] | None = None,
-    *,
-    parts: Mapping[str, File] | None = None,
-    maps: Mapping[str, File] | None = None,
-    **options: Any,
-) -> SuiteExperiment:
-    """Return a suite of the bench, ready to run; arguments as of :func:`load`.  Raises UsageError for a system."""
-    test = load_test(name)
-    if not isinstance(test, Suite):
-        raise UsageError(f"{name} is one test, no suite: gyrobench.load('{name}')")
-    suite = SuiteExperiment(test, parts or {}, maps or {})
-    for key, value in {**(values or {}), **options}.items():
-        suite.set(key, value)
-    return suite
-
-
-def reduce(
-    name: str, data: File, *, spec: File | None = None, out: File | None = None, force: bool = False, **values: str
-) -> Run:
-    """Return the reduction of a laboratory's CSV file; values: options and circumstances, which replace its comments.
-
-    ``gyrobench reduce NAME --template`` prints an empty file.  Raises errors of type GyrobenchError.
-    """
-    return load(name).reduce(data, spec=spec, out=out, force=force, **values)
-
-
 def open_run(folder: File) -> Run:
     """Return a run from its folder, with the result that was saved.  Raises RecordError and UsageError."""
     folder = require_run(Path(folder))
@@ -369,38 +234,14 @@ def open_run(folder: File) -> Run:
     return Run(record, folder, read_result(folder) if (folder / "result.json").is_file() else None)
 
 
-def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparison:
-    """Return runs, or folders of runs, side by side; the first is the baseline.
-
-    names: of the runs, in their order; default the names of their folders, numbered where two are equal.
-    ``print`` shows the estimates, a notebook tables; ``.frame()`` is a data frame, ``.write(folder)`` a report.
-    Raises UsageError for fewer than two runs, for names that are too few or equal, and for runs with nothing in common.
-    """
-    opened = [r if isinstance(r, Run | SuiteRun) else Path(r) for r in runs]
-    results = [read_result(r) if isinstance(r, Path) else r.result for r in opened]
-    named = list(names)
-    if named and len(named) != len(results):
-        raise UsageError(f"compare: {len(results)} runs, {len(named)} names")
-    if not named:
-        named = [r.name for r in opened]
-        named = [n if named.count(n) == 1 else f"{n} ({k})" for k, n in enumerate(named, 1)]
-    return compare_results(list(zip(named, results, strict=True)))
-
-
-def _finished(outcome: RunOutcome) -> Run:
+def finished(outcome: RunOutcome) -> Run:
     """Return the run of an outcome; what failed or was stopped after it is raised."""
     if outcome.stopped:
         raise outcome.stopped
     return Run(outcome.record, outcome.folder, outcome.result)
 
 
-def _finished_suite(outcome: SuiteOutcome) -> SuiteRun:
-    tests = {n: outcome.folder / t["folder"] for n, t in outcome.result.provenance["tests"].items()}
-    runs = {name: open_run(folder) for name, folder in tests.items()}
-    return SuiteRun(outcome.result, outcome.folder, runs, str(outcome.stopped or ""))
-
-
-def _feedback(progress: Callable[[Status], None] | None) -> Feedback:
+def feedback_of(progress: Callable[[Status], None] | None) -> Feedback:
     @contextlib.contextmanager
     def reported(label: str) -> Iterator[Callable[[Status], None] | None]:
         yield progress
@@ -408,7 +249,7 @@ def _feedback(progress: Callable[[Status], None] | None) -> Feedback:
     return Feedback(progress=reported)
 
 
-def _seed(seed: Any) -> int:
+def checked_seed(seed: Any) -> int:
     try:
         number = operator.index(seed)
     except TypeError:
@@ -418,15 +259,15 @@ def _seed(seed: Any) -> int:
     return number
 
 
-def _path(file: File | None) -> Path | None:
+def path_of(file: File | None) -> Path | None:
     return None if file is None else Path(file)
 
 
-def _step(step: float | str | None) -> float | None:
+def step_of(step: float | str | None) -> float | None:
     return None if step is None else float(parse("step", step, "s"))
 
 
-def _mapping_files(maps: Mapping[str, File]) -> dict[str, Path]:
+def mapping_files(maps: Mapping[str, File]) -> dict[str, Path]:
     files = {slot: Path(file) for slot, file in maps.items()}
     for slot, path in files.items():
         if not path.is_file():

@@ -1,0 +1,117 @@
+"""Tests and loops from Python: load, set, run, reduce, compare.
+
+    import gyrobench as gb
+
+    test = gb.load("tumble_single_axis", latitude="45.75deg")
+    test.set("gyro.D_I", "0.9deg/h/g")
+    run = test.run(seed=3)                       # in memory; out="folder" keeps record and result.json
+    run.result["D_I"].estimate, run.record.windows["mean"], run.record.frame("windows")
+    run.report("folder")                         # record, result.json, report.html, report.pdf
+    gb.compare(run, test.run(seed=4))            # shows itself in a notebook, prints as a table
+    gb.reduce("tumble_single_axis", "data.csv", latitude="45.75deg", k="17.2deg/h/mA")
+    gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
+
+The bench is the nearest folder above the working folder with components/, systems/ and reports/, as for the command.
+Every error meant for people is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a part or a
+system passes as it is before a run, and after it as a PostRunError that holds the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import UsageError
+from gyrobench.errors import GyrobenchError
+from gyrobench.library.experiment import Experiment, File, Run, open_run
+from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
+from gyrobench.record.record import Record
+from gyrobench.result import Result
+from gyrobench.system.suite import Suite
+from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
+
+__all__ = [
+    "Comparison",
+    "Experiment",
+    "GyrobenchError",
+    "Record",
+    "Result",
+    "Run",
+    "SuiteExperiment",
+    "SuiteRun",
+    "compare",
+    "load",
+    "load_suite",
+    "open_run",
+    "reduce",
+]
+
+
+def load(
+    name: File,
+    values: Mapping[str, Any] | None = None,
+    *,
+    parts: Mapping[str, File] | None = None,
+    maps: Mapping[str, File] | None = None,
+    **options: Any,
+) -> Experiment:
+    """Return a system of the bench, or of an SSP archive, ready to run.
+
+    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
+    mapping file of a foreign FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
+    """
+    test = load_test(str(name))
+    if isinstance(test, Suite):
+        raise UsageError(f"{name} is a suite of tests: gyrobench.load_suite('{name}')")
+    experiment = Experiment(test, parts or {}, maps or {})
+    for key, value in {**(values or {}), **options}.items():
+        experiment.set(key, value)
+    return experiment
+
+
+def load_suite(
+    name: str,
+    values: Mapping[str, Any] | None = None,
+    *,
+    parts: Mapping[str, File] | None = None,
+    maps: Mapping[str, File] | None = None,
+    **options: Any,
+) -> SuiteExperiment:
+    """Return a suite of the bench, ready to run; arguments as of :func:`load`.  Raises UsageError for a system."""
+    test = load_test(name)
+    if not isinstance(test, Suite):
+        raise UsageError(f"{name} is one test, no suite: gyrobench.load('{name}')")
+    suite = SuiteExperiment(test, parts or {}, maps or {})
+    for key, value in {**(values or {}), **options}.items():
+        suite.set(key, value)
+    return suite
+
+
+def reduce(
+    name: str, data: File, *, spec: File | None = None, out: File | None = None, force: bool = False, **values: str
+) -> Run:
+    """Return the reduction of a laboratory's CSV file; values: options and circumstances, which replace its comments.
+
+    ``gyrobench reduce NAME --template`` prints an empty file.  Raises errors of type GyrobenchError.
+    """
+    return load(name).reduce(data, spec=spec, out=out, force=force, **values)
+
+
+def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparison:
+    """Return runs, or folders of runs, side by side; the first is the baseline.
+
+    names: of the runs, in their order; default the names of their folders, numbered where two are equal.
+    ``print`` shows the estimates, a notebook tables; ``.frame()`` is a data frame, ``.write(folder)`` a report.
+    Raises UsageError for fewer than two runs, for names that are too few or equal, and for runs with nothing in common.
+    """
+    opened = [r if isinstance(r, Run | SuiteRun) else Path(r) for r in runs]
+    results = [read_result(r) if isinstance(r, Path) else r.result for r in opened]
+    named = list(names)
+    if named and len(named) != len(results):
+        raise UsageError(f"compare: {len(results)} runs, {len(named)} names")
+    if not named:
+        named = [r.name for r in opened]
+        named = [n if named.count(n) == 1 else f"{n} ({k})" for k, n in enumerate(named, 1)]
+    return compare_results(list(zip(named, results, strict=True)))
