@@ -32,6 +32,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
+from gyrobench.system.connectors import QUANTITIES
 from gyrobench.system.sockets import Connector, Socket, element_names
 from gyrobench.system.values import flatten
 
@@ -202,6 +203,13 @@ class _Fitter:
                 shape = " array" if variable.dimensions else ""
                 self.problems.append(
                     f"{element}: wrong type: {name} is {variable.type}{shape}, must be {' or '.join(allowed)}"
+                )
+                continue
+            given = str(variable.quantity or getattr(variable.declaredType, "quantity", None) or "").lower()
+            if c.quantity and given in QUANTITIES and given != c.quantity:
+                self.problems.append(
+                    f"{element}: wrong quantity: {name} is for {QUANTITIES[given]}, here the {c.meaning} stands for "
+                    f"{QUANTITIES[c.quantity]}"
                 )
                 continue
             found = self.gain(element, c.unit, variable, entry)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 Shape = tuple[int, ...]
+#: what a signal in V or A may stand for; an FMU declares it by the attribute quantity of a variable
+QUANTITIES = {"angle": "an angle", "rate": "an angular rate"}
 
 
 def element_names(name: str, shape: Shape) -> list[str]:
@@ -28,6 +31,7 @@ class Connector:
     shape: Shape = ()
     optional: bool = False
     whole: bool = False  # integer valued: an Integer or Boolean variable fits as well as a Real one
+    quantity: str = ""  # one of QUANTITIES: what the signal stands for, where its unit does not say
 
     @property
     def elements(self) -> list[str]:
@@ -41,6 +45,11 @@ class Socket:
     name: str
     meaning: str
     connectors: tuple[Connector, ...]
+
+    def standing_for(self, quantities: Mapping[str, str]) -> Socket:
+        """Return the socket with the quantities of connectors: {"u": "angle"}."""
+        changed = (replace(c, quantity=quantities.get(c.name, c.quantity)) for c in self.connectors)
+        return replace(self, connectors=tuple(changed))
 
     def connector(self, name: str) -> Connector | None:
         """The connector called ``name`` (without index), or None."""

@@ -60,11 +60,13 @@ class Slot:
     """A place in a system: its socket and the name of the part that is there unless another one is given.
 
     socket: the name of one of gyrobench.system.sockets, or a Socket of the system's own.  part: "" in a family, where
-    the system names it, see :meth:`System.with_parts`.
+    the system names it, see :meth:`System.with_parts`.  quantities: what signals stand for in this system, connector ->
+    "angle" or "rate"; a part that declares another one does not fit.
     """
 
     socket: str | Socket
     part: str = ""
+    quantities: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

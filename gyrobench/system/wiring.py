@@ -210,7 +210,9 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
             what = "has no co-simulation interface" if d.coSimulation is None else f"is {kind}"
             raise WiringError(system.name, [f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 co-simulation"])
         descriptions[slot] = d
-        bindings[slot] = fit(socket(declared.socket), d, load_mapping(maps.get(slot)), slot)
+        bindings[slot] = fit(
+            socket(declared.socket).standing_for(declared.quantities), d, load_mapping(maps.get(slot)), slot
+        )
     layer = _Layer(system, bindings, {slot for slot, s in system.slots.items() if Path(paths[slot]).stem == s.part})
     for wire in parse_wires(system.wires):
         layer.lay(*wire)

@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import PROFILE, OneAxisTest, data_sheet, noises
+from gyrobench.system.families.loop_test import PROFILE, OneAxisTest, data_sheet, noises, stabilizer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -30,7 +30,7 @@ class PlatformSingleAxisLoop(OneAxisTest):
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "rebalance": Slot("Rebalance", "rebalance_analog"),
         "estimator": Slot("Estimator", "estimator_none"),
-        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
+        "stabilizer": stabilizer("stabilizer_lead_lag", "rate"),
     }
     wires = OneAxisTest.wires + """
         exciter.command[1] -> stabilizer.command

@@ -16,6 +16,7 @@ from gyrobench.system.families.loop_test import (
     data_sheet,
     hold,
     noises,
+    stabilizer,
     three,
     torquer,
 )  # fmt: skip
@@ -57,7 +58,7 @@ class PlatformThreeAxis(ThreeAxisTest):
         "platform": Slot("Platform", "platform_three_axis"),
         **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in GYROS},
         "decoupler": Slot("Decoupler", "decoupler_t2"),
-        **{axis: Slot("Stabilizer", "stabilizer_lead_lag") for axis in AXES},
+        **{axis: stabilizer("stabilizer_lead_lag") for axis in AXES},
     }
     wires = MOVED + ThreeAxisTest.wires + "\n".join(COMMANDS) + "".join(
         f"""

@@ -9,7 +9,7 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, hold, noises, torquer
+from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, hold, noises, stabilizer, torquer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -51,7 +51,7 @@ class StabilizerFloated2dof(OneAxisTest):
     spec = ("STAB-FLOATED-2DOF",)
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
-        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
+        "stabilizer": stabilizer("stabilizer_lead_lag"),
     }
     wires = OneAxisTest.wires + """
         exciter.command[1] -> gyro.i_y

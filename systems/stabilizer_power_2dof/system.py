@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import MOVED, PROFILE, LoopTest, hold, noises
+from gyrobench.system.families.loop_test import MOVED, PROFILE, LoopTest, hold, noises, stabilizer
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -32,7 +32,7 @@ class StabilizerPower2dof(LoopTest):
     title = "Power gyro stabilizer with a two-degree-of-freedom gyro"
     spec = ("STAB-POWER-2DOF",)
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
-        "stabilizer": Slot("Stabilizer", "stabilizer_power"),
+        "stabilizer": stabilizer("stabilizer_power"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
     }
     wires = MOVED + LoopTest.wires + """

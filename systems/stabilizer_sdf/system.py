@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, torquer
+from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, stabilizer, torquer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -32,7 +32,7 @@ class StabilizerSdf(OneAxisTest):
     spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
-        "stabilizer": Slot("Stabilizer", "stabilizer_lead_lag"),
+        "stabilizer": stabilizer("stabilizer_lead_lag"),
     }
     wires = OneAxisTest.wires + """
         exciter.command[1] -> gyro.i

@@ -86,3 +86,18 @@ def test_every_socket_has_a_meaning_for_each_connector() -> None:
     for s in SOCKETS.values():
         assert s.meaning
         assert all(c.meaning and c.causality in ("input", "output") for c in s.connectors)
+
+
+def test_quantity_is_compared_where_both_sides_declare_one(make: Make) -> None:
+    """The vendor's FMU declares none and fits; a quantity the bench does not know says nothing."""
+    description = read_model_description(str(make("vendor_gyro")))
+    mapping = load_mapping(FOREIGN / "vendor_gyro.toml")
+    angle = socket("SdfGyro").standing_for({"u": "angle"})
+    u = next(v for v in description.modelVariables if v.name == "V_PICKOFF")
+    for quantity in (None, "angle", "Angle", "ElectricPotential"):
+        u.quantity = quantity
+        assert fit(angle, description, mapping, "gyro").outputs["u"].variable == "V_PICKOFF"
+    u.quantity = "rate"
+    assert fit(socket("SdfGyro"), description, mapping, "gyro").outputs["u"].variable == "V_PICKOFF"
+    with pytest.raises(SocketMismatchError, match="V_PICKOFF is for an angular rate, here the pickoff voltage stands"):
+        fit(angle, description, mapping, "gyro")

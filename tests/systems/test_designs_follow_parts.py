@@ -156,3 +156,18 @@ def test_another_estimator_in_the_loop_is_named() -> None:
     with Session(ONE, {"estimator": "estimator_kalman_ar"}) as s:
         notes = s.run({"hold": 10.0}, seed=1).run.notes
     assert any("cross at 4.58 Hz" in n and n.endswith("part estimator_kalman_ar in estimator, hold") for n in notes)
+
+
+# ------------------------------------------------------------------------------------ angle or rate
+@pytest.mark.parametrize("slot", ["pitch", "azimuth"])
+def test_servo_that_wants_a_rate_does_not_fit_a_loop_of_angles(slot: str, command: Command, tmp_path: Path) -> None:
+    """It fitted, and the loop swung up with 33 Hz."""
+    code, out, err = command("run", THREE, "--part", f"{slot}=servo_three_loop", "--out", tmp_path / "run")
+    assert (code, out) == (2, "") and not (tmp_path / "run").exists()
+    text = "u: wrong quantity: u is for an angular rate, here the gyro signal stands for an angle"
+    assert f"slot {slot}: FMU 'ServoThreeLoop' does not fit socket Stabilizer\n  - {text}" in err
+
+
+def test_the_same_servo_fits_where_the_signal_is_a_rate() -> None:
+    with Session(ONE, {"stabilizer": "servo_three_loop"}) as s:
+        assert s.run({"hold": 10.0}, seed=1).run.linear.loops["stabilizer"].break_at == "stabilizer.u"

@@ -62,6 +62,11 @@ def torquer(name: str, decimals: int | None = None) -> Callable[[PartValues], fl
     return factor
 
 
+def stabilizer(part: str = "", signal: str = "angle") -> Slot:
+    """Return the slot of a stabilizer; signal: "angle" or "rate", what the gyro tells it."""
+    return Slot("Stabilizer", part, {"u": signal})
+
+
 class LoopTest(System):
     """Exciter and motion of the base; the plan of a system is its ``phases``, its parameters are its ``design``."""
 
@@ -127,7 +132,6 @@ class OneAxisTest(LoopTest):
 class ThreeAxisTest(LoopTest):
     """A platform with three motor axes: gyro signals distributed by a decoupler, a stabilizer for each axis."""
 
-    stabilizers: ClassVar[dict[str, Slot]] = {axis: Slot("Stabilizer") for axis in AXES}
     wires = LoopTest.wires + """
         load.M -> platform.M_load
         motion -> platform: omega=omega_b alpha=alpha_b f=f_b
@@ -160,7 +164,7 @@ class TwoGyroTest(ThreeAxisTest):
         "platform": Slot("Platform"),
         **{gyro: Slot("TwoAxisGyro") for gyro in mounts},
         "decoupler": Slot("Decoupler"),
-        **ThreeAxisTest.stabilizers,
+        **{axis: stabilizer() for axis in AXES},
     }
     wires = FLOWN + ThreeAxisTest.wires + """
         platform -> gyro_a: omega f
