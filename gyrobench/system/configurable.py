@@ -15,7 +15,8 @@ from typing import Any, ClassVar, Self
 
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
-from gyrobench.system.values import InvalidValueError, parse
+from gyrobench.system.bare_numbers import question, usual_size
+from gyrobench.system.values import InvalidValueError, flatten, parse
 
 
 class InvalidConfigurationError(GyrobenchError):
@@ -60,6 +61,9 @@ class Option:
                 raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
             if self.max is not None and not number <= self.max:
                 raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
+        if self.kind is float and value is not self.default:
+            own = flatten("", parse(name, self.default, unit, self.kind)).values()
+            question(name, value, number, unit, usual_size(own, (self.min, self.max)))
         return number
 
 

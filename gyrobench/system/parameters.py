@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import units
+from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
@@ -50,18 +51,30 @@ def defaults(assembly: Assembly) -> dict[str, Any]:
 def _si(name: str, value: Any, bound: Bound) -> Any:
     """A given value as SI number of the parameter's type."""
     kind = {"Real": float, "Integer": int, "Boolean": bool, "String": str}[bound.kind]
+    return parse(name, value, _si_unit(bound.unit), kind)
+
+
+def _si_unit(name: str) -> str:
+    """Return the SI unit of a unit's dimension: the unit itself where it is one, "1" where it is not known."""
     try:
-        unit = units.unit(bound.unit or "1").dimension
+        unit = units.unit(name or "1")
     except units.UnitError:
-        unit = "1"
-    return parse(name, value, unit, kind)
+        return "1"
+    return name if name and unit.factor == 1.0 and not unit.offset else unit.dimension
 
 
 def _target(name: str, binding: Binding) -> Bound | None:
     return binding.parameters.get(name) or binding.inputs.get(name)
 
 
-def _override(name: str, value: Any, binding: Binding) -> dict[str, Any]:
+def _usual(slot: str, name: str, bound: Bound, binding: Binding, base: Mapping[str, Any]) -> float:
+    """Return the usual size of a parameter: its default, else the largest default of the part in that unit."""
+    own = [base.get(f"{slot}.{n}") for n in binding.parameters if n.partition("[")[0] == name.partition("[")[0]]
+    like = [base.get(f"{slot}.{n}") for n, b in binding.parameters.items() if b.unit == bound.unit]
+    return usual_size(own, like)
+
+
+def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) -> dict[str, Any]:
     """Elements and SI values of one "slot.parameter" as given by the user.  Raises InvalidValueError."""
     slot, _, parameter = name.partition(".")
     if isinstance(value, str) and value.strip().startswith("["):
@@ -77,7 +90,10 @@ def _override(name: str, value: Any, binding: Binding) -> dict[str, Any]:
                 )
             near = difflib.get_close_matches(element, names, n=4, cutoff=0.3) or names[:12]
             raise InvalidValueError(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
-        found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
+        given = found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
+        if bound.kind == "Real" and bound.unit:
+            usual = _usual(slot, element, bound, binding, base)
+            question(f"{slot}.{element}", v, given, _si_unit(bound.unit), usual)
     return found
 
 
@@ -110,7 +126,7 @@ def resolve(
     chosen.update(raw)
     overrides: dict[str, Any] = {}
     for name, value in system.overrides.items():
-        overrides.update(_override(name, value, assembly.bindings[name.partition(".")[0]]))
+        overrides.update(_override(name, value, assembly.bindings[name.partition(".")[0]], base))
     parts = PartValues(system, base, {**raw, **overrides})
     follow_factors(assembly, system, parts)
     for name, value in system.flat_parameters(parts).items():
