@@ -170,7 +170,7 @@ class Session:
             raise InvalidConfigurationError(system.name, problems)
         errors = setup_errors(self.assembly, system, seed, self.base, parameters)
         self._warn(system, [f"simulated set-up error: {e.sentence()}" for e in errors])
-        self._warn(system, notes)
+        self._warn(system, [*notes, *system.warnings()])
         if [c.gain for c in self.assembly.connections] != self.gains:  # factors of wires follow the parts
             self.program, self.gains = build_program(self.assembly), [c.gain for c in self.assembly.connections]
         linear = self._linear(system, parameters, notes) if system.loops else None

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
+from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.result import LoopResult, Specification
@@ -122,28 +122,11 @@ def _said(flight: Flight, error: np.ndarray, travel: float, steep: np.ndarray) -
 
 
 def _legs(flight: Flight) -> dict[str, object]:
-    rows = []
-    for gate in flight.gates:
-        s = flight.leg(gate)
-        base = np.linalg.norm([flight[f"motion.omega[{k}]"][s] for k in (1, 2, 3)], axis=0)
-        rows.append(
-            [
-                gate.label,
-                float(gate.t[-1] - gate.t[0]),
-                float(base.max()) / DEG,
-                float(np.ptp(flight[OUTER][s])) / DEG,
-                float(np.abs(flight[INNER][s]).max()) / DEG,
-                float(flight.error[s].max()) / DEG,
-                float(flight.error[s][-1]) / DEG,
-            ]
-        )
-    return {
-        "title": "Legs of the flight",
-        "caption": "What the rings did, and the error of the inner element",
-        "columns": ["leg", "time / s", "base rate / (°/s)", "ring 4 travel / °", "largest g2 / °",
-                    "largest error / °", "at the end / °"],
-        "rows": rows,
-    }  # fmt: skip
+    columns = {
+        "ring 4 travel / °": lambda s: float(np.ptp(flight[OUTER][s])) / DEG,
+        "largest g2 / °": lambda s: float(np.abs(flight[INNER][s]).max()) / DEG,
+    }
+    return legs_table(flight, "What the rings did, and the error of the inner element", columns)
 
 
 def _loads(found: LoopFindings) -> None:

@@ -119,9 +119,6 @@ class PlatformSingleAxisLoop(OneAxisTest):
             "stabilizer.K_u?": 1.0 / k,
         }
 
-    def crossovers(self) -> dict[str, float]:
-        return {"stabilizer": self["crossover"]}
-
     def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record
 

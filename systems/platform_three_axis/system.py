@@ -7,19 +7,8 @@ from typing import Any
 
 from gyrobench.record.record import Record
 from gyrobench.result import LoopResult, Specification
-from gyrobench.system.families.loop_test import (
-    AXES,
-    MOVED,
-    PROFILE,
-    LoopTest,
-    ThreeAxisTest,
-    data_sheet,
-    hold,
-    noises,
-    stabilizer,
-    three,
-    torquer,
-)  # fmt: skip
+from gyrobench.system.families import loop_test as loop
+from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, data_sheet, three
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -36,7 +25,7 @@ GYROS = tuple(MOUNTS)
 GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2}  # of this test [GYRO-SDF-EOM]
 COMMAND = 1e-3  # rad/s, of the command step
 MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current: 1 N.m a volt, no back EMF
-COMMANDS = {f"exciter.command[{k}] -> {gyro}.i": torquer(f"{gyro}.k", 9) for k, gyro in enumerate(GYROS, 1)}
+COMMANDS = {f"exciter.command[{k}] -> {gyro}.i": loop.torquer(f"{gyro}.k", 9) for k, gyro in enumerate(GYROS, 1)}
 
 
 def neutral_inertia(parts: PartValues) -> list[float]:
@@ -58,9 +47,9 @@ class PlatformThreeAxis(ThreeAxisTest):
         "platform": Slot("Platform", "platform_three_axis"),
         **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in GYROS},
         "decoupler": Slot("Decoupler", "decoupler_t2"),
-        **{axis: stabilizer("stabilizer_lead_lag") for axis in AXES},
+        **{axis: loop.stabilizer("stabilizer_lead_lag") for axis in AXES},
     }
-    wires = MOVED + ThreeAxisTest.wires + "\n".join(COMMANDS) + "".join(
+    wires = loop.MOVED + ThreeAxisTest.wires + "\n".join(COMMANDS) + "".join(
         f"""
         platform -> {gyro}: omega alpha f
         {gyro}.M_react[{k}] -> platform.M_gyro[{k}]
@@ -75,15 +64,13 @@ class PlatformThreeAxis(ThreeAxisTest):
         "azimuth": Option("30deg", "rad", "joint angle of the inner gimbal at the start"),
         "crossover": Option(10.0, "Hz", "crossover of each loop, for the gains", 0.5, 30.0),
         "load_step": Option(1.0, "N.m", "disturbance torque of the steps"),
-        "swing": Option(
-            83.0 * MIL, "rad", "amplitude of base and of commanded angle (83 of 6000 mil); 0: neither", 0.0
-        ),
+        "swing": Option(83 * MIL, "rad", "amplitude of base and of commanded angle (83 of 6000 mil); 0: neither", 0.0),
         "frequency": Option(1.0, "Hz", "frequency of the commanded sine", 0.1, 5.0),
         "sweeps": Option(True, bool, "test sines for the margins of each axis"),
-        **hold(30.0, 5.0),
-        **PROFILE,
+        **loop.hold(30.0, 5.0),
+        **loop.PROFILE,
     }
-    noises = noises(GYROS)
+    noises = loop.noises(GYROS)
     step = 1e-4
     channels = (
         "exciter.phase", "exciter.gate", *three("exciter.command", "exciter.test"), "exciter.motion_angle[1]",
@@ -141,9 +128,6 @@ class PlatformThreeAxis(ThreeAxisTest):
             stabilizer = self.stabilizer(neutral_inertia(parts)[k], motor, gyro)
             found |= {f"{axis}.{n}?": x for n, x in stabilizer.items()}
         return found
-
-    def crossovers(self) -> dict[str, float]:
-        return dict.fromkeys(AXES, self["crossover"])
 
     def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record

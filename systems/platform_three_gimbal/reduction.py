@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.gimbals import DEG, Flight, lock_table, over_time, spans
+from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import Gate, cross_axis, drift, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.result import LoopResult, Specification
@@ -156,26 +156,11 @@ def _flight(found: LoopFindings) -> list[str]:
 
 
 def _legs(flight: Flight, middle: np.ndarray) -> dict[str, object]:
-    rows = []
-    for gate in flight.gates:
-        s = flight.leg(gate)
-        base = np.linalg.norm([flight[f"motion.omega[{k}]"][s] for k in (1, 2, 3)], axis=0)
-        rings = np.max([np.abs(flight[f"platform.theta_dot[{k}]"][s]) for k in (1, 2, 3)], axis=0)
-        rows.append(
-            [
-                gate.label,
-                float(gate.t[-1] - gate.t[0]),
-                float(base.max()) / DEG,
-                float(rings.max()) / DEG,
-                1.0 / max(1e-3, float(np.min(np.abs(np.cos(middle[s]))))),
-                float(np.max(flight.error[s])) / DEG,
-                float(flight.error[s][-1]) / DEG,
-            ]
-        )
-    return {
-        "title": "Legs of the flight",
-        "caption": "1/cos m: gimbal rate for a unit rate of the base along the normal of the ring plane, at most 1000",
-        "columns": ["leg", "time / s", "base rate / (°/s)", "gimbal rate / (°/s)", "largest 1/cos m",
-                    "largest error / °", "at the end / °"],
-        "rows": rows,
-    }  # fmt: skip
+    def rings(s: slice) -> float:
+        return max(float(np.abs(flight[f"platform.theta_dot[{k}]"][s]).max()) for k in (1, 2, 3)) / DEG
+
+    def steepest(s: slice) -> float:
+        return 1.0 / max(1e-3, float(np.min(np.abs(np.cos(middle[s])))))
+
+    caption = "1/cos m: gimbal rate for a unit rate of the base along the normal of the ring plane, at most 1000"
+    return legs_table(flight, caption, {"gimbal rate / (°/s)": rings, "largest 1/cos m": steepest})

@@ -51,10 +51,10 @@ class StabilizerSdf(OneAxisTest):
         "H": Option(1e4, "N.m.s", "spin angular momentum"),
         "C": Option(62.5, "N.m.s/rad", "damping of the float (rate-integrating and rate gyro)"),
         "K": Option(100.0, "N.m/rad", "spring of the float (rate gyro)"),
-        "float_stop": Option("30deg", "rad", "stop of the float: the run ends there"),
+        "float_stop": Option("30deg", "rad", "stop of the float: the run ends there", sets=("gyro.stop",)),
         "form": Option("exact", str, "closed form of the rate-integrating gyro: exact, or light (5-34, light damping)"),
-        "offload": Option(0.0, "N.m/rad", "torque of the motor for the float angle; 0: no motor"),
-        "viscous": Option(0.0, "N.m.s/rad", "viscous friction of the axis against the base"),
+        "offload": Option(0.0, "N.m/rad", "motor torque for the float angle; 0: no motor", sets=("stabilizer.K",)),
+        "viscous": Option(0.0, "N.m.s/rad", "friction of the axis against the base", sets=("platform.viscous",)),
     }
     step = 1e-3
     channels = (*OneAxisTest.channels, "gyro.b", "stabilizer.e")
@@ -87,22 +87,16 @@ class StabilizerSdf(OneAxisTest):
         drifts = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "markov", "white", "pickoff")
         return {
             "platform.J": p.J0,
-            "platform.viscous": self["viscous"],
             **{f"platform.{k}?": v for k, v in {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0, "v_max": 1e9}.items()},
             "platform.i_max?": 1e9,
             "platform.step?": 1.0,
-            "gyro.H": p.H,
-            "gyro.J": p.J,
-            "gyro.C": p.C,
-            "gyro.K": p.K,
-            "gyro.stop": self["float_stop"],
+            **{f"gyro.{n}": getattr(p, n) for n in "HJCK"},
             "gyro.reaction": True,
             "gyro.k": data_sheet(parts["gyro.k"]),
             "gyro.K_sg": 1.0,
             "gyro.u_max": 1e3,
             "gyro.step?": 1.0,
             **{f"gyro.{n}?": 0.0 for n in drifts},
-            "stabilizer.K": self["offload"],
             **{f"stabilizer.{n}?": 1.0 for n in ("tau1", "T1")},
             **{f"stabilizer.{n}?": 0.01 for n in ("tau2", "T2")},
             "stabilizer.v_max": 1e9,
@@ -119,8 +113,7 @@ class StabilizerSdf(OneAxisTest):
             problems.append("C = 0 N.m.s/rad: a rate-integrating gyro has damping (kind=integrating has none)")
         if self["kind"] == "rate" and self["K"] == 0.0:
             problems.append("K = 0 N.m/rad: a rate gyro has a spring (kind=rate-integrating has none)")
-        if self["form"] not in ("exact", "light"):
-            problems.append(f"form = {self['form']}: must be exact or light")
+        problems += self.no_choice(form=("exact", "light"))
         if problems:
             return problems
         zeta = self.axis().zeta
@@ -139,29 +132,23 @@ class StabilizerSdf(OneAxisTest):
         return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        missing = [n for n in ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K") if n not in parameters]
-        if missing:
-            return [
-                f"the parts have no {', '.join(missing)}: this system needs a gyro with spring and "
-                "damper that gives its momentum h_I (floated_gyro), and a platform with inertia J"
-            ]
-        return []
+        missing = ", ".join(n for n in ("platform.J", *(f"gyro.{n}" for n in "JHCK")) if n not in parameters)
+        text = (
+            f"the parts have no {missing}: this system needs a gyro with spring and damper that gives its momentum h_I "
+            "(floated_gyro), and a platform with inertia J"
+        )
+        return [text] if missing else []
 
     def warnings(self) -> list[str]:
         p = self.axis()
-        found = []
-        runs = p.M * self["time"] / p.H
-        if self["kind"] != "rate" and self["offload"] == 0.0:
-            if runs >= self["float_stop"]:
-                found.append(
-                    f"the float runs away with M/H: it will reach its stop of {math.degrees(self['float_stop']):.3g}° "
-                    f"after about {self['float_stop'] * p.H / p.M:.3g} s, and the run will end there"
-                )
-            elif runs > 0.1:
-                found.append(
-                    f"the float will turn to {math.degrees(runs):.3g}°: the closed forms hold cos(b) at its mean"
-                )
-        return found
+        runs = 0.0 if self["kind"] == "rate" or self["offload"] else p.M * self["time"] / p.H
+        if runs >= self["float_stop"]:
+            return [
+                f"the float runs away with M/H: it will reach its stop of {math.degrees(self['float_stop']):.3g}° "
+                f"after about {self['float_stop'] * p.H / p.M:.3g} s, and the run will end there"
+            ]
+        text = f"the float will turn to {math.degrees(runs):.3g}°: the closed forms hold cos(b) at its mean"
+        return [text] if runs > 0.1 else []
 
     def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
         from .reduction import from_record

@@ -46,18 +46,18 @@ class VerticalGyroBench(LoopTest):
         "phases": Option(" ".join(PHASES), str, f"what is flown, of: {' '.join(PHASES)}"),
         "tilt": Option("2deg", "rad", "tilt of the rotor at the start, about x", 0.0),
         "law": Option("switches", str, f"erection: {' or '.join(LAWS)}"),
-        "rate": Option(4.0 * DEG / 60.0, "rad/s", "erection rate (4 deg/min), largest rate of the linear law"),
-        "dead_zone": Option("10arcmin", "rad", "dead zone of the switches", 0.0),
-        "gain": Option(0.05, "1/s", "linear law: rate per tilt"),
-        "cut_off": Option(1, int, "1: the erection is cut off in manoeuvre", 0, 1),
-        "fast_time": Option(0.0, "s", "length of a fast start (ten times the rate, no cut-off); 0: none", 0.0),
-        "ring": Option(1, int, "1: with follow-up ring", 0, 1),
+        "rate": Option("4deg/min", "rad/s", "erection rate, the largest of the linear law", sets=("erection.rate",)),
+        "dead_zone": Option("10arcmin", "rad", "dead zone of the switches", 0.0, sets=("erection.dead_zone",)),
+        "gain": Option(0.05, "1/s", "linear law: rate per tilt", sets=("erection.gain",)),
+        "cut_off": Option(1, int, "1: the erection is cut off in manoeuvre", 0, 1, sets=("erection.cut_off",)),
+        "fast_time": Option(0.0, "s", "fast start, ten times the rate; 0: none", 0.0, sets=("erection.fast_time",)),
+        "ring": Option(1, int, "1: with follow-up ring", 0, 1, sets=("gyro.ring",)),
         "acceleration": Option(0.2 * G0, "m/s2", "acceleration forward"),
         "turn": Option("3deg/s", "rad/s", "rate of the turn"),
-        "speed": Option(50.0, "m/s", "speed in the turn", 0.0),
+        "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets=("motion.speed",)),
         "time": Option(60.0, "s", "length of erection, rest, acceleration and turn, and of the wait before each"),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0),
+        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets=("motion.latitude",)),
+        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets=("motion.earth_rate",)),
     }
     noises = ("gyro.white", "gyro.white_y")
     step = 1e-2
@@ -93,18 +93,9 @@ class VerticalGyroBench(LoopTest):
                 table[name][k] = value
         return {
             **{f"motion.{n}": x for n, x in table.items()},
-            "motion.speed": self["speed"],
-            "motion.latitude": self["latitude"],
-            "motion.earth_rate": self["earth_rate"],
             "gyro.tilt": [self["tilt"], 0.0],
-            "gyro.ring": self["ring"],
             "erection.H?": parts["gyro.H"],
             "erection.law": LAWS.index(self["law"]) if self["law"] in LAWS else 0,
-            "erection.rate": self["rate"],
-            "erection.dead_zone": self["dead_zone"],
-            "erection.gain": self["gain"],
-            "erection.cut_off": self["cut_off"],
-            "erection.fast_time": self["fast_time"],
         }
 
     def check(self) -> list[str]:

@@ -11,7 +11,7 @@ SI inside, degrees where people read.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -98,6 +98,23 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
                     "platform error then / °", "largest / °"],
         "rows": sorted(rows, key=lambda r: float(r[2])),
     }  # fmt: skip
+
+
+def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> dict[str, Any]:
+    """Table of what each leg did.  columns: name -> value in the stretch of the flight that is the leg."""
+    rows = []
+    for gate in flight.gates:
+        s = flight.leg(gate)
+        base = np.linalg.norm([flight[f"motion.omega[{k}]"][s] for k in (1, 2, 3)], axis=0)
+        error = flight.error[s] / DEG
+        known = [gate.label, float(gate.t[-1] - gate.t[0]), float(base.max()) / DEG]
+        rows.append([*known, *(float(value(s)) for value in columns.values()), float(error.max()), float(error[-1])])
+    return {
+        "title": "Legs of the flight",
+        "caption": caption,
+        "columns": ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
+        "rows": rows,
+    }
 
 
 def over_time(

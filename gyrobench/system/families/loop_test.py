@@ -7,7 +7,6 @@
 
         def phases(self): return [LoopPhase("load step", ...), *sweep("loop", "test", ...), LoopPhase("drift", ...)]
         def design(self, parts): return {"stabilizer.K": wc / parts["gyro.K_sg"]}
-        def crossovers(self): return {"stabilizer": self["crossover"]}
 
 A design follows the values that the parts in the slots have; where a loop will not cross where it was asked to, the
 user is told before the run, with what was set or swapped.
@@ -83,7 +82,7 @@ class LoopTest(System):
         return []
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        """Return the parameters that follow from options and parts, beside plan and recorded motion."""
+        """Return the parameters that follow from options and parts, beside plan, motion and what options own."""
         return {}
 
     def plan(self) -> LoopPlan:
@@ -92,11 +91,12 @@ class LoopTest(System):
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         profile = self.values.get("profile")
-        return {
-            **self.plan().parameters(),
-            **(read_profile(Path(profile)) if profile else {}),
-            **self.design(parts),
-        }
+        motion = read_profile(Path(profile)) if profile else {}
+        return {**self.plan().parameters(), **motion, **self.owned(), **self.design(parts)}
+
+    def crossovers(self) -> dict[str, float]:
+        """The option crossover, for all loops, where a system has one."""
+        return dict.fromkeys(self.loops, self["crossover"]) if "crossover" in self.options else {}
 
     def not_positive(self, *names: str) -> list[str]:
         """Return a sentence for each option that must be above 0 and is not."""
