@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gyrobench.system.configurable import Option
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.system.configurable import Option, load_configurable
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.system import System
@@ -17,6 +21,7 @@ from gyrobench.system.wiring import assemble
 
 Make = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
+ROOT = Path(__file__).parents[2]
 
 
 def resolved(system: System, values: Mapping[str, Any], parts: Any = None, maps: Any = None) -> dict[str, Any]:
@@ -87,3 +92,32 @@ def test_options() -> None:
         time.parse("dwell", "1e6")
     assert time.parse("dwell", "1e6s") == 1e6
     assert Option(0.0, "rad").parse("offset", "500") == 500.0  # nothing tells its usual size
+
+
+def documented() -> list[tuple[str, dict[str, str], dict[str, str]]]:
+    """System, values and parts of every ``gyrobench run`` in the README files and the guides."""
+    found = []
+    systems = Bench(standard_folder()).systems()
+    for file in (f for pattern in ("*.md", "docs/**/*.md", "*/*/README.md") for f in ROOT.glob(pattern)):
+        for command in re.findall(r"gyrobench run ([^`\n#]+)", file.read_text("utf-8")):
+            words = shlex.split(command.replace("...", ""))
+            pairs = {option: dict[str, str]() for option in ("--set", "--part")}
+            for option, word in pairwise(words):
+                if option in pairs and "=" in word:
+                    name, _, value = word.partition("=")
+                    pairs[option][name] = value
+            if words and words[0] in systems and pairs["--set"]:
+                found.append((words[0], pairs["--set"], pairs["--part"]))
+    return found
+
+
+def test_no_documented_command_is_questioned() -> None:
+    commands = documented()
+    assert len(commands) > 20
+    for name, values, parts in commands:
+        system = load_configurable(name)
+        if isinstance(system, System):
+            own = {slot: part for slot, part in parts.items() if not part.endswith(".fmu")}
+            foreign = parts.keys() - own.keys()
+            known = {n: v for n, v in values.items() if n.partition(".")[0] not in foreign and n != "profile"}
+            resolved(system, known, own)
