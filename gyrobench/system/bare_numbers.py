@@ -1,4 +1,7 @@
-"""Numbers without a unit that are far outside the usual size: questioned before anything runs."""
+"""Numbers without a unit that are far outside the usual size: questioned before anything runs.
+
+Asked of what people write, on the command line or in a file.  A number of Python is SI, as the library says.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,9 @@ from gyrobench import drift, units
 from gyrobench.system.values import InvalidValueError, flatten
 
 FACTOR = 1000.0  # a number this many times the usual one is taken for one in another unit,
-NEAR = 100.0  # and from here on where an everyday unit makes it usual,
-USUAL = 10.0  # to this factor
+NEAR = 100.0  # and from here on, from LEAST on, where an everyday unit makes it usual to the factor USUAL
+LEAST = 0.01  # nobody writes 1e-5 and means degrees
+USUAL = 10.0
 PER_G = {n: ("", "/g", "/g2")[drift.order(n)] for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
 ODD = ("us", "ms", "min", "h", "day", "rev", "km", "degC")  # nobody leaves these out
 
@@ -26,12 +30,12 @@ def usual_size(*sizes: Iterable[float | None]) -> float:
 
 
 def question(name: str, given: Any, value: Any, unit: str, usual: float) -> None:
-    """Raise InvalidValueError for a number without a unit that is far beyond the usual size.
+    """Raise InvalidValueError for a text without a unit whose number is far beyond the usual size.
 
     given: as the user wrote it; value: the same in SI, a number or a list; unit: its SI unit.  A value with its unit is
     what the user means, and a number of unit 1 may have any size.
     """
-    if unit in ("", "1") or not usual or (isinstance(given, str) and given.strip(" +-.0123456789eE[],")):
+    if unit in ("", "1") or not usual or not isinstance(given, str) or given.strip(" +-.0123456789eE[],"):
         return
     sizes = {u: units.factor(u) for u in units.fitting(unit)[1:] if u not in ODD}
     for element, x in flatten(name, value).items():
@@ -40,7 +44,7 @@ def question(name: str, given: Any, value: Any, unit: str, usual: float) -> None
         apart = {u: abs(math.log(abs(x) * size / usual)) for u, size in sizes.items()}
         likely = [u for u in apart if u in units.USUAL and apart[u] <= math.log(USUAL)]
         meant = min(likely or apart, key=lambda u: apart[u], default="")
-        if abs(x) > FACTOR * usual or (meant and apart[meant] <= math.log(USUAL)):
+        if abs(x) > FACTOR * usual or (abs(x) >= LEAST and meant and apart[meant] <= math.log(USUAL)):
             raise InvalidValueError(_words(element, float(x), unit, usual, meant, sizes.get(meant, 0.0)))
 
 

@@ -77,6 +77,7 @@ def _usual(slot: str, name: str, bound: Bound, binding: Binding, base: Mapping[s
 def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) -> dict[str, Any]:
     """Elements and SI values of one "slot.parameter" as given by the user.  Raises InvalidValueError."""
     slot, _, parameter = name.partition(".")
+    text = value
     if isinstance(value, str) and value.strip().startswith("["):
         value = parse(name, value)
     found = {}
@@ -93,7 +94,7 @@ def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) 
         given = found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
         if bound.kind == "Real" and bound.unit:
             usual = _usual(slot, element, bound, binding, base)
-            question(f"{slot}.{element}", v, given, _si_unit(bound.unit), usual)
+            question(f"{slot}.{element}", text, given, _si_unit(bound.unit), usual)
     return found
 
 
