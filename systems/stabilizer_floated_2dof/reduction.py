@@ -16,7 +16,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import ARCSEC, DRIFTS, LoopFindings
 from gyrobench.result import LoopResult, Specification
 
 from .closed import Loop
@@ -67,7 +67,12 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         conventions=CONVENTIONS,
         specification=specification,
     )
-    result.summary = [*_summary(result), *said]
+    crosses = "The loop crosses over at {f_c:.4g} Hz with {PM:.3g}° of phase margin"
+    limit = "; it becomes unstable at {lower limit:.3g} of its gain." if "lower limit" in found.estimates else "."
+    result.summary = found.tell(
+        "A load leaves the platform {θ*:.4g}″ off; its stiffness at rest is {S:.5g} N·m/rad.", crosses + limit, DRIFTS
+    )
+    result.summary += said
     return result
 
 
@@ -236,21 +241,3 @@ def _blow(found: LoopFindings) -> list[str]:
         found.warnings.append("After the blow the loop did not come to rest: the motor's limit made it unstable.")
         return [f"A blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s throws the loop into a growing swing."]
     return [f"After a blow of {blow.amplitude:g} N·m for {blow.row.dwell:g} s the loop comes back to rest."]
-
-
-def _summary(result: LoopResult) -> list[str]:
-    c = {c.name: c for c in result.coefficients}
-    said = []
-    if "θ*" in c and "S" in c:
-        said.append(
-            f"A load leaves the platform {c['θ*'].estimate:.4g}″ off; its stiffness at rest is "
-            f"{c['S'].estimate:.5g} N·m/rad."
-        )
-    if "PM" in c:
-        lower = f"; it becomes unstable at {c['lower limit'].estimate:.3g} of its gain" if "lower limit" in c else ""
-        said.append(
-            f"The loop crosses over at {c['f_c'].estimate:.4g} Hz with {c['PM'].estimate:.3g}° of phase margin{lower}."
-        )
-    if "drift" in c:
-        said.append(f"The platform drifts by {c['drift'].estimate:.3g} °/h at rest.")
-    return said

@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import ARCSEC, DRIFTS, LoopFindings
 from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 648000.0
@@ -99,7 +99,12 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         conventions=CONVENTIONS,
         specification=specification,
     )
-    result.summary = _summary(result)
+    result.summary = found.tell(
+        "A load leaves the platform {α*:.4g}″ off; the gyro leans by M/K_m with K_m = {K_m:.4g} N·m/rad.",
+        "The loop crosses over at {f_c:.3g} Hz with a phase margin of {PM:.3g}°; it is stable up to "
+        "K_m = {K_m limit:.4g} N·m/rad.",
+        DRIFTS,
+    )
     return result
 
 
@@ -185,21 +190,3 @@ def _drift(found: LoopFindings, gate: Gate) -> None:
     if "gyro.Dx_zz" in p and not p.get("motion.preset"):
         truth = float(p["gyro.Dx_0"]) - float(p["gyro.Dx_z"]) + float(p["gyro.Dx_zz"])
     found.drift(gate, "gyro.alpha", truth=truth, walk=float(p.get("gyro.white_x", 0.0)))
-
-
-def _summary(result: LoopResult) -> list[str]:
-    c = {c.name: c for c in result.coefficients}
-    said = []
-    if "α*" in c and "K_m" in c:
-        said.append(
-            f"A load leaves the platform {c['α*'].estimate:.4g}″ off; the gyro leans by M/K_m with K_m = "
-            f"{c['K_m'].estimate:.4g} N·m/rad."
-        )
-    if "PM" in c and "K_m limit" in c:
-        said.append(
-            f"The loop crosses over at {c['f_c'].estimate:.3g} Hz with a phase margin of {c['PM'].estimate:.3g}°; it "
-            f"is stable up to K_m = {c['K_m limit'].estimate:.4g} N·m/rad."
-        )
-    if "drift" in c:
-        said.append(f"The platform drifts by {c['drift'].estimate:.3g} °/h at rest.")
-    return said

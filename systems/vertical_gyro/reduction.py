@@ -91,7 +91,11 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         specification=specification,
     )
     result.ranked_by = "max"
-    result.summary = _summary(found)
+    result.summary = found.tell(
+        "Erected to the dead zone in {t_zone:.3g} s.",
+        "The acceleration leaned it by {lean:.3g}°.",
+        "After the erection it was never more than {max:.3g} arcmin from the vertical.",
+    )
     return result
 
 
@@ -230,14 +234,3 @@ def _figure(found: LoopFindings, name: str, what: str, unit: str, t: Array, y: A
     found.responses.append(
         Response(name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), what, unit, curves=[line])
     )
-
-
-def _summary(found: LoopFindings) -> list[str]:
-    known = {c.name: c for c in found.coefficients}
-    said = []
-    if "t_zone" in known:
-        said.append(f"Erected to the dead zone in {known['t_zone'].estimate:.3g} s.")
-    if "lean" in known:
-        said.append(f"The acceleration leaned it by {known['lean'].estimate:.3g}°.")
-    said.append(f"After the erection it was never more than {known['max'].estimate:.3g} arcmin from the vertical.")
-    return said

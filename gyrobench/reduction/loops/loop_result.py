@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from string import Formatter
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from gyrobench.result import Coefficient, LoopResult, Response, Specification
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 CURVE = 241  # points of a drawn curve
+DRIFTS = "The platform drifts by {drift:.3g} °/h at rest."  # for LoopFindings.tell
 SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
@@ -107,6 +109,17 @@ class LoopFindings:
                 verdict=uncertainty.verdict(estimate, half, limit),
             )
         )
+
+    @property
+    def estimates(self) -> dict[str, float]:
+        """What was measured, in printed units."""
+        return {c.name: c.estimate for c in self.coefficients}
+
+    def tell(self, *texts: str) -> list[str]:
+        """Return the sentences of which all was measured: "It crosses over at {f_c:.4g} Hz."."""
+        measured = self.estimates
+        fields = {text: [name for _, name, _, _ in Formatter().parse(text) if name is not None] for text in texts}
+        return [text.format_map(measured) for text in texts if measured.keys() >= set(fields[text])]
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
