@@ -20,7 +20,7 @@ part).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,13 +107,23 @@ def terms_2dof(channel: str, which: int) -> tuple[str, ...]:
     return tuple(name_2dof(channel, n) for n in terms(which))
 
 
+def typst_2dof(channel: str, names: Iterable[str]) -> str:
+    """Return the drift of a channel over X, Y, Z as Typst math, the terms Dx_0, Dx_xz ... of ``names``."""
+    parts = []
+    for axes in (n.split("_")[1] for n in names):
+        upper = axes.upper()
+        power = f"{upper[0]}^2" if len(axes) == 2 and axes[0] == axes[1] else " ".join(upper)
+        parts.append(f'D_"{channel}0"' if axes == "0" else f'D_"{channel},{axes}" {power}')
+    return " + ".join(parts)
+
+
 def fold_problems(true: Mapping[str, float], prefix: str = "") -> list[str]:
     """Return which squares of a simulated gyro no test at constant |g| sees: coefficients in rad/s per g0 squared.
 
     prefix: of the names in ``true``, which the sentences repeat ("gyro.").
     """
     return [
-        f"{prefix}{square} = {true[prefix + square] / DPH:g} deg/h/g2: at constant |g| it cannot be told from {a}, {b} "
+        f"{prefix}{square} = {true[prefix + square] / DPH:g} °/h/g²: at constant |g| it cannot be told from {a}, {b} "
         f"and {c}; set fold=true to accept the combinations {a} + γ² {square}, {b} − {square}, {c} − {square}"
         for square, (a, b, c) in FOLDED.items()
         if true.get(prefix + square)

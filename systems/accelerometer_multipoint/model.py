@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.frames import G0
-from gyrobench.result import Specification
+from gyrobench.reduction import setups
 
 from . import closed
 from .geometry import CROSS, specific_force
@@ -24,25 +24,22 @@ from .geometry import CROSS, specific_force
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Setup:
-    """How the record was taken; SI.  scale: lambda, m/s2/A.  mounts: phase -> "a" or "b".  truth: k0 ... k5;
-    zeros: mount -> true theta_0.  u_*, quantum: see the options and parameters of the system.
+@dataclass(frozen=True, kw_only=True)
+class Setup(setups.Setup):
+    """scale: lambda, m/s2/A.  mounts: phase -> "a" or "b".  truth: k0 ... k5; zeros: mount -> true theta_0.  quantum:
+    resolution of the current reading.  site: as the report shows it.
     """
 
     gravity: float
     scale: float
     mounts: Mapping[int, str]
-    truth: Mapping[str, float] | None = None
     zeros: Mapping[str, float] | None = None
-    specification: Specification | None = None
+    quantum: float = 0.0
+    site: Mapping[str, Any] = field(default_factory=dict)
     u_scale: float = 0.0
     u_current: float = 0.0
     u_gravity: float = 0.0
     u_angle: float = 0.0
-    quantum: float = 0.0
-    instrument: str = ""
-    site: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def gamma(self) -> float:

@@ -23,15 +23,8 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
@@ -307,28 +300,24 @@ def _summary(result: DriftTestResult, found: Findings) -> list[str]:
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
-    """The setup a run.json describes.  Truth only where the accelerometer has the coefficients."""
-    options, parameters = run.options, run.parameters
+    """Return the setup a run.json describes.  Truth only where the accelerometer has the coefficients."""
     site = run_metadata.Site.of(run)
-    measured = run.measured
-    plan = run_metadata.phases(run, ("a", "b"))
-    mounts = {p: row.face for p, row in plan.items()}
+    mounts = {p: row.face for p, row in run_metadata.phases(run, ("a", "b")).items()}
     truth = run_metadata.truth_of(run, KS, "accelerometer")
     zeros = None
     if truth is not None and set(truth) == set(KS):
-        axes = parameters.get("accelerometer.mount", np.eye(3))
+        axes = run.parameters.get("accelerometer.mount", np.eye(3))
         zeros = {m: zero_angle(m, axes) for m in sorted(set(mounts.values()))}
-    return Setup(
+    return Setup.of(
+        run,
+        specification,
         gravity=site.gravity,
         scale=run_metadata.number(run, "scale", "accelerometer.scale", "scale λ"),
         mounts=mounts,
         truth=truth if zeros is not None else None,
         zeros=zeros,
-        specification=specification,
-        quantum=float(parameters.get("accelerometer.resolution", 0.0)),
-        instrument=run.instrument,
-        site={"gravity / (m/s²)": site.gravity} if measured else site.shown(),
-        **run_metadata.sizes(options, ("u_scale", "u_current", "u_gravity", "u_angle")),
+        quantum=float(run.parameters.get("accelerometer.resolution", 0.0)),
+        site={"gravity / (m/s²)": site.gravity} if run.measured else site.shown(),
     )
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench import frames
+
 from .closed import spacing
 from .geometry import FACES
 
@@ -46,9 +48,7 @@ def zero_problems(zeros: Mapping[str, float]) -> list[str]:
 
 
 def setup_problems(s: Setup) -> list[str]:
-    found = []
-    if not 9.7 <= s.gravity <= 9.9:
-        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
+    found = frames.gravity_problems(s.gravity)
     if not (math.isfinite(s.scale) and s.scale > 0.0):
         found.append(f"scale λ = {s.scale:g} m/s²/A: a finite positive number is expected")
     unknown = sorted({m for m in s.mounts.values() if m not in FACES})

@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench import frames, units
+from gyrobench import units
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.fit_result import Findings, Quantity, ReductionError
-from gyrobench.reduction.estimation.linear_fit import Estimates
-from gyrobench.result import Specification
+from gyrobench.reduction.estimation.linear_fit import Estimates, Findings, Quantity
+from gyrobench.reduction.setups import SiteSetup
+from gyrobench.reduction.window_checks import ReductionError
 
 from . import positions
 
@@ -53,33 +53,21 @@ TRUE = ("k_x", "k_y", *(f"D{c}_{a}" for c in "xy" for a in ("0", "x", "y", "z", 
 EXTRA = {"x": ("Dy_yy − Dy_xx", "Dy_x"), "y": ("Dx_xx − Dx_yy", "Dx_y")}
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Where and how the record was taken; SI throughout.
-
-    terms: unknowns of a channel, 4 or 6.  truth: coefficients Dx_0 ... Dy_xz (rad/s per g0^n), k_x, k_y of a simulated
-    gyro.  specification: name -> limits in the printed unit.  u_*: standard uncertainties of type B; u_nonlinearity:
-    relative, at the largest current; quantum: resolution of the current readings.  sigma: two cycles are needed.
+@dataclass(frozen=True, kw_only=True)
+class Setup(SiteSetup):
+    """terms: unknowns of a channel, 4 or 6.  sigma: two cycles are needed.  truth: coefficients Dx_0 ... Dy_xz (rad/s
+    per g0^n), k_x, k_y of a simulated gyro.  quantum: resolution of the current readings.  u_nonlinearity: relative, at
+    the largest current.
     """
 
-    latitude: float
-    gravity: float
-    earth_rate: float = frames.EARTH_RATE
     terms: int = 6
     sigma: bool = True
-    truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
     u_attitude: float = 0.0
     u_mount: float = 0.0
     u_latitude: float = 0.0
     u_current: float = 0.0
     u_nonlinearity: float = 0.0
     quantum: Mapping[str, float] = field(default_factory=dict)
-    instrument: str = ""
-
-    @property
-    def gamma(self) -> float:
-        return self.gravity / frames.G0
 
 
 def directions(position: NDArray[np.int_], latitude: float, turned: Mapping[int, Array] | None = None) -> Array:

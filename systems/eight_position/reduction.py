@@ -17,20 +17,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import units
+from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import repeatability, residual_series
-from gyrobench.reduction.estimation.fit_result import (
-    Group,
-    ReductionError,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Group, fit
 from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.window_checks import window_problems
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
 from . import budget, model, positions, refusals, tables
@@ -85,9 +80,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
 
 
 def _problems(windows: Mapping[str, Array], setup: Setup) -> list[str]:
-    found = refusals.latitude(setup.latitude)
-    if not 9.7 <= setup.gravity <= 9.9:
-        found.append(f"gravity {setup.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
+    found = refusals.latitude(setup.latitude) + frames.gravity_problems(setup.gravity)
     if setup.terms not in (4, 6):
         found.append(f"terms = {setup.terms}: no such model; a channel has 4 or 6 unknowns")
     missing = [n for n in ("position", "cycle", "t_start", "t_end", "mean_x", "mean_y") if n not in windows]
@@ -174,10 +167,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
         equation="",
         conventions=_conventions(setup),
         effects=effects,
-        specification=setup.specification,
-        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
-        instrument=setup.instrument,
-        simulated=setup.truth is not None,
+        **setup.reported(),
         closed_caption="Mean of the readings of each position in the corrected formulas 3-10, 3-11",
         warnings=_warnings(channel, setup),
     )
@@ -225,21 +215,15 @@ def _shown(c: Coefficient) -> str:
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
-    """The setup that a run.json describes: options and the parameters of the parts (slot.name, SI)."""
-    options, parameters = run.options, run.parameters
-    site = run_metadata.Site.of(run)
-    known = all(f"gyro.{n}" in parameters for n in ("Dx_0", "Dy_0"))
-    return Setup(
-        latitude=site.latitude,
-        gravity=site.gravity,
-        earth_rate=site.earth_rate,
-        terms=int(options.get("terms", 6)),
-        sigma=bool(options.get("sigma", True)),
+    """Return the setup that a run.json describes: options and the parameters of the parts (slot.name, SI)."""
+    known = all(f"gyro.{n}" in run.parameters for n in ("Dx_0", "Dy_0"))
+    return Setup.of(
+        run,
+        specification,
+        terms=int(run.options.get("terms", 6)),
+        sigma=bool(run.options.get("sigma", True)),
         truth=run_metadata.truth_of(run, model.TRUE) if known else None,
-        specification=specification,
-        quantum={c: float(parameters.get(f"rebalance_{c}.resolution", 0.0)) for c in "xy"},
-        instrument=run.instrument,
-        **run_metadata.sizes(run.options, ("u_attitude", "u_mount", "u_latitude", "u_current", "u_nonlinearity")),
+        quantum={c: float(run.parameters.get(f"rebalance_{c}.resolution", 0.0)) for c in "xy"},
     )
 
 

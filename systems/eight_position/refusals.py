@@ -9,19 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench import frames
+
 from . import positions
 
 Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 LATITUDE, NEAR = 85.0 * DEG, 80.0 * DEG
 ATTITUDE = 1.0 * DEG  # largest error of a position
-STEP_MAX = 5e-3  # s
 
 
 def latitude(value: float) -> list[str]:
     """Why there is no scale factor at this latitude (rad); empty when there is."""
-    if not math.isfinite(value) or abs(value) > math.pi / 2:
-        return [f"latitude {value / DEG:.6g}° lies outside −90..90°"]
+    if problems := frames.latitude_problems(value):
+        return problems
     if abs(value) > LATITUDE:
         return [
             f"latitude {value / DEG:.4g}°: possible to 85° north or south; the scale factors rest on W cos φ = "
@@ -51,12 +52,6 @@ def options(system: Any) -> list[str]:
         )
     if system["cycles"] * system["readings"] < 2:
         found.append("one reading in each position leaves no noise to estimate: readings or cycles at least 2")
-    if system["gravity"] and not 9.7 <= system["gravity"] <= 9.9:
-        found.append(f"gravity {system['gravity']:.6g} m/s² lies outside 9.7..9.9 m/s²")
-    if system.step > STEP_MAX:
-        found.append(
-            f"step = {system.step:g} s: the rebalance loops exchange once a step and need at most {STEP_MAX:g} s"
-        )
     return found
 
 

@@ -19,24 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.attitudes import parse
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import repeatability
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Group,
-    Quantity,
-    ReductionError,
-    fit,
-    linear_result,
-    plus_minus,
-)
-from gyrobench.reduction.window_checks import window_problems
+from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
+from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
-
-from . import refusals
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
@@ -45,28 +36,19 @@ DPH, DEG = units.factor("deg/h"), units.factor("deg")
 LEAST = 8  # readings
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Where and how the record was taken; SI throughout.
-
-    attitude: rows I, O, S in (E, N, U).  k: rad/s/A.  truth: coefficients of the simulated gyro, rad/s per g0^n.
-    u_*: standard uncertainties of type B; quantum: resolution of the current reading.  specification: name -> limits
-    in the printed unit.
+@dataclass(frozen=True, kw_only=True)
+class Setup(SiteSetup):
+    """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A.  quantum: resolution of the current
+    reading.
     """
 
-    latitude: float
-    gravity: float
     k: float
     attitude: Array = field(default_factory=lambda: np.eye(3))
-    earth_rate: float = frames.EARTH_RATE
-    truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
     u_attitude: float = 0.0
     u_latitude: float = 0.0
     u_scale_factor: float = 0.0
     u_current: float = 0.0
     quantum: float = 0.0
-    instrument: str = ""
 
     @property
     def xyz(self) -> Array:
@@ -85,11 +67,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
 
     Raises ReductionError with everything that is wrong with setup or record.
     """
-    problems = refusals.site(setup.latitude, setup.gravity) + refusals.scale_factor(setup.k)
-    try:
-        frames.check_rotation(setup.attitude, "attitude")
-    except ValueError as error:
-        problems.append(str(error))
+    problems = frames.latitude_problems(setup.latitude) + frames.gravity_problems(setup.gravity)
+    problems += scale_factor_problems(setup.k) + frames.rotation_problems({"attitude": setup.attitude})
     still = np.zeros(len(windows.get("mean", ())))
     problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **windows})
     if not problems and still.size < LEAST:
@@ -121,10 +100,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
         conventions=_conventions(setup),
         effects=_effects(setup, found, i),
-        specification=setup.specification,
-        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
-        instrument=setup.instrument,
-        simulated=setup.truth is not None,
+        **setup.reported(),
         closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
         tables=[_table(setup, i, t0, t1, book)],
     )  # fmt: skip
@@ -190,24 +166,14 @@ def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, A
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
-    """The setup that a run.json describes."""
-    options, parameters = run.options, run.parameters
-    site = run_metadata.Site.of(run)
-    try:
-        attitude = parse(str(options.get("attitude", "")), site.latitude)
-    except ValueError as error:
-        raise ReductionError(str(error)) from None
-    return Setup(
-        latitude=site.latitude,
-        gravity=site.gravity,
-        earth_rate=site.earth_rate,
-        attitude=attitude,
+    """Return the setup that a run.json describes."""
+    return Setup.of(
+        run,
+        specification,
+        attitude=attitude_of(run),
         k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
         truth=run_metadata.truth_of(run, drift.NAMES),
-        specification=specification,
-        quantum=float(parameters.get("rebalance.resolution", 0.0)),
-        instrument=run.instrument,
-        **run_metadata.sizes(run.options, ("u_attitude", "u_latitude", "u_scale_factor", "u_current")),
+        quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
     )
 
 

@@ -27,20 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.attitudes import parse
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Group,
-    Quantity,
-    ReductionError,
-    fit,
-    linear_result,
-    plus_minus,
-)
-from gyrobench.reduction.window_checks import window_problems
+from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
+from gyrobench.reduction.setups import SiteSetup, attitude_of
+from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import refusals
@@ -53,30 +46,21 @@ ARCSEC = units.factor("arcsec")
 LEAST = 9  # readings
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Where and how the record was taken; SI throughout.
-
-    attitude: rows I, O, S in (E, N, U) at table angle 0; the table turns about I.  float_gain: H/C.  wait: time between
-    a step of the case and the reading after it, s; None: the step takes no time.  reach: case angle at which the
-    pickoff saturates, rad (None: unknown).  truth: coefficients of the simulated gyro, rad/s per g0^n.  u_*: standard
-    uncertainties of type B.  specification: name -> limits in the printed unit.
+@dataclass(frozen=True, kw_only=True)
+class Setup(SiteSetup):
+    """attitude: rows I, O, S in (E, N, U) at table angle 0; the table turns about I.  float_gain: H/C.  wait: time
+    between a step of the case and the reading after it, s; None: the step takes no time.  reach: case angle at which
+    the pickoff saturates, rad (None: unknown).
     """
 
-    latitude: float
-    gravity: float
     attitude: Array = field(default_factory=lambda: np.eye(3))
-    earth_rate: float = frames.EARTH_RATE
     float_gain: float = 1.0
     wait: float | None = None
     reach: float | None = None
-    truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
     u_attitude: float = 0.0
     u_latitude: float = 0.0
     u_angle: float = 0.0
     u_float_gain: float = 0.0
-    instrument: str = ""
 
     def earth(self, axis: int = 0) -> float:
         """Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
@@ -141,11 +125,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
 
     Raises ReductionError with everything that is wrong with setup or record.
     """
-    problems = refusals.site(setup.latitude, setup.gravity)
-    try:
-        frames.check_rotation(setup.attitude, "attitude")
-    except ValueError as error:
-        problems.append(str(error))
+    problems = frames.latitude_problems(setup.latitude) + frames.gravity_problems(setup.gravity)
+    problems += frames.rotation_problems({"attitude": setup.attitude})
     problems += window_problems({"phase": np.zeros(len(windows.get("mean", ()))), **windows})
     if not problems and len(windows["mean"]) < LEAST:
         problems.append(f"{len(windows['mean'])} readings: at least {LEAST} are needed to estimate the noise")
@@ -190,10 +171,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
             "Valid only while the pickoff is inside its range; flagged (saturated) readings are refused.",
         ],
         effects=_effects(setup, found, t, coupled),
-        specification=setup.specification,
-        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
-        instrument=setup.instrument,
-        simulated=setup.truth is not None,
+        **setup.reported(),
         closed_caption="Least squares under the noise model; closed: angle between first and last null over the time",
         tables=[_table(setup, G, used, null, t, book)],
         warnings=_warnings(setup, theta, used),
@@ -263,22 +241,13 @@ def _float_gain(run: RunDocument) -> float:
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record with its run.json as provenance."""
     run = record.run
-    site = run_metadata.Site.of(run)
-    try:
-        attitude = parse(str(run.options.get("attitude", "")), site.latitude)
-    except ValueError as error:
-        raise ReductionError(str(error)) from None
-    setup = Setup(
-        latitude=site.latitude,
-        gravity=site.gravity,
-        earth_rate=site.earth_rate,
-        attitude=attitude,
+    setup = Setup.of(
+        run,
+        specification,
+        attitude=attitude_of(run),
         float_gain=_float_gain(run),
         wait=None if run.measured else next((row.settle for row in run.plan), None),
         reach=refusals.case_range(run.parameters),
         truth=run_metadata.truth_of(run, drift.NAMES),
-        specification=specification,
-        instrument=run.instrument,
-        **run_metadata.sizes(run.options, ("u_attitude", "u_latitude", "u_angle", "u_float_gain")),
     )
     return run_metadata.finish(reduce(record.windows, setup), record)

@@ -27,15 +27,9 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.setups import Setup
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
@@ -50,19 +44,16 @@ TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is 
 
 
 @dataclass(frozen=True)
-class PickoffSetup:
-    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_*: relative
-    standard uncertainties.
+class PickoffSetup(Setup):
+    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_*: relative.
+    site: as the report shows it.
     """
 
     gain: float
     drift: float
-    truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
     u_gain: float = 0.0
     u_angle: float = 0.0
     u_voltage: float = 0.0
-    instrument: str = ""
     site: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -213,15 +204,13 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Pi
             truth["drift"] = float(sum(r * v for r, v in zip(row, static.values(), strict=True)))
     if not gain:
         raise ReductionError("gain H/C unknown: the gyro has no parameters H and C; give the option gain")
-    measured = run.measured
-    return PickoffSetup(
+    return PickoffSetup.of(
+        run,
+        specification,
         gain=gain,
         drift=float(options["drift"]),
         truth=truth,
-        specification=specification,
-        instrument=run.instrument,
-        site={} if measured else site.shown(),
-        **run_metadata.sizes(run.options, ("u_gain", "u_angle", "u_voltage")),
+        site={} if run.measured else site.shown(),
     )
 
 

@@ -24,7 +24,9 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.fit_result import Findings, Group, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, fit
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
 from . import closed, refusals
@@ -44,21 +46,12 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
     if route != "dwells" or len({n for n in labels.values() if n in POLAR}) == 1:
         labels = {p: n for p, n in labels.items() if n in POLAR or n not in SERVO_ATTITUDES}
-    wrong = refusals.latitude_problems(site.latitude)
-    wrong += [f"phase {p}: attitude '{n}' unknown; there are {', '.join(SERVO_ATTITUDES)}" for p, n in labels.items()
-              if n not in SERVO_ATTITUDES]  # fmt: skip
-    wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
-    if wrong:
+    if wrong := refusals.latitude_problems(site.latitude):
         raise ReductionError(wrong)
-    every = np.asarray(windows["phase"]).astype(int)
-    mine = np.isin(every, list(labels))
-    phase = every[mine]
-    start, end, t0, t1 = (
-        np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
-    )
-    wrong = refusals.record_problems(start, end, phase, labels)
+    held, phase, rows = servo_regression.held_windows(windows, labels, SERVO_ATTITUDES, site.latitude)
+    wrong = refusals.record_problems(held, phase, labels)
     limit = float(options.get("tracking", servo_regression.TRACKING))
-    wrong += servo_regression.tracking_problems(windows, np.isin(every, list(labels)), run.parameters, limit)
+    wrong += servo_regression.tracking_problems(windows, rows, run.parameters, limit)
     mounts = [n for n in labels.values() if n in POLAR]
     dwells = {n for n in labels.values() if n not in POLAR}
     if route == "dwells" and len(set(mounts)) > 1 and dwells != {"x east, y up", "x east, y down"}:
@@ -70,8 +63,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         wrong.append(f"no polar mount in the record; phases are {', '.join(labels.values())}")
     if wrong:
         raise ReductionError(wrong)
-    axes = np.array([on_servo_table(labels[p], site.latitude) for p in phase.tolist()])
-    held = servo_regression.Held(start, end, t0, t1, axes)
+    start, end, t0, t1 = held.angle_start, held.angle_end, held.t_start, held.t_end
     model = Model.of(route, mounts, which)
     y, X = servo_regression.drift_rate(held, site), model.columns(held, site)
     groups = {n: np.isin(phase, [p for p, m in labels.items() if m == n]) for n in labels.values()}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, units
+from gyrobench import drift, frames, units
 from gyrobench.attitudes import POLAR, on_servo_table
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
@@ -40,8 +40,8 @@ def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: f
 
 def latitude_problems(latitude: float) -> list[str]:
     """Below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
-    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
-        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+    if problems := frames.latitude_problems(latitude):
+        return problems
     if 10.0 <= abs(math.degrees(latitude)) <= 80.0:
         return []
     names = drift.terms(8)
@@ -100,16 +100,14 @@ def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
     return found
 
 
-def record_problems(
-    angle_start: Array, angle_end: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
-) -> list[str]:
+def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
     """Less than a turn, or too few windows, in a polar mount."""
     found = []
     for p, label in labels.items():
         mine = phase == p
         if label not in POLAR or not mine.any():
             continue
-        turned = math.degrees(abs(float(angle_end[mine][-1] - angle_start[mine][0])))
+        turned = math.degrees(abs(float(held.angle_end[mine][-1] - held.angle_start[mine][0])))
         if turned < 356.0:
             found.append(f"phase {p} ({label}) turned {turned:.4g}°: a whole turn is needed, some 24 h")
         if np.count_nonzero(mine) < 8:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.fit_result import Effect, Findings
+from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.run_metadata import Site
 
 from .windows import Track

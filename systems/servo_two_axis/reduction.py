@@ -24,16 +24,10 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.fit_result import (
-    Findings,
-    Group,
-    Quantity,
-    ReductionError,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.merge_channels import merge
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
 from . import budget, closed, geometry, refusals
@@ -263,18 +257,9 @@ def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
 
 
 def _equation(c: str, names: tuple[str, ...]) -> str:
-    parts = []
-    for n in names:
-        axes = n.split("_")[1]
-        if axes == "0":
-            parts.append(f'D_"{c}0"')
-            continue
-        upper = axes.upper()
-        power = f"{upper[0]}^2" if len(axes) == 2 and axes[0] == axes[1] else " ".join(upper)
-        parts.append(f'D_"{c},{axes}" {power}')
     left = (
         "dot(x) cos y + omega_X cos y + omega_Y sin x sin y - omega_Z cos x sin y"
         if c == "x"
         else "dot(y) + omega_Y cos x + omega_Z sin x"
     )
-    return f'{left} = omega_"d{c}" \\ omega_"d{c}" = {" + ".join(parts)}'
+    return f'{left} = omega_"d{c}" \\ omega_"d{c}" = {drift.typst_2dof(c, names)}'

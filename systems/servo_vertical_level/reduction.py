@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.attitudes import SERVO_ATTITUDES, on_servo_table
+from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
-from gyrobench.reduction.estimation.fit_result import Group, Quantity, ReductionError, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
+from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
 from . import closed, refusals
@@ -39,25 +41,13 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     options = dict(run.options)
     site = run_metadata.Site.of(run)
     labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
-    wrong = [f"phase {p}: attitude '{n}' unknown; there are {'; '.join(SERVO_ATTITUDES)}" for p, n in labels.items()
-             if n not in SERVO_ATTITUDES or n.startswith("polar")]  # fmt: skip
-    wrong = wrong or servo_regression.window_problems(windows, {p: {"label": n} for p, n in labels.items()})
-    if wrong:
-        raise ReductionError(wrong)
-    every = np.asarray(windows["phase"]).astype(int)
-    mine = np.isin(every, list(labels))
-    phase = every[mine]
-    start, end, t0, t1 = (
-        np.asarray(windows[c], dtype=float)[mine] for c in ("angle_start", "angle_end", "t_start", "t_end")
-    )
+    held, phase, rows = servo_regression.held_windows(windows, labels, (*VERTICAL, *LEVEL), site.latitude)
+    t0, t1 = held.t_start, held.t_end
     limit = float(options.get("tracking", servo_regression.TRACKING))
-    wrong = refusals.record_problems(start, end, phase, labels)
-    wrong += servo_regression.tracking_problems(windows, mine, run.parameters, limit)
+    wrong = refusals.record_problems(held, phase, labels)
+    wrong += servo_regression.tracking_problems(windows, rows, run.parameters, limit)
     if wrong:
         raise ReductionError(wrong)
-    held = servo_regression.Held(
-        start, end, t0, t1, np.array([on_servo_table(labels[p], site.latitude) for p in phase.tolist()])
-    )
     seen = refusals.seen(list(labels.values()))
 
     def columns(h: servo_regression.Held) -> Array:
@@ -82,7 +72,11 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     ]
     warnings = refusals.unseen(list(labels.values()))
     both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
-    worst = float(np.max(np.abs(np.concatenate([start, end])[np.tile(_level(labels, phase), 2)]), initial=0.0))
+    worst = float(
+        np.max(
+            np.abs(np.concatenate([held.angle_start, held.angle_end])[np.tile(_level(labels, phase), 2)]), initial=0.0
+        )
+    )
     if both and worst > 0.0:
         size = max(abs((truth or {})[n]) for n in both) * worst / DPH
         warnings.append(f"Of {', '.join(both)} angles up to {np.degrees(worst):.2g}° let {size:.1g} °/h in.")

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift
-from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP
+from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP, VERTICAL
+from gyrobench.reduction.drift import servo_regression
 
 Array = NDArray[np.float64]
 LIMIT = math.radians(1.0)  # of the angle in a level attitude
@@ -87,9 +88,9 @@ def unseen(attitudes: Sequence[str]) -> list[str]:
 
 def option_problems(attitudes: Sequence[str], earth: Mapping[str, float], time: float) -> list[str]:
     """What is wrong with attitudes and times.  earth: rate along the input axis of the level attitudes, rad/s."""
-    unknown = [n for n in attitudes if n not in SERVO_ATTITUDES or n.startswith("polar")]
+    known = (*VERTICAL, *LEVEL)
+    unknown = [n for n in attitudes if n not in known]
     if unknown or not attitudes:
-        known = [n for n in SERVO_ATTITUDES if not n.startswith("polar")]
         return [f"attitude {', '.join(unknown) or 'none'}: there are {'; '.join(known)}"]
     found = []
     for name, rate in earth.items():
@@ -102,16 +103,14 @@ def option_problems(attitudes: Sequence[str], earth: Mapping[str, float], time: 
     return found
 
 
-def record_problems(
-    angle_start: Array, angle_end: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
-) -> list[str]:
+def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
     """Level attitudes beyond 1 degree."""
     found = []
     for p, label in labels.items():
         mine = phase == p
         if label not in LEVEL or not mine.any():
             continue
-        worst = float(np.max(np.abs(np.concatenate([angle_start[mine], angle_end[mine]]))))
+        worst = float(np.max(np.abs(np.concatenate([held.angle_start[mine], held.angle_end[mine]]))))
         if worst > LIMIT * 1.001:
             found.append(
                 f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import window_regressors
-from gyrobench.reduction.estimation.fit_result import Effect, Findings
+from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.linear_fit import Findings
 
 from .setup import TumbleSetup
 
@@ -66,11 +67,7 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
         return found.change(-setup.k * di)
 
     def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
-        cases = []
-        for wave in (np.sin, np.cos):
-            start, end = (a + SMALL * wave(n * a) for a in (turning.angle_start, turning.angle_end))
-            cases.append(geometry(setup.base, replace(turning, angle_start=start, angle_end=end)))
-        return np.array(cases)
+        return np.array([geometry(setup.base, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
 
     full = float(np.max(np.abs(current))) or 1.0
     one = np.ones_like(current)

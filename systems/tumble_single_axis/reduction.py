@@ -24,7 +24,8 @@ from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise_mixture_fit, regression
-from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
@@ -101,10 +102,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         equation=_equation(names),
         conventions=_conventions(setup),
         effects=effects,
-        specification=setup.specification,
-        site=run_metadata.Site(setup.latitude, setup.gravity, setup.earth_rate).shown(),
-        instrument=setup.instrument,
-        simulated=setup.truth is not None,
+        **setup.reported(),
         no_closed=why,
         closed_caption="From the same windows; the formulas weigh all windows alike, D_F and D_O rest on the dwells",
         tables=turns.table("θ = −angle"),
@@ -198,12 +196,8 @@ def _equation(names: tuple[str, ...]) -> str:
 
 
 def _conventions(s: TumbleSetup) -> list[str]:
-    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     return [
-        "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-        "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 "
-        "= 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
-        f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        *s.sign_conventions(s.k),
         "Gyro axes I, O, S right-handed; local frame east, north, up; table angle right-handed about the pole, so that "
         "turning against the Earth is negative; the θ of Hu 1981 is minus the table angle.",
         *([] if s.terms in (9, 10) else [f"{s.terms}-term model: the terms left out are taken as zero."]),

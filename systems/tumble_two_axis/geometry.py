@@ -77,9 +77,8 @@ def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[s
 
 def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
     """Why these positions cannot give nine coefficients, as sentences."""
-    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
-        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
-    found = []
+    if found := frames.latitude_problems(latitude):
+        return found
     if min(m, n) < 1:
         return [f"ratio {m}:{n}: both numbers must be at least 1"]
     if math.gcd(m, n) != 1:

@@ -24,15 +24,9 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
@@ -47,37 +41,20 @@ COLUMNS = ("phase", "t_start", "t_end", *ANGLES, "mean")
 STILL = 1e-4  # rad that a table may move while the current is averaged (20 arcsec: encoders jitter)
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
-SIZES = ("u_axis", "u_square", "u_mount", "u_scale_factor", "u_nonlinearity", "u_current")
 
 
-@dataclass(frozen=True)
-class TwoAxisSetup:
-    """Where and how the record was taken; SI.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
-
-    k: torquer scale factor, rad/s/A.  truth: simulated coefficients, rad/s per g0^n.  fold: D_OO may be there and is
-    folded into others.  u_*: standard uncertainties of type B.  quantum: resolution of the current reading.  polarity:
-    "project" k i = omega_IA - omega_d, or "book" k i = omega_d - omega_IA.
+@dataclass(frozen=True, kw_only=True)
+class TwoAxisSetup(RebalanceSetup):
+    """k: torquer scale factor, rad/s/A.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
+    quantum: resolution of the current reading.
     """
 
-    latitude: float
-    gravity: float
     k: float
     m: int = 5
     n: int = 1
-    earth_rate: float = frames.EARTH_RATE
     harmonic: bool = False
-    fold: bool = False
-    truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
-    u_axis: float = 0.0
-    u_square: float = 0.0
-    u_mount: float = 0.0
-    u_scale_factor: float = 0.0
-    u_nonlinearity: float = 0.0
-    u_current: float = 0.0
     quantum: float = 0.0
-    polarity: str = "project"
-    instrument: str = ""
+    u_square: float = 0.0
 
 
 def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
@@ -136,10 +113,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         'D_"OS" Y Z + D_"IS" X Z',
         conventions=_conventions(s),
         effects=_effects(s, found, outer, inner, C, current),
-        specification=s.specification,
-        site=run_metadata.Site(s.latitude, s.gravity, s.earth_rate).shown(),
-        instrument=s.instrument,
-        simulated=s.truth is not None,
+        **s.reported(),
         no_closed="; ".join(why),
         closed_caption="From the means of the positions; the harmonic route fits 25 amplitudes where nine would do",
         tables=ties,
@@ -157,25 +131,10 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
 
 
 def _setup_problems(s: TwoAxisSetup) -> list[str]:
-    found = []
-    if not math.isfinite(s.latitude) or abs(s.latitude) > math.pi / 2:
-        found.append(f"latitude {math.degrees(s.latitude):.6g}° lies outside −90..90°")
-    elif abs(math.degrees(s.latitude)) > 85.0:
-        found += geometry.refusals(s.latitude, 5, 1, 36)
-    if not 9.7 <= s.gravity <= 9.9:
-        found.append(f"gravity {s.gravity:.6g} m/s² lies outside 9.7..9.9 m/s²")
-    if not (math.isfinite(s.k) and s.k > 0.0):
-        found.append(f"scale factor k = {s.k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'")
-    if s.polarity not in ("project", "book"):
-        found.append(
-            f"polarity '{s.polarity}' unknown; there are 'project' (k i = ω_IA − ω_d) and 'book' (k i = ω_d − ω_IA)"
-        )
-    if s.truth and s.truth.get("D_OO", 0.0) != 0.0 and not s.fold:
-        found.append(
-            f"D_OO = {s.truth['D_OO'] / DPH:g} °/h/g² is simulated, but at constant |g| it cannot be told from D_F, "
-            "D_II and D_SS; set fold to accept the combinations D_F + γ² D_OO, D_II − D_OO, D_SS − D_OO"
-        )
-    return found
+    problems = frames.latitude_problems(s.latitude)
+    if not problems and abs(math.degrees(s.latitude)) > 85.0:
+        problems = geometry.refusals(s.latitude, 5, 1, 36)
+    return problems + s.problems() + scale_factor_problems(s.k)
 
 
 def _position_problems(w: Mapping[str, Array]) -> list[str]:
@@ -333,12 +292,8 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
 
 
 def _conventions(s: TwoAxisSetup) -> list[str]:
-    sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     return [
-        "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-        "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 "
-        "= 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
-        f"Torquer current: {sign}; k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        *s.sign_conventions(s.k),
         "Gyro axes I, O, S right-handed; local frame east, north, up; table angles right-handed, outer axis along the "
         f"pole: outer angle {s.m} θ, inner angle {s.n} θ.",
         *([] if s.fold else ["D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."]),
@@ -346,24 +301,16 @@ def _conventions(s: TwoAxisSetup) -> list[str]:
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> TwoAxisSetup:
-    """The setup a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
-    options, parameters = run.options, run.parameters
-    site = run_metadata.Site.of(run)
-    return TwoAxisSetup(
-        latitude=site.latitude,
-        gravity=site.gravity,
+    """Return the setup a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
+    return TwoAxisSetup.of(
+        run,
+        specification,
         k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
-        m=int(options.get("m", 5)),
-        n=int(options.get("n", 1)),
-        earth_rate=site.earth_rate,
-        harmonic=bool(options.get("harmonic", False)),
-        fold=bool(options.get("fold", False)),
+        m=int(run.options.get("m", 5)),
+        n=int(run.options.get("n", 1)),
+        harmonic=bool(run.options.get("harmonic", False)),
         truth=run_metadata.truth_of(run, drift.NAMES),
-        specification=specification,
-        quantum=float(parameters.get("rebalance.resolution", 0.0)),
-        polarity=run.polarity or "project",
-        instrument=run.instrument,
-        **run_metadata.sizes(run.options, SIZES),
+        quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
     )
 
 

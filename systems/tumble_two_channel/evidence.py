@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.fit_result import Effect, Findings, Group
+from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.linear_fit import Findings, Group
 
 from . import geometry
 from .setup import OTHER, TwoChannelSetup, design
@@ -90,11 +91,7 @@ def effects(
         return geometric(s.base, replace(turning, face=frames.rotation(direction, SMALL) @ turning.face))
 
     def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
-        cases = []
-        for wave in (np.sin, np.cos):
-            start, end = (a + SMALL * wave(n * a) for a in (turning.angle_start, turning.angle_end))
-            cases.append(geometric(s.base, replace(turning, angle_start=start, angle_end=end)))
-        return np.array(cases)
+        return np.array([geometric(s.base, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
 
     k, full = s.k[OTHER[c]], float(np.max(np.abs(current))) or 1.0
     quantum = s.quantum.get(OTHER[c], 0.0)

@@ -28,8 +28,10 @@ TILT = {"x": "ε_xz", "y": "ε_yz"}  # tilt of a measuring axis towards the spin
 AXIS = {"x": 0, "y": 1}
 #: of the simple model, in the order of the R, u, u_z, Q of Hu 1981
 SIMPLE = {"x": ("Dx_0", "Dx_x", "Dx_z", "Dx_xz"), "y": ("Dy_0", "Dy_y", "Dy_z", "Dy_yz")}
-#: the square that cannot be told from the others at constant |g|: channel -> it and the three that take it up
-FOLD = {"x": ("Dx_yy", ("Dx_0", "Dx_xx", "Dx_zz")), "y": ("Dy_xx", ("Dy_0", "Dy_yy", "Dy_zz"))}
+
+
+#: channel -> the square that cannot be told from the others at constant |g|, and the three that take it up
+FOLD = {channel: (square, drift.FOLDED[square]) for channel, square in (("x", "Dx_yy"), ("y", "Dy_xx"))}
 
 
 def terms(model: str, channel: str) -> tuple[str, ...]:
@@ -64,8 +66,8 @@ def refusals(latitude: float, model: str) -> list[str]:
     """Why a test at ``latitude`` (rad) cannot give the coefficients of ``model``, as sentences; [TUM2B-SING]."""
     if model not in MODELS:
         return [f"model = {model}: no such model; there are {' and '.join(MODELS)}"]
-    if not math.isfinite(latitude) or abs(latitude) > math.pi / 2:
-        return [f"latitude {math.degrees(latitude):.6g}° lies outside −90..90°"]
+    if problems := frames.latitude_problems(latitude):
+        return problems
     if 10.0 <= round(abs(math.degrees(latitude)), 9) <= 80.0:
         return []
     lost, seen = [], []

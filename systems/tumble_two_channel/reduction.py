@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import frames, units
+from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
-from gyrobench.reduction.estimation.fit_result import Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
+from gyrobench.reduction.estimation.linear_fit import Quantity, fit
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -115,10 +116,7 @@ def _channel(
         equation=_equation(c, names),
         conventions=_conventions(s),
         effects=evidence.effects(s, c, found, turning, current),
-        specification=s.specification,
-        site=run_metadata.Site(s.latitude, s.gravity, s.earth_rate).shown(),
-        instrument=s.instrument,
-        simulated=s.truth is not None,
+        **s.reported(),
         no_closed=why,
         closed_caption="From the same windows; the formulas weigh all windows of a mount alike",
         tables=[*turns.table("θ = −angle"), *left_out],
@@ -201,20 +199,10 @@ def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, 
 
 
 def _equation(c: str, names: tuple[str, ...]) -> str:
-    parts = []
-    for n in names:
-        if n == geometry.TILT[c]:
-            continue
-        axes = n.split("_")[1]
-        if axes == "0":
-            parts.append(f'D_"{c}0"')
-            continue
-        upper = axes.upper()
-        power = f"{upper[0]}^2" if len(axes) == 2 and axes[0] == axes[1] else " ".join(upper)
-        parts.append(f'D_"{c},{axes}" {power}')
+    terms = drift.typst_2dof(c, (n for n in names if n != geometry.TILT[c]))
     left = f"omega_{c} - k_{OTHER[c]} i_{OTHER[c]}"
     tilt = f' = omega_"d{c}" - epsilon_"{c}z" omega_z, quad' if geometry.TILT[c] in names else " ="
-    return f'{left}{tilt} omega_"d{c}" = {" + ".join(parts)}'
+    return f'{left}{tilt} omega_"d{c}" = {terms}'
 
 
 def _conventions(s: TwoChannelSetup) -> list[str]:

@@ -32,7 +32,7 @@ RUNS: list[tuple[list[str], list[str]]] = [
     (["gyro.terms=7"], ["gyro.terms = 7", "3, 4, 5, 8, 9, 10"]),
     (["terms=6"], ["terms = 6", "3, 4, 5, 8 and 9"]),
     (["terms=10"], ["terms = 10: must be <= 9"]),
-    (["gyro.D_OO=0.1deg/h/g2", "gyro.terms=10"], ["gyro.D_OO = 0.1 deg/h/g2", "fold=true", "D_F + γ² D_OO"]),
+    (["gyro.D_OO=0.1deg/h/g2", "gyro.terms=10"], ["gyro.D_OO = 0.1 °/h/g²", "fold=true", "D_F + γ² D_OO"]),
     (["latitude=45m"], ["latitude: '45m'", "units that fit: rad"]),
     (["latitude=45.75"], ["latitude = 45.75: must be <= 1.5708 rad"]),
     (["rate=10deg"], ["rate: '10deg'", "units that fit: rad/s, deg/h, deg/s, ERU"]),

@@ -150,7 +150,7 @@ REFUSED: list[tuple[list[str], list[str]]] = [
     (["harmonic=true", "positions=24"], ["24 positions", "at least 25"]),
     (["harmonic=true", "latitude=1deg"], ["divide by sin φ"]),
     (["inner_rate=0.1"], ["inner axis is the input axis", "k i_max = 0.004169"]),
-    (["gyro.D_OO=0.1deg/h/g2", "gyro.terms=10"], ["gyro.D_OO = 0.1 deg/h/g2", "fold=true"]),
+    (["gyro.D_OO=0.1deg/h/g2", "gyro.terms=10"], ["gyro.D_OO = 0.1 °/h/g²", "fold=true"]),
     (["gyro.mount[1,1]=0.999"], ["gyro.mount", "not orthonormal"]),
     (["table.base[1,1]=0.5"], ["table.base", "not orthonormal"]),
 ]

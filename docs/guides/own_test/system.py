@@ -36,4 +36,5 @@ class SixPosition(RebalanceTest):
         scale = Effect("torquer scale factor", run.options["u_scale_factor"], "1", found.change(-k * w["mean"]))
         return linear_result(found, system=self.name, title=self.title, method="Least squares over six positions",
                              sources=[], equation='omega_d = omega_"IA" - k i', conventions=["k i = ω_IA − ω_d"],
-                             effects=[scale], specification=specification, site=site.shown())  # fmt: skip
+                             effects=[scale], specification=specification, site=site.shown(),
+                             instrument=run.instrument)  # fmt: skip

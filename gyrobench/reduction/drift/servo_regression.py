@@ -13,7 +13,7 @@ rate along y and z at angle 0; 5e-7 deg/h at most, nothing with the table axis a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation.fit_result import Effect, Findings
 from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
@@ -65,6 +67,26 @@ class Held:
         x, y, z = (v[:, k, None] for k in range(3))
         out: Array = np.stack([np.broadcast_to(x, a.shape), c * y + s * z, c * z - s * y], axis=-1)
         return out if self.body is None else np.asarray(out @ self.body.T)
+
+
+def held_windows(
+    windows: Mapping[str, Array], labels: Mapping[int, str], known: Collection[str], latitude: float
+) -> tuple[Held, NDArray[np.int_], NDArray[np.bool_]]:
+    """Return the windows of the phases in ``labels`` (phase -> attitude), their phase numbers, and their rows.
+
+    Raises ReductionError for an attitude that is not one of ``known``, and for windows that cannot be read.
+    """
+    there = "; ".join(known)
+    wrong = [f"phase {p}: attitude '{n}' unknown; there are {there}" for p, n in labels.items() if n not in known]
+    if wrong := wrong or window_problems(windows, {p: {"label": n} for p, n in labels.items()}):
+        raise ReductionError(wrong)
+    every = np.asarray(windows["phase"]).astype(int)
+    rows = np.isin(every, list(labels))
+    phase = every[rows]
+    axes = np.array([on_servo_table(labels[p], latitude) for p in phase.tolist()])
+    columns = (np.asarray(windows[c], dtype=float)[rows] for c in ("angle_start", "angle_end", "t_start", "t_end"))
+    start, end, t0, t1 = columns
+    return Held(start, end, t0, t1, axes), phase, rows
 
 
 def drift_rate(held: Held, site: Site) -> Array:

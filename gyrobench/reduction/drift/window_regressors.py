@@ -8,7 +8,7 @@ regressors are averaged like the data.  Not modelled: change of the table rate i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -38,6 +38,15 @@ class Turning:
         middle = (self.angle_end + self.angle_start) / 2.0
         out: Array = middle[:, None] + half[:, None] * _NODES
         return out
+
+
+def misread(turning: Turning, n: int, size: float) -> list[Turning]:
+    """Return the windows of an encoder that reads too much by ``size`` (rad) times sin n theta, and cos n theta."""
+    cases = []
+    for wave in (np.sin, np.cos):
+        start, end = (a + size * wave(n * a) for a in (turning.angle_start, turning.angle_end))
+        cases.append(replace(turning, angle_start=start, angle_end=end))
+    return cases
 
 
 def average(values: Array) -> Array:

@@ -1,0 +1,215 @@
+"""Where and how a record was taken: what the reductions of several tests must know beside its windows.
+
+@dataclass(frozen=True)
+class TwoAxisSetup(RebalanceSetup):
+    k: float
+    m: int = 5
+setup = TwoAxisSetup.of(record.run, specification, k=..., m=...)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames
+from gyrobench.attitudes import parse
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.run_metadata import Site, phases, sizes
+from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Specification
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """truth: simulated values, SI (of coefficients rad/s per g0^n).  specification: name -> limits in the printed unit.
+
+    u_* of all setups: standard uncertainties of type B, SI, the options of the same names.
+    """
+
+    truth: Mapping[str, float] | None = None
+    specification: Specification | None = None
+    instrument: str = ""
+
+    @classmethod
+    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+        """Return the setup that a run.json describes; ``own``: the fields that are the test's own."""
+        sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
+        return cls(**{"specification": specification, "instrument": run.instrument, **sources, **own})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SiteSetup(Setup):
+    """A test at a site: latitude rad, gravity m/s2, earth_rate rad/s."""
+
+    latitude: float
+    gravity: float
+    earth_rate: float = frames.EARTH_RATE
+
+    @classmethod
+    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+        site = Site.of(run)
+        place = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
+        return super().of(run, specification, **{**place, **own})
+
+    @property
+    def site(self) -> Site:
+        return Site(self.latitude, self.gravity, self.earth_rate)
+
+    def reported(self) -> dict[str, Any]:
+        """Return what linear_result() is told of every test at a site."""
+        return {
+            "specification": self.specification,
+            "site": self.site.shown(),
+            "instrument": self.instrument,
+            "simulated": self.truth is not None,
+        }
+
+    @property
+    def gamma(self) -> float:
+        """Gravity in multiples of g0."""
+        return self.gravity / frames.G0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RebalanceSetup(SiteSetup):
+    """A gyro in torque rebalance under gravity of one size.
+
+    fold: squares that cannot be told apart may be there and are folded into others.  polarity: "project" k i = omega_IA
+    - omega_d, or "book" k i = omega_d - omega_IA.  u_nonlinearity: relative, at the largest current of the record.
+    """
+
+    fold: bool = False
+    polarity: str = "project"
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_scale_factor: float = 0.0
+    u_nonlinearity: float = 0.0
+    u_current: float = 0.0
+
+    @classmethod
+    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+        found = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
+        return super().of(run, specification, **{**found, **own})
+
+    def problems(self, folding: bool = True) -> list[str]:
+        """Return what is wrong with gravity and polarity, and, with ``folding``, with squares that are simulated."""
+        problems = frames.gravity_problems(self.gravity)
+        if self.polarity not in ("project", "book"):
+            known = "'project' (k i = ω_IA − ω_d) and 'book' (k i = ω_d − ω_IA)"
+            problems.append(f"polarity '{self.polarity}' unknown; there are {known}")
+        return problems + (drift.fold_problems(self.truth or {}) if folding and not self.fold else [])
+
+    def sign_conventions(self, k: float) -> list[str]:
+        """Return how signs are meant, as sentences of a report; k: torquer scale factor, rad/s/A."""
+        book = "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
+        sign = "k i = ω_IA − ω_d" if self.polarity == "project" else book
+        return [
+            "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
+            "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); "
+            "g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
+            f"Torquer current: {sign}; k = {k * 1e-3 / drift.DPH:.6g} °/h/mA.",
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TumbleSetup(RebalanceSetup):
+    """A tumble on a table whose axis lies along the pole; matrices with rows = axes.
+
+    base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate" or
+    "dwell" (None: by the direction of the second gyro axis).  tilt: small angles of the gyro are estimated too.
+    """
+
+    faces: Mapping[int, Array]
+    base: Array = field(default_factory=lambda: np.empty((0, 0)))  # empty: table axis on the pole
+    labels: Mapping[int, str] = field(default_factory=dict)
+    modes: Mapping[int, str] | None = None
+    tilt: bool = False
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+
+    def __post_init__(self) -> None:
+        if np.size(self.base) == 0 and not frames.latitude_problems(self.latitude):
+            object.__setattr__(self, "base", frames.polar_base(self.latitude))
+
+    @classmethod
+    def of_plan(
+        cls, run: RunDocument, specification: Specification | None, faces: Mapping[str, Array], **own: Any
+    ) -> Self:
+        """Return the setup with the plan of run.json; faces: its mounts by name."""
+        plan = phases(run, faces)
+        found = {
+            "faces": {p: faces[row.face] for p, row in plan.items()},
+            "labels": {p: row.label for p, row in plan.items()},
+            "modes": {p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
+            "tilt": bool(run.options.get("tilt", False)),
+        }
+        return cls.of(run, specification, **found, **own)
+
+    def label(self, phase: int) -> str:
+        return self.labels.get(phase, f"phase {phase}")
+
+    def turns(self, phase: int) -> bool:
+        """True where the table turns: by ``modes``, or where the second gyro axis is nearer to its axis than to the
+        vertical.
+        """
+        if self.modes is not None and phase in self.modes:
+            return self.modes[phase] == "rate"
+        second = np.asarray(self.faces[phase])[1]
+        return bool(abs(second[2]) >= abs(second @ (np.asarray(self.base) @ frames.U)))
+
+    def problems(self, folding: bool = True) -> list[str]:
+        mounts = {f"mount of {self.label(p)}": face for p, face in self.faces.items()}
+        return super().problems(folding) + frames.rotation_problems({"table base": self.base, **mounts})
+
+    def sides(self, axis: int) -> set[float]:
+        """Return the senses (1, -1) in which a gyro axis lies along the axis of the turning table."""
+        return {float(np.sign(np.asarray(f)[axis, 2])) for p, f in self.faces.items() if self.turns(p)}
+
+    def dwells(self) -> dict[int, float]:
+        """Return the phases in which the table stands, with the sense (1 up, -1 down) of the second gyro axis."""
+        up = np.asarray(self.base) @ frames.U
+        return {p: float(np.sign(np.asarray(f)[1] @ up)) for p, f in self.faces.items() if not self.turns(p)}
+
+    def table_problems(self, windows: Mapping[str, Array]) -> list[str]:
+        """Missing phases, a table that stands still or turns where it should not, windows too wide."""
+        phase = np.asarray(windows["phase"]).astype(int)
+        there = set(phase.tolist())
+        found = [f"phase {p} ({self.label(p)}) is missing in the record" for p in self.faces if p not in there]
+        found += [f"phase {p} is in the record, but its mount is not given" for p in sorted(there - set(self.faces))]
+        width = np.abs(np.asarray(windows["angle_end"], dtype=float) - np.asarray(windows["angle_start"], dtype=float))
+        for p in self.faces:
+            most = float(np.max(width[phase == p], initial=0.0))
+            where = f"phase {p} ({self.label(p)}): "
+            if p not in there:
+                continue
+            if not self.turns(p):
+                if most > 1e-2:
+                    found.append(f"{where}the table turns by {math.degrees(most):.3g}° in a dwell")
+            elif most < 1e-3:
+                found.append(f"{where}the table angle does not move, expected a turning table (rate 0?)")
+            elif most > 2.0 * math.pi / 5.0 * 1.001:
+                found.append(f"{where}{2 * math.pi / most:.2g} windows a turn, at least 5 are needed for two harmonics")
+        return found
+
+
+def scale_factor_problems(k: float, name: str = "k") -> list[str]:
+    """What is wrong with the scale factor of a torquer, rad/s/A."""
+    if math.isfinite(k) and k > 0.0:
+        return []
+    return [f"scale factor {name} = {k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'"]
+
+
+def attitude_of(run: RunDocument) -> Array:
+    """Return the option attitude of a run as rows I, O, S in (E, N, U).  Raises ReductionError."""
+    try:
+        return parse(str(run.options.get("attitude", "")), Site.of(run).latitude)
+    except ValueError as error:
+        raise ReductionError(str(error)) from None
