@@ -53,6 +53,15 @@ def parse(text: str, latitude: float) -> Array:
     return frames.check_rotation(np.array(found), f"attitude '{text}'")
 
 
+def attitude_problems(text: str, latitude: float) -> list[str]:
+    """Return why a text is no attitude, as a sentence; empty where it is one."""
+    try:
+        parse(text, latitude)
+    except ValueError as error:
+        return [str(error)]
+    return []
+
+
 # ------------------------------------------------------------------------ a gyro that holds its table
 EAST, NORTH, UP, POLE, CROSS = 1, 2, 3, 4, 5  # E, N, U, P, Q as the part fixture counts them; minus: the opposite
 _LEVEL = {

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gyrobench import units
 from gyrobench.units import EARTH_RATE, G0
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "check_rotation",
     "earth_rate_local",
     "equatorial_base",
+    "equatorial_problems",
     "gravity_problems",
     "latitude_problems",
     "normal_gravity",
@@ -169,6 +171,15 @@ def equatorial_base(latitude: float) -> Array:
     """Return the base of a table with its axis east, first axis on the pole: its axis sees no Earth rate."""
     p = pole(latitude)
     return np.array([p, np.cross(E, p), E])
+
+
+def equatorial_problems(base: ArrayLike, latitude: float) -> list[str]:
+    """Return by how much a table axis sees Earth rate, where it is not at right angles to the pole (1 degree)."""
+    along = float(np.asarray(base)[2] @ pole(latitude))
+    if abs(along) <= math.radians(1.0):
+        return []
+    rate = along * EARTH_RATE / units.factor("deg/h")
+    return [f"table.base: the axis must be at right angles to the pole (1°); it sees {rate:.3g} °/h of Earth rate"]
 
 
 def tumble_faces(latitude: float) -> dict[str, Array]:

@@ -37,7 +37,7 @@ def _bound(value: float, unit: str) -> str:
 class Option:
     """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type.
 
-    sets: parameters of parts ("site.latitude") that the option owns: they take its value.
+    sets: parameters of parts that the option owns, which take its value: "site.latitude stand.latitude".
     """
 
     default: Any
@@ -45,7 +45,7 @@ class Option:
     doc: str = ""
     min: float | None = None
     max: float | None = None
-    sets: tuple[str, ...] = ()
+    sets: str = ""
 
     @property
     def kind(self) -> type:

@@ -23,7 +23,7 @@ def setup_errors(
     Assumed is the value that the option in whose ``sets`` a parameter stands gives it, and for those in
     ``system.assumed`` what system or part give it.
     """
-    owners = {name: key for key, option in system.options.items() for name in option.sets}
+    owners = {name: key for key, option in system.options.items() for name in option.sets.split()}
     owners |= {name: "" for name in system.assumed if name not in owners}
     bases = {_base(name) for name in owners}
     past = [name for name in system.overrides if _base(name) in bases]

@@ -16,6 +16,20 @@ from gyrobench.system.loop_sockets import LOOPS
 
 __all__ = ["SOCKETS", "Connector", "Shape", "Socket", "element_names", "socket"]
 
+TABLE = (
+    inp("f_local", "m/s2", "specific force at the site, ENU", 3),
+    inp("omega_local", "rad/s", "Earth rate at the site, ENU", 3),
+    inp("mode", "1", "0 hold, 1 index to the target angle, 2 turn at the target rate", whole=True),
+    inp("target", "", "angle (rad) or rate (rad/s), by mode"),
+    inp("face", "1", "rows: the gyro axes I, O, S in table axes", 3, 3),
+    out("angle", "rad", "table angle, cumulative"),
+    out("rate", "rad/s", "table rate relative to its base", optional=True),
+    out("angle_read", "rad", "table angle as the encoder reads it, cumulative"),
+    out("omega", "rad/s", "inertial rate in face axes", 3),
+    out("alpha", "rad/s2", "angular acceleration in face axes", 3, optional=True),
+    out("f", "m/s2", "specific force in face axes", 3),
+    out("in_position", "1", "1 when the target is reached", whole=True),
+)
 SOCKETS: dict[str, Socket] = {
     s.name: s
     for s in (
@@ -87,22 +101,44 @@ SOCKETS: dict[str, Socket] = {
                 out("saturated", "1", "1 while the current is limited", optional=True, whole=True),
             ),
         ),
+        Socket("Table", "turntable with one driven axis", TABLE),
         Socket(
-            "Table",
-            "turntable with one driven axis",
+            "ServoTable",
+            "turntable with one axis that nulls the pickoff of the gyro on it in mode 3",
             (
-                inp("f_local", "m/s2", "specific force at the site, ENU", 3),
-                inp("omega_local", "rad/s", "Earth rate at the site, ENU", 3),
-                inp("mode", "1", "0 hold, 1 index to the target angle, 2 turn at the target rate", whole=True),
-                inp("target", "", "angle (rad) or rate (rad/s), by mode"),
-                inp("face", "1", "rows: the gyro axes I, O, S in table axes", 3, 3),
-                out("angle", "rad", "table angle, cumulative"),
-                out("rate", "rad/s", "table rate relative to its base", optional=True),
-                out("angle_read", "rad", "table angle as the encoder reads it, cumulative"),
-                out("omega", "rad/s", "inertial rate in face axes", 3),
-                out("alpha", "rad/s2", "angular acceleration in face axes", 3, optional=True),
-                out("f", "m/s2", "specific force in face axes", 3),
-                out("in_position", "1", "1 when the target is reached", whole=True),
+                *TABLE,
+                inp("u", "V", "pickoff voltage of the gyro"),
+                out("saturated", "1", "1 while the motor is at its limit", optional=True, whole=True),
+            ),
+        ),
+        Socket(
+            "Stand",
+            "turns what the site says into the axes of the attitude of a phase",
+            (
+                inp("mount", "1", "number of the phase", whole=True),
+                inp("f_face", "m/s2", "specific force, ENU", 3),
+                inp("omega_face", "rad/s", "Earth rate, ENU", 3),
+                out("f", "m/s2", "specific force, attitude axes", 3),
+                out("omega", "rad/s", "Earth rate, attitude axes", 3),
+            ),
+        ),
+        Socket(
+            "Cage",
+            "holds the float by the torquer outside servo mode",
+            (
+                inp("u", "V", "pickoff voltage"),
+                inp("mode", "1", "mode of the table", whole=True),
+                out("i", "A", "torquer current"),
+            ),
+        ),
+        Socket(
+            "CurrentSource",
+            "current through the torquer while the gyro holds the table",
+            (
+                inp("command", "", "current wanted in servo mode, A"),
+                inp("mode", "1", "mode of the table", whole=True),
+                out("i", "A", "current"),
+                out("i_read", "A", "current as measured"),
             ),
         ),
         Socket(

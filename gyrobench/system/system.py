@@ -15,18 +15,19 @@
         done = "sequencer.done"
         channels = ["gyro.u", "rebalance.i"]
         noises = ("gyro.white", "rebalance.meter")          # set to 0 by --check-step
+        reduction = "reduction"                             # reduction.py beside it: from_record(record, specification)
         measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
         def parameters(self, parts): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
         def check(self): return [...]
-        def reduce(self, record, specification=None): ...
 
 An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``system.set("gyro.H", 0.3)``.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -109,6 +110,7 @@ class System(Configurable):
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
     channel_period: float = 1.0  # s
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
+    reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
@@ -155,7 +157,7 @@ class System(Configurable):
 
     def owned(self) -> dict[str, Any]:
         """Return the parameters that options own: "slot.parameter" -> value of the option."""
-        return {name: self[key] for key, option in self.options.items() for name in option.sets}
+        return {name: self[key] for key, option in self.options.items() for name in option.sets.split()}
 
     # ------------------------------------------------------------ to be given by the system
     def plan(self) -> Plan | LoopPlan:
@@ -189,14 +191,20 @@ class System(Configurable):
     def reduce(self, record: Record, specification: Specification | None = None) -> Result:
         """Return the result of a record, judged by the limits of ``specification`` where it has any.
 
-        Raises UsageError for a system without a reduction.
+        By the module that ``reduction`` names, unless a system overrides this method.  Raises UsageError for a system
+        with neither.
         """
-        raise UsageError(f"{self.name} has no reduction")
+        if not self.reduction:
+            raise UsageError(f"{self.name} has no reduction")
+        owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
+        module = importlib.import_module(f".{self.reduction}", owner.__module__)
+        result: Result = module.from_record(record, specification)
+        return result
 
     @property
     def has_reduction(self) -> bool:
         """False for a system whose runs end with the record."""
-        return type(self).reduce is not System.reduce
+        return bool(self.reduction) or type(self).reduce is not System.reduce
 
     def read_measured(self, data: Path, values: Mapping[str, str]) -> Record:
         """Return a laboratory's file as a record; ``values``: options, and comments of the file, which they replace.
@@ -234,4 +242,7 @@ def load_system(name: str, bench: Path | None = None) -> System:
     if empty := [slot for slot, s in system.slots.items() if not s.part]:
         parts = ", ".join(f'{slot}="..."' for slot in empty)
         raise InvalidConfigurationError(name, [f"slot {', '.join(empty)}: no part; name it by with_parts({parts})"])
+    if system.reduction and system.folder and not (system.folder / f"{system.reduction}.py").is_file():
+        missing = f'reduction = "{system.reduction}": no file {system.reduction}.py in {system.folder}'
+        raise InvalidConfigurationError(name, [f"{missing}; write from_record(record, specification) there"])
     return system

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.families.table_test import Array, TableTest, on_table
 from gyrobench.system.part_values import PartValues
@@ -34,6 +32,7 @@ class AccelerometerMultipoint(TableTest):
 
     title = "Multi-position test of an accelerometer"
     spec = ("TEST-ACC-MULTI", "ACC-EXACT", "ACC-4PT", "ACC-MINPTS")
+    reduction = "reduction"
     slots = on_table(table=Slot("Table", "index_head"), accelerometer=Slot("Accelerometer", "accelerometer_pendulous"))
     wires = f"""
         {TableTest.wires}
@@ -63,22 +62,13 @@ class AccelerometerMultipoint(TableTest):
 
     def plan(self) -> Plan:
         """Mount a, then mount b, position after position; the head goes on through the turns and never back."""
-        n, phases = self["points"], []
-        station = 0
+        n = self["points"]
+        phases: list[Phase] = []
+        each = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"] / self["readings"]}
         for mount in MOUNTS.get(self["mounts"], ()):
             for k in range(n * self["turns"]):
-                phases.append(
-                    Phase(
-                        label=f"mount {mount}, {360.0 * (k % n) / n:.4g}°",
-                        mode="index",
-                        face=mount,
-                        target=TURN * station / n,
-                        settle=self["settle"],
-                        dwell=self["dwell"],
-                        window=self["dwell"] / self["readings"],
-                    )
-                )
-                station += 1
+                label, target = f"mount {mount}, {360.0 * (k % n) / n:.4g}°", TURN * len(phases) / n
+                phases.append(Phase(label, "index", mount, target, **each))
         return Plan(phases, {m: f.tolist() for m, f in geometry.FACES.items()})
 
     def base(self) -> Array:
@@ -115,8 +105,3 @@ class AccelerometerMultipoint(TableTest):
         if self["points"] == 4:
             return ["Four positions: k3 is not told from k1, and the cross term from k0 and k2."]
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

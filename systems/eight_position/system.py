@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.plan import Phase, Plan
@@ -28,6 +26,7 @@ class EightPosition(TwoChannelTest):
 
     title = "Eight-position test"
     spec = ("TEST-8POS", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
+    reduction = "reduction"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
     )
@@ -82,8 +81,3 @@ class EightPosition(TwoChannelTest):
 
     def warnings(self) -> list[str]:
         return refusals.near_pole(self["latitude"])
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.connectors import Socket, out
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
@@ -33,6 +31,7 @@ class EstimatorBench(System):
 
     title = "Bench of estimators"
     spec = ("BENCH-DYN-SINE", "BENCH-DRIFT-LL", "BENCH-DRIFT-AR3", "EST-KF-AR", "EST-SAGE-HUSA", "EST-WAVELET-ONLINE")
+    reduction = "reduction"
     slots = {
         "source": Slot(SOURCE, "signal_source"),
         "estimator": Slot("Estimator", "estimator_kalman_rate"),
@@ -105,8 +104,3 @@ class EstimatorBench(System):
         if left < least:
             return [f"samples = {self.samples}, of which {self.skip} are skipped: at least {least} must be left"]
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

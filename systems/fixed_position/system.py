@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.attitudes import parse
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
-from gyrobench.system.families.table_test import attitude_problems
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
@@ -27,6 +24,7 @@ class FixedPosition(RebalanceTest):
 
     title = "Fixed-position test"
     spec = ("TEST-FIXED", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
+    reduction = "reduction"
     slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     options = (
         SITE
@@ -61,8 +59,3 @@ class FixedPosition(RebalanceTest):
         if not (self["k"] or parameters.get("gyro.k")):
             problems.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
         return problems
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

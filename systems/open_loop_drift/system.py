@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.attitudes import parse
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, type_b
-from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest, attitude_problems
+from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
@@ -37,6 +35,7 @@ class OpenLoopDrift(OpenLoopTest):
 
     title = "Open-loop drift test"
     spec = ("TEST-OPEN", "GYRO-DYN-1", "GYRO-STATIC-9")
+    reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     options = (
         SITE
@@ -51,9 +50,7 @@ class OpenLoopDrift(OpenLoopTest):
         }
         | type_b("attitude", "latitude")
         | {
-            "u_angle": Option(
-                0.0, "rad", "standard uncertainty of the angle turned between first and last reading", 0.0
-            ),
+            "u_angle": Option(0.0, "rad", "standard uncertainty of the angle from the first to the last reading", 0.0),
             "u_float_gain": Option(0.0, "1", "standard uncertainty of H/C", 0.0),
         }
     )
@@ -99,8 +96,3 @@ class OpenLoopDrift(OpenLoopTest):
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         return super().check_parameters(parameters) + refusals.pickoff_range(self["bracket"], parameters)
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

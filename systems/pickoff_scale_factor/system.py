@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import SITE
-from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest, equatorial_problems
+from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
@@ -31,19 +29,16 @@ class PickoffScaleFactor(OpenLoopTest):
 
     title = "Pickoff scale factor"
     spec = ("TEST-PICKOFF", "GYRO-DYN-1")
+    reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     options = SITE | {
         "range": Option("20arcmin", "rad", "the table goes from -range to +range", 0.0),
         "points": Option(11, int, "angles", 2, 49),
-        "both_ways": Option(
-            True, bool, "back again over the same angles, so that the drift can be told from the slope"
-        ),
+        "both_ways": Option(True, bool, "back over the same angles, which tells the drift from the slope"),
         "settle": Option(0.03, "s", "wait before averaging, at each angle", 0.0),
         "dwell": Option(0.1, "s", "time averaged at each angle"),
         "drift": Option("2deg/h", "rad/s", "largest drift to be expected of the gyro", 0.0),
-        "gain": Option(
-            0.0, "1", "angle of the float per angle of the case, H/C; 0: from the parameters of the gyro", 0.0
-        ),
+        "gain": Option(0.0, "1", "angle of the float per angle of the case, H/C; 0: from the gyro's parameters", 0.0),
         "u_gain": Option(0.0, "1", "relative standard uncertainty of that gain", 0.0),
         "u_angle": Option(0.0, "1", "relative standard uncertainty of the angle scale of the table", 0.0),
         "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
@@ -85,7 +80,8 @@ class PickoffScaleFactor(OpenLoopTest):
         return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        problems = super().check_parameters(parameters) + equatorial_problems(parameters, self["latitude"])
+        problems = super().check_parameters(parameters)
+        problems += frames.equatorial_problems(parameters.get("table.base", self.base()), self["latitude"])
         moves = {k: float(parameters.get(f"table.{k}", v)) for k, v in TABLE.items()}
         problems += drift_problems(self["drift"], self.duration(**moves), 2.0 * self["range"])
         known = [parameters.get(f"gyro.{n}") for n in ("u_max", "K_sg", "H", "C")]
@@ -93,8 +89,3 @@ class PickoffScaleFactor(OpenLoopTest):
             u_max, k_sg, h, c = (float(v) for v in known)  # type: ignore[arg-type]
             problems += range_problems(self["range"], u_max / (k_sg * h / c))
         return problems
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.families.loop_test import AXES, TwoGyroTest, three
 from gyrobench.system.loop_plan import LoopPhase
@@ -27,6 +25,7 @@ class PlatformFourGimbal(TwoGyroTest):
 
     title = "Four-gimbal platform"
     spec = ("PLATFORM-4GIMBAL", "PLATFORM-3GIMBAL-2DOF")
+    reduction = "reduction"
     tones = (2.5, 5.0, 7.0, 10.0, 14.0)  # Hz
     slots = TwoGyroTest.with_parts(
         motion="manoeuvre", load="load_torque", gyro_a="gyro_2dof", gyro_b="gyro_2dof",
@@ -83,8 +82,3 @@ class PlatformFourGimbal(TwoGyroTest):
         if self.flown().vertical and not self["locked"] and self["law"] != "sign":
             return [f"law = {self['law']} at pitch 90°: the fourth gimbal turns over there (law=sign does not)"]
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

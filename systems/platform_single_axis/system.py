@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families.loop_test import PROFILE, OneAxisTest, data_sheet, noises, stabilizer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
@@ -26,6 +24,7 @@ class PlatformSingleAxisLoop(OneAxisTest):
 
     title = "Stabilized platform on one axis, estimator in the loop"
     spec = ("PLATFORM-1AXIS", "GYRO-REBALANCE", "EST-KF-GEN")
+    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "rebalance": Slot("Rebalance", "rebalance_analog"),
@@ -118,8 +117,3 @@ class PlatformSingleAxisLoop(OneAxisTest):
             **{f"stabilizer.{name}?": x for name, x in stabilizer.items()},
             "stabilizer.K_u?": 1.0 / k,
         }
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, data_sheet, three
 from gyrobench.system.loop_plan import LoopPhase, sweep
@@ -43,6 +41,7 @@ class PlatformThreeAxis(ThreeAxisTest):
 
     title = "Three-axis stabilized platform"
     spec = ("PLATFORM-3AXIS-DYN", "PLATFORM-3AXIS-KIN", "DECOUPLE-T2", "DECOUPLE-BENCH-83MIL", "GYRO-OA-COUPLING-Y2")
+    reduction = "reduction"
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "platform": Slot("Platform", "platform_three_axis"),
         **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in GYROS},
@@ -128,8 +127,3 @@ class PlatformThreeAxis(ThreeAxisTest):
             stabilizer = self.stabilizer(neutral_inertia(parts)[k], motor, gyro)
             found |= {f"{axis}.{n}?": x for n, x in stabilizer.items()}
         return found
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system import flight_plan
 from gyrobench.system.families.loop_test import AXES, TwoGyroTest, three, torquer
 from gyrobench.system.flight_plan import Leg
@@ -38,6 +36,7 @@ class PlatformThreeGimbal(TwoGyroTest):
 
     title = "Three-gimbal platform with two gyros"
     spec = ("PLATFORM-3GIMBAL-2DOF", "RESOLVER-AZ", "DECOUPLE-T2")
+    reduction = "reduction"
     tones = (1.5, 2.5, 4.0, 5.5, 7.0, 9.0, 13.0, 18.0)  # Hz
     slots = TwoGyroTest.with_parts(
         motion="manoeuvre", load="load_torque", platform="platform_three_gimbal_2dof", gyro_a="gyro_2dof",
@@ -120,8 +119,3 @@ class PlatformThreeGimbal(TwoGyroTest):
                 "the platform; set the option mount, which gives both"
             )
         return problems
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import type_b
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
@@ -27,6 +25,7 @@ class ServoPolar(ServoTest):
 
     title = "Polar servo test"
     spec = ("TEST-SERVO-POLAR", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
+    reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
     options = (
         ServoTest.options
@@ -77,8 +76,3 @@ class ServoPolar(ServoTest):
         from .refusals import unseen
 
         return unseen(self["route"], self.mounts(), self["terms"])
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

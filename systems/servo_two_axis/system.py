@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import type_b
 from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
-from gyrobench.system.families.servo_test import CAGE, SERVO_TABLE, SITE_AND_STAND, STAND, TRACKING
+from gyrobench.system.families.servo_test import SITE_AND_STAND, TRACKING
 from gyrobench.system.families.table_test import TableTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
@@ -31,18 +29,19 @@ class ServoTwoAxis(TableTest):
 
     title = "Two-axis servo test"
     spec = ("TEST-SERVO2-2DOF", "LOOP-TABLE-SERVO", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF")
+    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
-        "stand": Slot(STAND, "fixture"),
+        "stand": Slot("Stand", "fixture"),
         "wobble_x": Slot(setup.WOBBLE, "axis_wobble"),
-        "outer": Slot(SERVO_TABLE, "table_servo"),
+        "outer": Slot("ServoTable", "table_servo"),
         "wobble_y": Slot(setup.WOBBLE, "axis_wobble"),
-        "inner": Slot(SERVO_TABLE, "table_servo"),
+        "inner": Slot("ServoTable", "table_servo"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "coupling": Slot(setup.COUPLING, "axis_coupling"),
-        "cage_x": Slot(CAGE, "cage"),
-        "cage_y": Slot(CAGE, "cage"),
+        "cage_x": Slot("Cage", "cage"),
+        "cage_y": Slot("Cage", "cage"),
         "sampler_x": Slot("Sampler", "sampler"),
         "sampler_y": Slot("Sampler", "sampler"),
     }
@@ -82,8 +81,7 @@ class ServoTwoAxis(TableTest):
         return setup.plan(self.mounts(), self["time"], self["window"], self["settle"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        plan = {**self.plan().parameters(), **self.owned()}
-        return {**plan, **setup.parameters(parts, self.mounts())}
+        return {**self.plan().parameters(), **self.owned(), **setup.parameters(parts, self.mounts())}
 
     def check(self) -> list[str]:
         from .refusals import option_problems
@@ -100,8 +98,3 @@ class ServoTwoAxis(TableTest):
         from .refusals import cautions
 
         return cautions(self.mounts(), self["latitude"], self["time"], self.earth_rate(), self["terms"])
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

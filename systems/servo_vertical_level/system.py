@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from gyrobench import frames
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL, on_servo_table
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
@@ -32,6 +30,7 @@ class ServoVerticalLevel(ServoTest):
 
     title = "Vertical and level servo test"
     spec = ("TEST-SERVO-VERT", "TEST-SERVO-LEVEL", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
+    reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
     options = ServoTest.options | {
         "attitudes": Option("six", str, "three, six, vertical, level, all, or names separated by semicolons"),
@@ -74,8 +73,3 @@ class ServoVerticalLevel(ServoTest):
         from .refusals import unseen
 
         return unseen(self.attitudes())
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

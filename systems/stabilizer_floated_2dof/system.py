@@ -7,8 +7,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, hold, noises, stabilizer, torquer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
@@ -49,6 +47,7 @@ class StabilizerFloated2dof(OneAxisTest):
 
     title = "Stabilizer with a floated two-degree-of-freedom gyro"
     spec = ("STAB-FLOATED-2DOF",)
+    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "stabilizer": stabilizer("stabilizer_lead_lag"),
@@ -151,8 +150,3 @@ class StabilizerFloated2dof(OneAxisTest):
                 self.name, at[1], at[0] / (2.0 * math.pi),
             )  # fmt: skip
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families.loop_test import MOVED, PROFILE, LoopTest, hold, noises, stabilizer
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
@@ -31,6 +29,7 @@ class StabilizerPower2dof(LoopTest):
 
     title = "Power gyro stabilizer with a two-degree-of-freedom gyro"
     spec = ("STAB-POWER-2DOF",)
+    reduction = "reduction"
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "stabilizer": stabilizer("stabilizer_power"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
@@ -102,8 +101,3 @@ class StabilizerPower2dof(LoopTest):
                 "at 5 deg: take a smaller load or a larger K_m"
             ]
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

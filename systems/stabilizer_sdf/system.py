@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families.loop_test import OneAxisTest, data_sheet, stabilizer, torquer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
@@ -30,6 +28,7 @@ class StabilizerSdf(OneAxisTest):
 
     title = "Stabilizer with a gyro of one degree of freedom"
     spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
+    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "stabilizer": stabilizer("stabilizer_lead_lag"),
@@ -51,10 +50,10 @@ class StabilizerSdf(OneAxisTest):
         "H": Option(1e4, "N.m.s", "spin angular momentum"),
         "C": Option(62.5, "N.m.s/rad", "damping of the float (rate-integrating and rate gyro)"),
         "K": Option(100.0, "N.m/rad", "spring of the float (rate gyro)"),
-        "float_stop": Option("30deg", "rad", "stop of the float: the run ends there", sets=("gyro.stop",)),
+        "float_stop": Option("30deg", "rad", "stop of the float: the run ends there", sets="gyro.stop"),
         "form": Option("exact", str, "closed form of the rate-integrating gyro: exact, or light (5-34, light damping)"),
-        "offload": Option(0.0, "N.m/rad", "motor torque for the float angle; 0: no motor", sets=("stabilizer.K",)),
-        "viscous": Option(0.0, "N.m.s/rad", "friction of the axis against the base", sets=("platform.viscous",)),
+        "offload": Option(0.0, "N.m/rad", "motor torque for the float angle; 0: no motor", sets="stabilizer.K"),
+        "viscous": Option(0.0, "N.m.s/rad", "friction of the axis against the base", sets="platform.viscous"),
     }
     step = 1e-3
     channels = (*OneAxisTest.channels, "gyro.b", "stabilizer.e")
@@ -149,8 +148,3 @@ class StabilizerSdf(OneAxisTest):
             ]
         text = f"the float will turn to {math.degrees(runs):.3g}°: the closed forms hold cos(b) at its mean"
         return [text] if runs > 0.1 else []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -6,20 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
-from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import SITE
-from gyrobench.system.families.servo_test import GYRO, SERVO_TABLE, gyro_on_table
-from gyrobench.system.families.table_test import (
-    FACE,
-    ON_TABLE,
-    SDF_NOISES,
-    Array,
-    TableTest,
-    equatorial_problems,
-    on_table,
-)
+from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
+from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, Array, TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot
@@ -28,17 +17,6 @@ from .measured import MEASURED
 
 CAPTURE = "capture, no current"
 STEADY = 1.0  # s after the current has changed
-
-SOURCE = Socket(
-    "CurrentSource",
-    "current through the torquer while the gyro holds the table",
-    (
-        inp("command", "", "current wanted in servo mode, A"),
-        inp("mode", "1", "mode of the table", whole=True),
-        out("i", "A", "current"),
-        out("i_read", "A", "current as measured"),
-    ),
-)
 
 
 class TorquerScaleFactor(TableTest):
@@ -50,15 +28,15 @@ class TorquerScaleFactor(TableTest):
 
     title = "Torquer scale factor and linearity"
     spec = ("TEST-TORQUER", "SF-APP1", "LIN-TABLE", "LOOP-TABLE-SERVO")
+    reduction = "reduction"
     slots = on_table(
-        table=Slot(SERVO_TABLE, "table_servo"),
-        source=Slot(SOURCE, "current_source"),
+        table=Slot("ServoTable", "table_servo"), source=Slot("CurrentSource", "current_source"),
         gyro=Slot("SdfGyro", "floated_gyro"),
-    )
+    )  # fmt: skip
     # in servo mode the table has no target: the sequencer's target is the current
     wires = f"""
         {TableTest.wires}
-        {GYRO}
+        {GYRO_SERVO}
         sequencer -> source: target=command mode
         source -> gyro: i
         source.i_read -> sampler.x
@@ -69,7 +47,7 @@ class TorquerScaleFactor(TableTest):
         "range": Option("10deg", "rad", "angle turned with each current up to 20 mA", 0.0),
         "range_large": Option("100deg", "rad", "angle turned with each larger current", 0.0),
         "k": Option("17.2deg/h/mA", "rad/s/A", "scale factor expected, for the times of the plan", 0.0),
-        "slew": Option(0.1, "A/s", "rate at which the current is changed", 0.0, sets=("source.slew",)),
+        "slew": Option(0.1, "A/s", "rate at which the current is changed", 0.0, sets="source.slew"),
         "windows": Option(20, int, "readings of the angle over each range", 5, 500),
         "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
     }
@@ -122,15 +100,11 @@ class TorquerScaleFactor(TableTest):
         return problems + super().check()
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        problems = super().check_parameters(parameters) + equatorial_problems(parameters, self["latitude"])
+        problems = super().check_parameters(parameters)
+        problems += frames.equatorial_problems(parameters.get("table.base", self.base()), self["latitude"])
         limit = parameters.get("source.i_max")
         if limit is not None and max(self.currents()) > limit:
             problems.append(
                 f"currents up to {max(self.currents()) * 1e3:g} mA: the source gives {limit * 1e3:g} mA at most"
             )
         return problems
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift, frames
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.families.option_groups import FOLD, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
-from gyrobench.system.families.table_test import fold_problems
 from gyrobench.system.families.tumble_test import TumbleTest
 from gyrobench.system.system import Option
 
@@ -27,6 +24,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
 
     title = "Single-axis tumble test"
     spec = ("TEST-TUMBLE1-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
+    reduction = "reduction"
     slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     options = (
         SITE
@@ -59,9 +57,4 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         if terms not in drift.TERM_SETS:
             known = ", ".join(str(t) for t in drift.TERM_SETS)
             problems.append(f"gyro.terms = {terms:g}: no such model; the gyro has {known} terms")
-        return problems + fold_problems(parameters, self["fold"])
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)
+        return problems if self["fold"] else problems + drift.fold_problems(parameters, "gyro.")

@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench import drift
 from gyrobench.system.families.option_groups import FOLD, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
-from gyrobench.system.families.table_test import Array, fold_problems, on_table, sampled
+from gyrobench.system.families.table_test import Array, sampled
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
@@ -28,12 +27,9 @@ class TumbleTwoAxis(RebalanceTest):
 
     title = "Two-axis tumble test"
     spec = ("TEST-TUMBLE2-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
-    slots = {
-        **on_table(
-            table=Slot("TwoAxisTable", "table_two_axis"),
-            gyro=Slot("SdfGyro", "floated_gyro"),
-            rebalance=Slot("Rebalance", "rebalance_analog"),
-        ),
+    reduction = "reduction"
+    slots = RebalanceTest.with_parts(gyro="floated_gyro", rebalance="rebalance_analog") | {
+        "table": Slot("TwoAxisTable", "table_two_axis"),
         "sampler_inner": Slot("Sampler", "sampler"),
     }
     # sampler_inner averages the same current; it is there for the inner angle at both ends of a window
@@ -55,10 +51,7 @@ class TumbleTwoAxis(RebalanceTest):
             "cycles": Option(1, int, "how often the positions are gone through (99 phases in all)", 1, 9),
             "dwell": Option(120.0, "s", "averaging time in each position"),
             "windows": Option(2, int, "averages a position", 1, 100),
-            "inner_rate": Option(
-                0.003, "rad/s", "rate of the inner axis between positions; the torquer must follow it",
-                sets=("table.index_rate[2]",),
-            ),
+            "inner_rate": Option(0.003, "rad/s", "rate of the inner axis in moves", sets="table.index_rate[2]"),
             "harmonic": Option(False, bool, "insist on the harmonic route beside least squares"),
         }
         | SETTLE
@@ -115,9 +108,4 @@ class TumbleTwoAxis(RebalanceTest):
                 f"inner_rate = {self['inner_rate']:g} rad/s: the inner axis is the input axis, and the torquer follows "
                 f"up to k i_max = {reach:.4g} rad/s; at most 0.9 of that"
             )
-        return problems + fold_problems(parameters, self["fold"])
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)
+        return problems if self["fold"] else problems + drift.fold_problems(parameters, "gyro.")

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench import drift
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.rebalance_test import TwoChannelTest
-from gyrobench.system.families.table_test import fold_problems
 from gyrobench.system.families.tumble_test import TumbleTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Windows
@@ -31,6 +29,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
 
     title = "Single-axis tumble test of a two-degree-of-freedom gyro"
     spec = ("TEST-TUMBLE1-2DOF-A", "TEST-TUMBLE1-2DOF-B", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
+    reduction = "reduction"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
     )
@@ -44,9 +43,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         }
         | type_b("axis", "mount", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | {
-            f"k_{a}": Option(
-                0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: parameter k_{a} of the gyro", 0.0
-            )
+            f"k_{a}": Option(0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: that of the gyro", 0.0)
             for a in "xy"
         }
     )
@@ -81,10 +78,6 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         return geometry.cautions(self["latitude"])
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        folded = self["fold"] or self["model"] != "nine"
-        return super().check_parameters(parameters) + fold_problems(parameters, folded)
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> DriftTestResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)
+        problems = super().check_parameters(parameters)
+        seen = self["fold"] or self["model"] != "nine"
+        return problems if seen else problems + drift.fold_problems(parameters, "gyro.")

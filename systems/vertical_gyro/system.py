@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.frames import G0
-from gyrobench.record.record import Record
-from gyrobench.result import LoopResult, Specification
 from gyrobench.system.families.loop_test import FLOWN, LoopTest
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
@@ -30,6 +28,7 @@ class VerticalGyroBench(LoopTest):
 
     title = "Vertical gyro"
     spec = ("VERTICAL-GYRO",)
+    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "motion": Slot("Motion", "manoeuvre"),
@@ -46,18 +45,18 @@ class VerticalGyroBench(LoopTest):
         "phases": Option(" ".join(PHASES), str, f"what is flown, of: {' '.join(PHASES)}"),
         "tilt": Option("2deg", "rad", "tilt of the rotor at the start, about x", 0.0),
         "law": Option("switches", str, f"erection: {' or '.join(LAWS)}"),
-        "rate": Option("4deg/min", "rad/s", "erection rate, the largest of the linear law", sets=("erection.rate",)),
-        "dead_zone": Option("10arcmin", "rad", "dead zone of the switches", 0.0, sets=("erection.dead_zone",)),
-        "gain": Option(0.05, "1/s", "linear law: rate per tilt", sets=("erection.gain",)),
-        "cut_off": Option(1, int, "1: the erection is cut off in manoeuvre", 0, 1, sets=("erection.cut_off",)),
-        "fast_time": Option(0.0, "s", "fast start, ten times the rate; 0: none", 0.0, sets=("erection.fast_time",)),
-        "ring": Option(1, int, "1: with follow-up ring", 0, 1, sets=("gyro.ring",)),
+        "rate": Option("4deg/min", "rad/s", "erection rate, the largest of the linear law", sets="erection.rate"),
+        "dead_zone": Option("10arcmin", "rad", "dead zone of the switches", 0.0, sets="erection.dead_zone"),
+        "gain": Option(0.05, "1/s", "linear law: rate per tilt", sets="erection.gain"),
+        "cut_off": Option(1, int, "1: the erection is cut off in manoeuvre", 0, 1, sets="erection.cut_off"),
+        "fast_time": Option(0.0, "s", "fast start, ten times the rate; 0: none", 0.0, sets="erection.fast_time"),
+        "ring": Option(1, int, "1: with follow-up ring", 0, 1, sets="gyro.ring"),
         "acceleration": Option(0.2 * G0, "m/s2", "acceleration forward"),
         "turn": Option("3deg/s", "rad/s", "rate of the turn"),
-        "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets=("motion.speed",)),
+        "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets="motion.speed"),
         "time": Option(60.0, "s", "length of erection, rest, acceleration and turn, and of the wait before each"),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets=("motion.latitude",)),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets=("motion.earth_rate",)),
+        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
+        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
     }
     noises = ("gyro.white", "gyro.white_y")
     step = 1e-2
@@ -117,8 +116,3 @@ class VerticalGyroBench(LoopTest):
         if gyro is not None and erection is not None and not math.isclose(gyro, erection, rel_tol=1e-6):
             return [f"gyro.H = {gyro:g} and erection.H = {erection:g} N.m.s: the erection must know the gyro's H"]
         return []
-
-    def reduce(self, record: Record, specification: Specification | None = None) -> LoopResult:
-        from .reduction import from_record
-
-        return from_record(record, specification)

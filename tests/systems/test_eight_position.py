@@ -221,7 +221,7 @@ def test_bounds_and_warnings(session: Session) -> None:
     for values in ({"settle": 0.5}, {"cycles": 13}, {"latitude": "95deg"}, {"dwell": "1m"}):
         with pytest.raises(InvalidValueError):
             load().with_values(values)
-    with pytest.raises(InvalidConfigurationError, match="exchange once a step"):
+    with pytest.raises(InvalidConfigurationError, match="exchanges once a step"):
         session.run(SHORT, step=0.01)
     record = session.run({**SHORT, **QUIET, "latitude": math.radians(81.0), "table.tilt": [math.radians(0.5), 0.0]})
     assert any("beyond 80°" in n for n in record.run.notes)

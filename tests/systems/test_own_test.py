@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import shutil
+import typing
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from gyrobench.bench import standard_folder
+from gyrobench.bench import Bench, standard_folder
 from gyrobench.commands.catalog import init_bench
+from gyrobench.record.record import Record
+from gyrobench.result import Result, Specification
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
-from gyrobench.system.system import load_system
+from gyrobench.system.suite import Suite, load_test
+from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]
 EXAMPLE = standard_folder() / "docs" / "guides" / "own_test" / "system.py"
@@ -79,8 +84,30 @@ def test_a_family_without_parts_is_refused(bench: Path) -> None:
         load_system(NAME, bench)
 
 
+def test_the_declared_reduction_of_every_system_is_one() -> None:
+    """Loaded late, it is not seen by the type checker where it is called: its signature is held here."""
+    for name in Bench(standard_folder()).systems():
+        test = load_test(name)
+        if isinstance(test, Suite) or not test.reduction:
+            continue
+        assert test.has_reduction and type(test).reduce is System.reduce
+        module = importlib.import_module(f".{test.reduction}", type(test).__module__)
+        hints = typing.get_type_hints(module.from_record)
+        assert hints["record"] is Record and hints["specification"] == Specification | None, name
+        assert issubclass(hints["return"], Result), name
+
+
+def test_a_declared_reduction_that_is_missing_is_refused(bench: Path) -> None:
+    file = bench / "systems" / NAME / "system.py"
+    file.write_text(
+        EXAMPLE.read_text("utf-8").replace("    title =", '    reduction = "sums"\n    title ='), encoding="utf-8"
+    )
+    with pytest.raises(InvalidConfigurationError, match=r'reduction = "sums": no file sums.py in .*six_position'):
+        load_system(NAME, bench)
+
+
 def test_groups_of_options() -> None:
-    assert SITE["latitude"].sets == ("site.latitude",) and set(SITE) <= set(RebalanceTest.options)
+    assert SITE["latitude"].sets == "site.latitude" and set(SITE) <= set(RebalanceTest.options)
     sizes = type_b("current", mount="of the gyro in its fixture")
     assert sizes["u_current"].unit == "A" and sizes["u_mount"].doc == "of the gyro in its fixture"
     with pytest.raises(KeyError):

@@ -8,10 +8,10 @@ from gyrobench.system.configurable import Option
 
 SITE = {
     "latitude": Option(
-        "45.75deg", "rad", "geographic latitude, north positive", -math.pi / 2, math.pi / 2, sets=("site.latitude",)
+        "45.75deg", "rad", "geographic latitude, north positive", -math.pi / 2, math.pi / 2, sets="site.latitude"
     ),
-    "height": Option(0.0, "m", "height above the ellipsoid", sets=("site.height",)),
-    "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity", sets=("site.gravity",)),
+    "height": Option(0.0, "m", "height above the ellipsoid", sets="site.height"),
+    "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity", sets="site.gravity"),
 }
 TORQUER = {
     "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),

@@ -18,48 +18,17 @@ import numpy as np
 from gyrobench.attitudes import SERVO_ATTITUDES
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.system.configurable import Option
-from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.sockets import SOCKETS
 from gyrobench.system.system import MeasuredData, Slot
 
 #: table axes (rows) in the axes x, y, z of the attitude at angle 0: the transpose of ON_TABLE
 BASE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-SERVO_TABLE = Socket(
-    "ServoTable",
-    "turntable with one axis that nulls the pickoff of the gyro on it in mode 3",
-    (
-        *SOCKETS["Table"].connectors,
-        inp("u", "V", "pickoff voltage of the gyro"),
-        out("saturated", "1", "1 while the motor is at its limit", optional=True, whole=True),
-    ),
-)
-STAND = Socket(
-    "Stand",
-    "turns what the site says into the axes of the attitude of a phase",
-    (
-        inp("mount", "1", "number of the phase", whole=True),
-        inp("f_face", "m/s2", "specific force, ENU", 3),
-        inp("omega_face", "rad/s", "Earth rate, ENU", 3),
-        out("f", "m/s2", "specific force, attitude axes", 3),
-        out("omega", "rad/s", "Earth rate, attitude axes", 3),
-    ),
-)
-CAGE = Socket(
-    "Cage",
-    "holds the float by the torquer outside servo mode",
-    (
-        inp("u", "V", "pickoff voltage"),
-        inp("mode", "1", "mode of the table", whole=True),
-        out("i", "A", "torquer current"),
-    ),
-)
 #: the gyro on the table whose servo nulls its pickoff
-GYRO = """
+GYRO_SERVO = """
     table -> gyro: omega alpha f
     gyro -> table: u
 """
@@ -67,7 +36,7 @@ INDEX_RATE = 5e-3  # rad/s: the cage holds the float up to 8.3e-3
 #: rad/s (8 Hz): brushes hold a turning table M / (J capture_rate2) from null, and must let it within capture_angle
 CAPTURE_RATE = 50.0
 GYRO_TO_TABLE = {"H": "H_g", "J": "J_g", "C": "C_g", "K_sg": "K_g"}  # of the gyro -> what the table is told of it
-SITE_AND_STAND = SITE | {"latitude": replace(SITE["latitude"], sets=("site.latitude", "stand.latitude"))}
+SITE_AND_STAND = SITE | {"latitude": replace(SITE["latitude"], sets="site.latitude stand.latitude")}
 TRACKING = {
     "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
 }
@@ -104,13 +73,13 @@ class ServoTest(TableTest):
     slots = ServoTest.with_parts(stand=..., table=..., gyro=..., cage=...)
     """
 
-    slots: ClassVar[Mapping[str, Slot]] = on_table(stand=STAND, table=SERVO_TABLE, gyro="SdfGyro", cage=CAGE)
+    slots: ClassVar[Mapping[str, Slot]] = on_table(stand="Stand", table="ServoTable", gyro="SdfGyro", cage="Cage")
     wires = f"""
     site -> stand: f=f_face omega=omega_face
     sequencer -> stand: phase=mount
     stand -> table: f=f_local omega=omega_local
     sequencer -> table: mode target face
-    {GYRO}
+    {GYRO_SERVO}
     gyro -> cage: u
     sequencer -> cage: mode
     cage -> gyro: i

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyrobench import attitudes, drift, frames, units
+from gyrobench import frames
 from gyrobench.system.connectors import Socket
 from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.part_values import PartValues
@@ -105,27 +104,3 @@ class OpenLoopTest(TableTest):
     )
     open: ClassVar[tuple[str, ...]] = ("gyro.i",)
     noises: ClassVar[tuple[str, ...]] = SDF_NOISES
-
-
-def equatorial_problems(parameters: Mapping[str, Any], latitude: float) -> list[str]:
-    """Return by how much the table axis sees Earth rate, where it is not at right angles to the pole (1 degree)."""
-    axis = np.asarray(parameters.get("table.base", frames.equatorial_base(latitude)))[2]
-    along = float(axis @ frames.pole(latitude))
-    if abs(along) <= math.radians(1.0):
-        return []
-    rate = along * frames.EARTH_RATE / units.factor("deg/h")
-    return [f"table.base: the axis must be at right angles to the pole (1°); it sees {rate:.3g} °/h of Earth rate"]
-
-
-def fold_problems(parameters: Mapping[str, Any], fold: bool) -> list[str]:
-    """Return which squares of the simulated gyro no test at constant |g| sees, unless they may be folded."""
-    return [] if fold else drift.fold_problems(parameters, "gyro.")
-
-
-def attitude_problems(text: str, latitude: float) -> list[str]:
-    """Return why an option is no attitude (:func:`gyrobench.attitudes.parse`), as a sentence."""
-    try:
-        attitudes.parse(text, latitude)
-    except ValueError as error:
-        return [str(error)]
-    return []
