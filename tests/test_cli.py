@@ -18,7 +18,7 @@ import pytest
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.commands import cli, progress_display
 from gyrobench.commands.console import print_notes
-from gyrobench.engine.run_driver import Status
+from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
 
 Call = Callable[..., tuple[int, str, str]]
@@ -328,7 +328,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
@@ -361,7 +361,7 @@ def test_interrupt_does_not_replace_a_whole_record(
 def test_interrupted_step_check_still_gives_the_report(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if "step check" in self.label:
             signal.raise_signal(signal.SIGINT)
 
@@ -416,7 +416,7 @@ def test_progress_in_lines_where_there_is_no_terminal(
 ) -> None:
     monkeypatch.setattr(progress_display, "PAUSE", 0.0)
     with progress_display.ProgressDisplay("tumble") as display:
-        display(Status(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
+        display(ProgressReport(time=250.0, total=1000.0, steps=250_000, windows=3, rate=1e6, elapsed=2.5))
     # 250 of 1000 s are done after 2.5 s: 7.5 s are left; 250,000 steps in 2.5 s
     assert capsys.readouterr().err == "tumble: 25 %, t = 250 of 1,000 s, 0.10 M steps/s, 8 s left\n"
 
@@ -433,9 +433,9 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
     monkeypatch.setenv("COLUMNS", "120")
     with progress_display.ProgressDisplay("tumble") as display:
-        display(Status(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
+        display(ProgressReport(time=1.0, total=1000.0, steps=1000, windows=0, rate=1e6, elapsed=0.1))
         assert display.bar is None  # short runs stay silent
-        display(Status(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
+        display(ProgressReport(time=500.0, total=1000.0, steps=500_000, windows=3, rate=1e6, elapsed=60.0))
         assert display.bar is not None and display.bar.tasks[0].completed == 0.5
         assert "1 min 00 s left" in display.bar.tasks[0].fields["words"]
     captured = capsys.readouterr()

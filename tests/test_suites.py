@@ -16,7 +16,7 @@ import pytest
 
 from gyrobench.bench import standard_folder
 from gyrobench.commands import cli, progress_display
-from gyrobench.engine.run_driver import Status
+from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite, load_test
@@ -193,7 +193,7 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
-    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if self.label == "tumble_single_axis" and status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 

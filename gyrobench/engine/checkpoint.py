@@ -1,10 +1,11 @@
-"""Checkpoints: a run that was stopped goes on where it was, and its record is bit-equal with that of a whole run.
+"""Checkpoints of runs: a stopped run continues where it was; its record is bit-equal with that of an unbroken run.
 
 ``checkpoint.npz`` in the folder of the run holds the serialized state of every FMU, the buffer ``out`` of the engine,
 the last watched value, the number of steps and the rows recorded so far: one file, written under a temporary name and
-renamed, so that it is whole or not there.  It is written when the user stops the run and about once a minute of wall
-time, for a process that is killed; it is removed when the run is complete.  A checkpoint belongs to one job: parts,
-parameters, options, seed, step, order and wiring; any other job is refused.  Both engines write and read the same file.
+renamed, so that it is either complete or absent.  It is written when the user stops the run and about once a minute
+of wall time, for a process that is killed; it is removed when the run is complete.  A checkpoint belongs to one job:
+parts, parameters, options, seed, step, order and wiring; it is not accepted for any other.  Both engines write and
+read the same file.
 
 Not covered: FMUs that cannot serialize their state, and FMUs in a process of their own (``isolate``).
 """
@@ -22,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave, Slave
+from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
 from gyrobench.engine.program import Program
-from gyrobench.engine.reference_engine import Array, Progress, take
+from gyrobench.engine.reference_engine import Array, RunState, read_outputs
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
@@ -32,7 +33,7 @@ FILE = "checkpoint.npz"
 FORMAT = 1
 PERIOD = 60.0  # s of wall time between two checkpoints
 SHARE = 50.0  # and this many times what the last one took
-SHOWN = 5  # differences named in a refusal
+MAX_LISTED = 5  # differences named in a message
 NAMES = {
     "step": "step (s)",
     "stop": "end of the simulated time (s)",
@@ -47,7 +48,7 @@ class ResumeError(GyrobenchError):
 
 
 def wiring(program: Program) -> str:
-    """A digest of what goes where between the parts and into the record, unit factors included."""
+    """Return a digest of what goes where between the parts and into the record, unit factors included."""
     calls = [(*p.sets, *p.gets, *p.channel_gets, *p.window_gets) for p in program.parts]
     parts = [[[g.kind, list(g.references), g.at, g.source, g.scaled] for g in groups] for groups in calls]
     rows = [[r.names, r.source, r.gain] for r in (program.channel, program.window)]
@@ -55,48 +56,48 @@ def wiring(program: Program) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def obstacle(slaves: Mapping[str, Slave]) -> str:
-    """Why a run with these FMUs cannot be resumed; empty when it can."""
-    apart = [slot for slot, s in slaves.items() if not isinstance(s, LocalSlave)]
-    if apart:
-        return f"{', '.join(apart)}: an FMU in a process of its own (--isolate) does not give out its state"
-    mute = [
+def resume_obstacle(instances: Mapping[str, FmuInstance]) -> str:
+    """Return why a run with these FMUs cannot be resumed; empty where it can."""
+    isolated = [slot for slot, s in instances.items() if not isinstance(s, LocalInstance)]
+    if isolated:
+        return f"{', '.join(isolated)}: an FMU in a process of its own (--isolate) does not give out its state"
+    stateless = [
         slot
-        for slot, s in slaves.items()
-        if isinstance(s, LocalSlave)
+        for slot, s in instances.items()
+        if isinstance(s, LocalInstance)
         and not (s.description.coSimulation.canGetAndSetFMUstate and s.description.coSimulation.canSerializeFMUstate)
     ]
-    if mute:
-        return f"{', '.join(mute)}: the FMU cannot save its state (canSerializeFMUstate is not true in its description)"
+    if stateless:
+        return f"{', '.join(stateless)}: the FMU cannot save its state (canSerializeFMUstate is not true)"
     return ""
 
 
-def save_state(slave: LocalSlave) -> bytes:
-    """The serialized state of an FMU.  Raises FmuCallError."""
+def save_state(instance: LocalInstance) -> bytes:
+    """Return the serialized state of an FMU.  Raises FmuCallError."""
     try:
-        state = slave.fmu.getFMUstate()
+        state = instance.fmu.getFMUstate()
         try:
-            return bytes(slave.fmu.serializeFMUstate(state))
+            return bytes(instance.fmu.serializeFMUstate(state))
         finally:
-            slave.fmu.freeFMUstate(state)
+            instance.fmu.freeFMUstate(state)
     except Exception as error:
-        raise slave.fail("serializeFMUstate", error) from None
+        raise instance.fail("serializeFMUstate", error) from None
 
 
-def load_state(slave: LocalSlave, data: bytes) -> None:
-    """Puts an initialized FMU into a serialized state.  Raises FmuCallError."""
+def load_state(instance: LocalInstance, data: bytes) -> None:
+    """Set an initialized FMU to a serialized state.  Raises FmuCallError."""
     try:
-        state = slave.fmu.deSerializeFMUstate(data)
+        state = instance.fmu.deSerializeFMUstate(data)
         try:
-            slave.fmu.setFMUstate(state)
+            instance.fmu.setFMUstate(state)
         finally:
-            slave.fmu.freeFMUstate(state)
+            instance.fmu.freeFMUstate(state)
     except Exception as error:
-        raise slave.fail("deSerializeFMUstate", error) from None
+        raise instance.fail("deSerializeFMUstate", error) from None
 
 
-def about(folder: Path) -> dict[str, Any] | None:
-    """The job of the checkpoint in a folder; None when there is none.  Raises ResumeError for a damaged file."""
+def read_job(folder: Path) -> dict[str, Any] | None:
+    """Return the job of the checkpoint in a folder; None when there is none.  Raises ResumeError for a damaged file."""
     return dict(_read(folder / FILE)[0]["job"]) if (folder / FILE).is_file() else None
 
 
@@ -112,8 +113,8 @@ def _read(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
         raise ResumeError(f"{file}: not a checkpoint that can be read: {error}") from None
 
 
-def _whole(rows: list[Array], width: int) -> Array:
-    """All rows as one array; the list then holds that one."""
+def _joined(rows: list[Array], width: int) -> Array:
+    """Return all rows as one array; the list then holds that one."""
     if not rows:
         return np.empty((0, width))
     if len(rows) > 1 or rows[0].ndim == 1:
@@ -122,25 +123,25 @@ def _whole(rows: list[Array], width: int) -> Array:
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """What is not the same in two jobs, in words."""
-    found = []
+    """Return what differs between two jobs, a line each."""
+    lines = []
     for key, now in new.items():
         was = old.get(key)
         if json.dumps(was, sort_keys=True) == json.dumps(now, sort_keys=True):
             continue
         if key == "parts":
             was = was or {}
-            found += [f"the part in slot {s} (its FMU)" for s in sorted({*was, *now}) if was.get(s) != now.get(s)]
+            lines += [f"the part in slot {s} (its FMU)" for s in sorted({*was, *now}) if was.get(s) != now.get(s)]
         elif isinstance(now, dict) and isinstance(was, dict):
             names = [n for n in {**was, **now} if was.get(n) != now.get(n)]
-            if "seed" in new and old.get("seed") != new["seed"]:  # said already; the slots' seeds come from it
+            if "seed" in new and old.get("seed") != new["seed"]:  # reported by itself; the slots' seeds follow from it
                 names = [n for n in names if not n.endswith(".seed")]
-            found += [f"{n}: {_shown(was.get(n))} there, {_shown(now.get(n))} here" for n in names]
+            lines += [f"{n}: {_shown(was.get(n))} there, {_shown(now.get(n))} here" for n in names]
         elif key == "wiring":
-            found.append(NAMES[key])
+            lines.append(NAMES[key])
         else:
-            found.append(f"{NAMES.get(key, key)}: {_shown(was)} there, {_shown(now)} here")
-    return found
+            lines.append(f"{NAMES.get(key, key)}: {_shown(was)} there, {_shown(now)} here")
+    return lines
 
 
 def _shown(value: Any) -> str:
@@ -148,8 +149,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-class Keeper:
-    """Keeps the checkpoint of one run.
+class CheckpointManager:
+    """The checkpoint of one run: reads, writes and removes it.
 
     folder: of the checkpoint.  resume: continue from the one in ``source`` (default: the folder).  stop_at: s of
     simulated time at which the run is interrupted as if by the user.  period: s of wall time between checkpoints.
@@ -168,43 +169,43 @@ class Keeper:
         self.source = Path(source or folder)
         self.stop_at = stop_at
         self.period = PERIOD if period is None else period
-        self.says = ""  # whether and how an interrupted run goes on
+        self.resume_hint = ""  # whether and how an interrupted run goes on
         self.resumed_at: list[float] = []  # s
         self.job: dict[str, Any] = {}
         self.head: dict[str, Any] = {}
         self.arrays: dict[str, Array] = {}
         self.due = self.began = time.monotonic()
 
-    def check(self, job: Mapping[str, Any], program: Program, slaves: Mapping[str, Slave]) -> None:
-        """Before anything runs: reads the checkpoint when resuming.  Raises ResumeError when it is not of this job."""
-        self.program, self.slaves = program, slaves
+    def check(self, job: Mapping[str, Any], program: Program, instances: Mapping[str, FmuInstance]) -> None:
+        """Read the checkpoint when resuming, before anything runs.  Raises ResumeError when it is not of this job."""
+        self.program, self.instances = program, instances
         job = {**job, "order": program.order, "wiring": wiring(program)}
         self.job = json.loads(json.dumps(job))
-        self.why = obstacle(slaves)
+        self.obstacle = resume_obstacle(instances)
         if not self.resume:
             return
-        if self.why:
-            raise ResumeError(f"--resume: {self.why}; run it again without --resume")
+        if self.obstacle:
+            raise ResumeError(f"--resume: {self.obstacle}; run it again without --resume")
         file = self.source / FILE
         if not file.is_file():
             raise ResumeError(f"--resume: no interrupted run to continue in {self.source} (there is no {FILE})")
         self.head, self.arrays = _read(file)
-        found = differences(self.head["job"], self.job)
-        if found:
-            more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
-            lines = "".join(f"\n  - {line}" for line in [*found[:SHOWN], *more])
+        changed = differences(self.head["job"], self.job)
+        if changed:
+            more = [f"and {len(changed) - MAX_LISTED} more"] if len(changed) > MAX_LISTED else []
+            lines = "".join(f"\n  - {line}" for line in [*changed[:MAX_LISTED], *more])
             raise ResumeError(f"--resume: the interrupted run in {self.source} is another one; what differs:{lines}")
 
     def notes(self) -> list[str]:
-        """What to say before a run that starts anew although it could be continued."""
+        """Return notes for a run that starts anew although it could be continued."""
         if self.resume or not (self.source / FILE).is_file():
             return []
         return [f"this run starts anew; the interrupted one in {self.source} could be continued with --resume"]
 
-    def restore(self, state: Progress) -> Progress:
-        """The run as it was saved, after initialization; ``state`` itself when not resuming.
+    def restore(self, state: RunState) -> RunState:
+        """Return the state of the run as it was saved, after initialization; ``state`` itself when not resuming.
 
-        Raises FmuCallError, and ResumeError for an FMU that does not show its outputs again.
+        Raises FmuCallError, and ResumeError for an FMU whose outputs are not those it had.
         """
         self.due = time.monotonic() + self.period
         if not self.resume:
@@ -213,7 +214,7 @@ class Keeper:
         try:
             states = {slot: self.arrays[f"state.{slot}"].tobytes() for slot in self.program.order}
             saved = self.arrays["out"]
-            found = Progress(
+            restored = RunState(
                 k=int(self.head["k"]),
                 last=float(self.arrays["last"][0]),
                 finished=bool(self.head["finished"]),
@@ -222,41 +223,43 @@ class Keeper:
                 timed=int(self.head["timed"]),
                 timed_seconds=dict(self.head["timed_seconds"]),
             )
-            self.resumed_at = [*self.head["resumed_at"], found.k * float(self.job["step"])]
+            self.resumed_at = [*self.head["resumed_at"], restored.k * float(self.job["step"])]
         except KeyError as error:
             raise ResumeError(f"{self.source / FILE}: not a checkpoint that can be read: {error} is missing") from None
         for p in self.program.parts:
-            slave = self.slaves[p.slot]
-            assert isinstance(slave, LocalSlave)
-            load_state(slave, states[p.slot])
-            take(slave, p.gets, out)
+            instance = self.instances[p.slot]
+            assert isinstance(instance, LocalInstance)
+            load_state(instance, states[p.slot])
+            read_outputs(instance, p.gets, out)
             if any(out[g.at : g.at + g.n].tobytes() != saved[g.at : g.at + g.n].tobytes() for g in p.gets):
                 raise ResumeError(
                     f"--resume: {p.slot}: the outputs of the FMU are not those it had when its state was saved; "
                     "it does not save all of its state, so the run cannot be continued"
                 )
         out[:] = saved
-        return found
+        return restored
 
     def last_step(self, h: float) -> int | None:
-        """The step after which the run stops as asked for."""
+        """Return the step after which the run is to stop; None for no such request."""
         return None if self.stop_at is None else max(0, round(self.stop_at / h))
 
-    def look(self, state: Progress) -> None:
-        """Between two chunks: writes a checkpoint when one is due."""
-        if time.monotonic() >= self.due and not self.why:
+    def save_if_due(self, state: RunState) -> None:
+        """Write a checkpoint when one is due; called between two chunks."""
+        if time.monotonic() >= self.due and not self.obstacle:
             began = time.monotonic()
             self.write(state)
             now = time.monotonic()
             self.due = now + max(self.period, SHARE * (now - began))
 
-    def stopped(self, state: Progress) -> None:
-        """The user has stopped the run: writes the checkpoint, or says why there is none."""
-        problem = self.why or self.write(state)
-        self.says = f"it cannot be resumed: {problem}" if problem else "the same command with --resume continues it"
+    def save_on_interrupt(self, state: RunState) -> None:
+        """Write the checkpoint of a run that the user stopped, or keep the reason why there is none."""
+        problem = self.obstacle or self.write(state)
+        self.resume_hint = (
+            f"it cannot be resumed: {problem}" if problem else "the same command with --resume continues it"
+        )
 
-    def write(self, state: Progress) -> str:
-        """Writes the checkpoint.  What hinders it is returned, not raised: the run itself is sound."""
+    def write(self, state: RunState) -> str:
+        """Write the checkpoint; return what prevents it, "" where nothing: the run itself is sound."""
         program = self.program
         head = {
             "format": FORMAT,
@@ -271,8 +274,8 @@ class Keeper:
             "head": np.frombuffer(json.dumps(head).encode("utf-8"), np.uint8),
             "out": program.out,
             "last": np.array([state.last]),
-            "channel": _whole(state.channel_rows, 1 + len(program.channel.names)),
-            "window": _whole(state.window_rows, 1 + len(program.window.names)),
+            "channel": _joined(state.channel_rows, 1 + len(program.channel.names)),
+            "window": _joined(state.window_rows, 1 + len(program.window.names)),
         }
 
         def save(path: Path) -> None:
@@ -282,22 +285,22 @@ class Keeper:
                 os.fsync(f.fileno())
 
         try:
-            for slot, slave in self.slaves.items():
-                assert isinstance(slave, LocalSlave)
-                arrays[f"state.{slot}"] = np.frombuffer(save_state(slave), np.uint8)
+            for slot, instance in self.instances.items():
+                assert isinstance(instance, LocalInstance)
+                arrays[f"state.{slot}"] = np.frombuffer(save_state(instance), np.uint8)
             self.folder.mkdir(parents=True, exist_ok=True)
             write_whole(self.folder / FILE, save)
         except (FmuCallError, OSError) as error:
             return str(error)
         return ""
 
-    def done(self) -> None:
-        """The record is complete and saved: removes the checkpoint, and what a killed process left of one."""
-        remove((self.folder, self.source))
+    def remove(self) -> None:
+        """Remove the checkpoint, and what a killed process left of one, once the record is complete and saved."""
+        remove_checkpoints((self.folder, self.source))
 
 
-def remove(folders: Iterable[Path]) -> None:
-    """Removes the checkpoints in folders."""
+def remove_checkpoints(folders: Iterable[Path]) -> None:
+    """Remove the checkpoints in folders."""
     for folder in folders:
         for file in folder.glob(f"{FILE}*"):
             file.unlink(missing_ok=True)

@@ -1,7 +1,7 @@
 """One FMU instance under FMPy, and the messages it logs.
 
-The engines talk to a slave in groups of variables (:class:`gyrobench.engine.program.Group`); a slave in a child
-process (:mod:`gyrobench.engine.isolated_instance`) has the same methods.
+The engines read and write groups of variables (:class:`gyrobench.engine.program.VariableGroup`); an instance in a
+child process (:mod:`gyrobench.engine.isolated_instance`) has the same methods.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Protocol
 
-from gyrobench.engine.program import Group
+from gyrobench.engine.program import VariableGroup
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Bound
 
@@ -29,16 +29,16 @@ class FmuCallError(GyrobenchError):
         self.slot, self.call, self.status, self.time = slot, call, status, time
         self.messages = list(messages)
         when = "" if time is None else f" at t = {time:.12g} s"
-        said = [m.removeprefix(f"{slot}: ") for m in self.messages]
-        if said and time is None:  # what the part refuses first: the names of calls mean nothing to most
-            text = "\n".join([f"{slot} does not start: {said[0]}", *(f"  {m}" for m in said[1:])])
+        texts = [m.removeprefix(f"{slot}: ") for m in self.messages]
+        if texts and time is None:  # the reason before the names of FMI calls
+            text = "\n".join([f"{slot} does not start: {texts[0]}", *(f"  {m}" for m in texts[1:])])
             super().__init__(f"{text}\n  ({call}: {status})")
         else:
-            super().__init__(f"{slot}: {call} failed{when}: {status}" + "".join(f"\n  {slot} said: {m}" for m in said))
+            super().__init__(f"{slot}: {call} failed{when}: {status}" + "".join(f"\n  FMU log: {m}" for m in texts))
 
 
-class Slave(Protocol):
-    """What the engines need of an FMU instance."""
+class FmuInstance(Protocol):
+    """The methods of an FMU instance that the engines call."""
 
     slot: str
 
@@ -46,30 +46,30 @@ class Slave(Protocol):
     def set_start(self, values: list[tuple[Bound, Any]]) -> None: ...
     def initialize(self, t0: float) -> None: ...
     def exit_initialization(self) -> None: ...
-    def write(self, group: Group) -> None: ...
-    def read(self, group: Group) -> None: ...
+    def write(self, group: VariableGroup) -> None: ...
+    def read(self, group: VariableGroup) -> None: ...
     def do_step(self, t: float, h: float) -> None: ...
     def messages(self) -> list[str]: ...
     def free(self) -> None: ...
     def close(self) -> None: ...
 
 
-_books: dict[int, deque[tuple[int, str]]] = {}
+_logs: dict[int, deque[tuple[int, str]]] = {}
 _ids = itertools.count(1)
 _template: Any = None
 
 
 def _log(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-    book = _books.get(environment or 0)
+    log = _logs.get(environment or 0)
     text = (message or b"").decode("utf-8", "replace").strip()
-    if book is not None:
-        book.append((status, text))
+    if log is not None:
+        log.append((status, text))
     elif status > 1:
         print(f"{(instance or b'').decode('utf-8', 'replace')}: {text}")
 
 
 def _callbacks(identity: int) -> Any:
-    """FMI 2 callbacks that log into the messages of ``identity``.
+    """Return FMI 2 callbacks that log into the messages of ``identity``.
 
     FMPy's proxy formats the variadic message and forwards it to one logger for the whole process, so that one
     dispatches by the component environment.
@@ -95,14 +95,14 @@ def _callbacks(identity: int) -> Any:
             addLoggerProxy(ctypes.byref(_template))
         except (ImportError, OSError):  # no proxy for this platform: messages come unformatted
             pass
-    own = fmi2CallbackFunctions()
+    callbacks = fmi2CallbackFunctions()
     for name in ("logger", "allocateMemory", "freeMemory"):
-        setattr(own, name, getattr(_template, name))
-    own.componentEnvironment = identity
-    return own
+        setattr(callbacks, name, getattr(_template, name))
+    callbacks.componentEnvironment = identity
+    return callbacks
 
 
-class LocalSlave:
+class LocalInstance:
     """An FMI 2.0 co-simulation FMU in this process.  Instances may follow one another; the library stays loaded."""
 
     def __init__(self, slot: str, description: Any, folder: Path) -> None:
@@ -110,8 +110,8 @@ class LocalSlave:
 
         self.slot, self.description = slot, description
         self.identity = next(_ids)
-        self.book: deque[tuple[int, str]] = deque(maxlen=KEPT)
-        _books[self.identity] = self.book
+        self.log: deque[tuple[int, str]] = deque(maxlen=KEPT)
+        _logs[self.identity] = self.log
         self.time: float | None = None
         self.live = False
         self.initialized = False
@@ -129,9 +129,9 @@ class LocalSlave:
         self.component: Any = None
 
     def messages(self) -> list[str]:
-        """Messages of the FMU, newest last: the bad ones, or all if there is none."""
-        bad = [text for status, text in self.book if status > 0]
-        return list(dict.fromkeys(bad or [text for _, text in self.book]))[-5:]
+        """Return the last messages of the FMU: warnings and errors, or all messages where there are none."""
+        warnings = [text for status, text in self.log if status > 0]
+        return list(dict.fromkeys(warnings or [text for _, text in self.log]))[-5:]
 
     def fail(self, call: str, error: Exception) -> FmuCallError:
         code = getattr(error, "status", None)
@@ -145,20 +145,20 @@ class LocalSlave:
             raise self.fail(name, error) from None
 
     def instantiate(self) -> None:
-        """A fresh instance, with logging of errors and warnings only where the FMU names such categories."""
-        self.book.clear()
+        """Create the instance; log errors and warnings only, where the FMU declares such categories."""
+        self.log.clear()
         self.time = None
         self.initialized = False
         self.call("instantiate", self.fmu.instantiate, callbacks=_callbacks(self.identity), loggingOn=True)
         self.live = True
         self.component = self.fmu.component
         words = ("error", "warning", "fatal", "discard")
-        named = [c.name for c in self.description.logCategories if any(w in c.name.lower() for w in words)]
-        if named:
-            self.call("setDebugLogging", self.fmu.setDebugLogging, True, named)
+        categories = [c.name for c in self.description.logCategories if any(w in c.name.lower() for w in words)]
+        if categories:
+            self.call("setDebugLogging", self.fmu.setDebugLogging, True, categories)
 
     def set_start(self, values: list[tuple[Bound, Any]]) -> None:
-        """Sets parameters and start values (in the FMU's own units) before initialization."""
+        """Set parameters and start values, in the FMU's own units, before initialization."""
         for kind in ("Real", "Integer", "Boolean", "String"):
             chosen = [(b, v) for b, v in values if b.kind == kind]
             if chosen:
@@ -167,7 +167,7 @@ class LocalSlave:
                 self.call(f"set{kind} of {names}", function, [b.reference for b, _ in chosen], [v for _, v in chosen])
 
     def initialize(self, t0: float) -> None:
-        """setupExperiment and enterInitializationMode."""
+        """Call setupExperiment and enterInitializationMode."""
         self.call("setupExperiment", self.fmu.setupExperiment, startTime=t0)
         self.call("enterInitializationMode", self.fmu.enterInitializationMode)
 
@@ -175,22 +175,22 @@ class LocalSlave:
         self.call("exitInitializationMode", self.fmu.exitInitializationMode)
         self.initialized = True
 
-    def write(self, group: Group) -> None:
-        """Sets the values of a group."""
+    def write(self, group: VariableGroup) -> None:
+        """Set the values of a group."""
         try:
             self.setters[group.kind](self.component, group.references, group.n, group.values)
         except Exception as error:
             raise self.fail(f"set{group.kind}", error) from None
 
-    def read(self, group: Group) -> None:
-        """Gets the values of a group."""
+    def read(self, group: VariableGroup) -> None:
+        """Get the values of a group."""
         try:
             self.getters[group.kind](self.component, group.references, group.n, group.values)
         except Exception as error:
             raise self.fail(f"get{group.kind}", error) from None
 
     def do_step(self, t: float, h: float) -> None:
-        """One communication step; a status worse than warning is a failure."""
+        """Do one communication step; a status worse than warning is a failure."""
         try:
             self.fmu.fmi2DoStep(self.component, t, h, 1)
         except Exception as error:
@@ -198,12 +198,12 @@ class LocalSlave:
             raise self.fail("doStep", error) from None
 
     def pointers(self) -> dict[str, int]:
-        """Addresses of the functions that the native engine calls."""
+        """Return the addresses of the functions that the native engine calls."""
         names = ["DoStep", *(f"{a}{k}" for a in ("Set", "Get") for k in ("Real", "Integer", "Boolean"))]
         return {n: ctypes.cast(getattr(self.fmu.dll, f"fmi2{n}"), ctypes.c_void_p).value or 0 for n in names}
 
     def free(self) -> None:
-        """Terminates and frees the instance; a second call does nothing."""
+        """Terminate and free the instance; a second call does nothing."""
         if self.live:
             self.live = False
             if self.initialized:
@@ -212,7 +212,7 @@ class LocalSlave:
             self.fmu.fmi2FreeInstance(self.component)
 
     def close(self) -> None:
-        """Frees the instance and the library."""
+        """Free the instance and the library."""
         self.free()
-        _books.pop(self.identity, None)
+        _logs.pop(self.identity, None)
         self.fmu.freeLibrary()

@@ -1,8 +1,7 @@
 """An FMU in a child process: its crash or hang ends in a message, not in a dead bench.
 
-The child (:mod:`gyrobench.engine.isolation_server`) is started for each instance.  Writes are kept back and travel
-with the
-next step or read, so that a step costs one or two round trips.
+The child (:mod:`gyrobench.engine.isolation_server`) is started for each instance.  Writes are buffered and sent
+with the next step or read, so that a step costs one or two round trips.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from typing import IO, Any
 
 from gyrobench.engine.fmu_instance import FmuCallError
 from gyrobench.engine.isolation_server import receive, send
-from gyrobench.engine.program import Group
+from gyrobench.engine.program import VariableGroup
 from gyrobench.system.binding import Bound
 
-LOOK = 0.05  # s between two looks of the watchdog
+POLL = 0.05  # s between two checks of the watchdog
 
 
 class _Watchdog(threading.Thread):
-    """Kills the process when a call takes longer than allowed."""
+    """A thread that kills the process when a call takes longer than allowed."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         super().__init__(daemon=True)
@@ -43,11 +42,11 @@ class _Watchdog(threading.Thread):
                 self.hung = True
                 self.process.kill()
                 return
-            time.sleep(LOOK)
+            time.sleep(POLL)
 
 
-class RemoteSlave:
-    """The methods of :class:`gyrobench.engine.fmu_instance.LocalSlave`, answered by a child process.
+class IsolatedInstance:
+    """An FMU instance in a child process; its methods are those of :class:`gyrobench.engine.fmu_instance.FmuInstance`.
 
     timeout: s, for one call (the first one, which starts Python and loads the FMU, may take 30 s longer).
     """
@@ -59,7 +58,7 @@ class RemoteSlave:
         self.watchdog: _Watchdog | None = None
         self.pending: list[tuple[int, list[Any]]] = []
         self.known: dict[int, int] = {}
-        self.groups: list[Group] = []
+        self.groups: list[VariableGroup] = []
         self.time: float | None = None
 
     # ------------------------------------------------------------ the process
@@ -91,28 +90,29 @@ class RemoteSlave:
                     stream.close()
             self.errors = None
 
-    def _said(self) -> list[str]:
-        """The last lines that the child wrote to standard error."""
+    def _last_lines(self) -> list[str]:
+        """Return the last lines that the child wrote to standard error."""
         if self.errors is None:
             return []
         self.errors.seek(0)
         lines = self.errors.read().decode("utf-8", "replace").strip().splitlines()
         return lines[-5:]
 
-    def _died(self, call: str) -> FmuCallError:
+    def _process_failure(self, call: str) -> FmuCallError:
+        """Return the error of a call whose process crashed, ended or was killed."""
         assert self.process is not None and self.watchdog is not None
         code = self.process.wait()
-        said = self._said()
+        lines = self._last_lines()
         if self.watchdog.hung:
             status = f"no answer within {self.timeout:g} s; its process was stopped"
         elif code < 0:
             status = f"its process crashed ({signal.Signals(-code).name})"
         else:
             status = f"its process ended with exit code {code}"
-        return FmuCallError(self.slot, call, status, self.time, said)
+        return FmuCallError(self.slot, call, status, self.time, lines)
 
     def ask(self, call: str, *arguments: Any) -> Any:
-        """One request; raises FmuCallError when it fails, crashes or hangs."""
+        """Send a request and return the reply.  Raises FmuCallError when it fails, crashes or hangs."""
         grace = 0.0
         if self.process is None:
             self._start()
@@ -122,32 +122,32 @@ class RemoteSlave:
         self.watchdog.deadline = time.monotonic() + self.timeout + grace
         try:
             send(self.process.stdin, (call, *arguments))  # type: ignore[arg-type]
-            answer = receive(self.process.stdout)  # type: ignore[arg-type]
+            reply = receive(self.process.stdout)  # type: ignore[arg-type]
         except (EOFError, OSError):
-            raise self._died({"step": "doStep"}.get(call, call)) from None
+            raise self._process_failure({"step": "doStep"}.get(call, call)) from None
         finally:
             self.watchdog.deadline = None
-        if answer[0] == "ok":
-            return answer[1]
-        _, failed, status, when, messages = answer
-        raise FmuCallError(self.slot, failed, status, self.time if when is None else when, messages)
+        if reply[0] == "ok":
+            return reply[1]
+        _, failed_call, status, when, messages = reply
+        raise FmuCallError(self.slot, failed_call, status, self.time if when is None else when, messages)
 
-    def number(self, group: Group) -> int:
-        """The number under which the child knows a group."""
-        found = self.known.get(id(group))
-        if found is None:
-            found = self.known[id(group)] = len(self.groups)
+    def number(self, group: VariableGroup) -> int:
+        """Return the number under which the child knows a group."""
+        number = self.known.get(id(group))
+        if number is None:
+            number = self.known[id(group)] = len(self.groups)
             self.groups.append(group)
-            self.ask("group", found, group.kind, list(group.references))
-        return found
+            self.ask("group", number, group.kind, list(group.references))
+        return number
 
     def flush(self) -> None:
-        """Sends the writes kept back."""
+        """Send the buffered writes."""
         pending, self.pending = self.pending, []
         for number, values in pending:
             self.ask("write", number, values)
 
-    # ------------------------------------------------------------ the methods of a slave
+    # ------------------------------------------------------------ the methods of FmuInstance
     def instantiate(self) -> None:
         self.pending, self.time = [], None
         self.ask("instantiate")
@@ -162,10 +162,10 @@ class RemoteSlave:
         self.flush()
         self.ask("exit_initialization")
 
-    def write(self, group: Group) -> None:
+    def write(self, group: VariableGroup) -> None:
         self.pending.append((self.number(group), list(group.values)))
 
-    def read(self, group: Group) -> None:
+    def read(self, group: VariableGroup) -> None:
         self.flush()
         group.values[:] = self.ask("read", self.number(group))
 
@@ -175,11 +175,11 @@ class RemoteSlave:
         self.ask("step", pending, t, h, [])
 
     def messages(self) -> list[str]:
-        """Messages travel with the failures."""
+        """Return no messages: they come with the failures."""
         return []
 
     def free(self) -> None:
-        """Ends the process; the next instance gets a new one."""
+        """End the process; the next instance gets a new one."""
         if self.process is not None and self.process.poll() is None:
             with contextlib.suppress(FmuCallError):
                 self.ask("free")

@@ -1,7 +1,7 @@
 """The child process that holds one isolated FMU: ``python -m gyrobench.engine.isolation_server SLOT FOLDER``.
 
 Protocol on its standard streams, in both directions: four bytes of length, then a marshalled tuple.  A request is
-(call, arguments...), an answer ("ok", value) or ("failed", call, status, time, messages).  What the FMU itself prints
+(call, arguments...), a reply ("ok", value) or ("failed", call, status, time, messages).  What the FMU itself prints
 goes to standard error.
 """
 
@@ -14,20 +14,20 @@ import sys
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave
-from gyrobench.engine.program import Group
+from gyrobench.engine.fmu_instance import FmuCallError, LocalInstance
+from gyrobench.engine.program import VariableGroup
 from gyrobench.system.binding import Bound
 
 
 def send(stream: BinaryIO, message: tuple[Any, ...]) -> None:
-    """Writes one message."""
+    """Write one message."""
     data = marshal.dumps(message)
     stream.write(struct.pack("<I", len(data)) + data)
     stream.flush()
 
 
 def receive(stream: BinaryIO) -> tuple[Any, ...]:
-    """Reads one message; raises EOFError when the other side is gone."""
+    """Return the next message.  Raises EOFError when the other side is gone."""
     head = stream.read(4)
     if len(head) < 4:
         raise EOFError
@@ -41,38 +41,38 @@ class _Server:
         from fmpy import read_model_description
 
         description = read_model_description(str(folder), validate=False)
-        self.slave = LocalSlave(slot, description, folder)
-        self.groups: dict[int, Group] = {}
+        self.instance = LocalInstance(slot, description, folder)
+        self.groups: dict[int, VariableGroup] = {}
 
     def group(self, number: int, kind: str, references: list[int]) -> None:
-        self.groups[number] = Group(kind, references)
+        self.groups[number] = VariableGroup(kind, references)
 
     def set_start(self, values: list[tuple[Any, ...]]) -> None:
-        self.slave.set_start([(Bound(*b), v) for b, v in values])
+        self.instance.set_start([(Bound(*b), v) for b, v in values])
 
     def write(self, number: int, values: list[Any]) -> None:
         group = self.groups[number]
         group.values[:] = values
-        self.slave.write(group)
+        self.instance.write(group)
 
     def read(self, number: int) -> list[Any]:
         group = self.groups[number]
-        self.slave.read(group)
+        self.instance.read(group)
         return list(group.values)
 
     def step(self, writes: list[tuple[int, list[Any]]], t: float, h: float, reads: list[int]) -> list[list[Any]]:
         for number, values in writes:
             self.write(number, values)
-        self.slave.do_step(t, h)
+        self.instance.do_step(t, h)
         return [self.read(n) for n in reads]
 
     def handle(self, call: str, *arguments: Any) -> Any:
-        own = getattr(self, call, None)
-        return own(*arguments) if own is not None else getattr(self.slave, call)(*arguments)
+        method = getattr(self, call, None)
+        return method(*arguments) if method is not None else getattr(self.instance, call)(*arguments)
 
 
 def main() -> None:
-    """Serves requests until the parent closes the stream."""
+    """Serve requests until the parent closes the stream."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # prints of the FMU do not disturb the protocol
     requests = sys.stdin.buffer

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench.engine.engine_library import engine_library
-from gyrobench.engine.fmu_instance import STATUS, FmuCallError, LocalSlave
-from gyrobench.engine.program import KINDS, Group, Program, Row
-from gyrobench.engine.reference_engine import Progress
+from gyrobench.engine.fmu_instance import STATUS, FmuCallError, LocalInstance
+from gyrobench.engine.program import KINDS, Program, RecordRow, VariableGroup
+from gyrobench.engine.reference_engine import RunState
 
 BLOCK = 16384  # rows
 MORE, DONE, FULL, FAILED = range(4)
@@ -73,23 +73,23 @@ class _Run(ctypes.Structure):
 
 
 class NativeEngine:
-    """The loop in C.  Every slave must be a LocalSlave.  Raises CompilerError where C cannot be compiled."""
+    """The loop in C.  Every instance must be a LocalInstance.  Raises CompilerError where C cannot be compiled."""
 
     name = "native"
 
-    def __init__(self, program: Program, slaves: Mapping[str, LocalSlave]) -> None:
+    def __init__(self, program: Program, instances: Mapping[str, LocalInstance]) -> None:
         self.library = engine_library()
         self.program = program
-        self.slaves = [slaves[p.slot] for p in program.parts]
+        self.instances = [instances[p.slot] for p in program.parts]
         self.keep: list[Any] = []
         self.run = _Run()
         parts = (_Part * len(program.parts))()
-        for part, p, slave in zip(parts, program.parts, self.slaves, strict=True):
-            functions = slave.pointers()
-            part.component = slave.component
+        for part, p, instance in zip(parts, program.parts, self.instances, strict=True):
+            functions = instance.pointers()
+            part.component = instance.component
             part.step = functions["DoStep"]
             for name in ("sets", "gets", "channel_gets", "window_gets"):
-                groups: list[Group] = getattr(p, name)
+                groups: list[VariableGroup] = getattr(p, name)
                 call = "Set" if name == "sets" else "Get"
                 packed = (_Group * max(len(groups), 1))(*(self.group(g, functions[call + g.kind]) for g in groups))
                 setattr(part, f"n_{name}", len(groups))
@@ -112,7 +112,7 @@ class NativeEngine:
         self.keep.append(array)
         return ctypes.addressof(array)
 
-    def group(self, g: Group, call: int) -> _Group:
+    def group(self, g: VariableGroup, call: int) -> _Group:
         self.keep.append(g)
         return _Group(
             KINDS.index(g.kind),
@@ -127,8 +127,8 @@ class NativeEngine:
             self.pointer([f for _, f in g.scaled], c_double),
         )
 
-    def table(self, table: _Table, row: Row) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Gives a table of rows its block."""
+    def table(self, table: _Table, row: RecordRow) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Allocate and return the block of a table of rows."""
         block = np.empty((BLOCK, 1 + len(row.source)))
         table.n, table.rows, table.capacity = len(row.source), 0, BLOCK
         table.source = self.pointer(row.source, c_int32)
@@ -136,37 +136,37 @@ class NativeEngine:
         table.block = block.ctypes.data
         return block
 
-    def empty(self, progress: Progress) -> None:
-        """Moves the recorded rows into the progress."""
-        for name, rows in (("channel", progress.channel_rows), ("window", progress.window_rows)):
+    def drain(self, state: RunState) -> None:
+        """Move the recorded rows into the state."""
+        for name, rows in (("channel", state.channel_rows), ("window", state.window_rows)):
             table: _Table = getattr(self.run, name)
             if table.rows:
                 rows.append(self.blocks[name][: table.rows].copy())
                 table.rows = 0
 
-    def advance(self, progress: Progress, k_end: int, t0: float, h: float, every: int) -> None:
-        """Runs steps until k_end or done; ``every`` steps a row of the channels.  Raises FmuCallError."""
+    def advance(self, state: RunState, k_end: int, t0: float, h: float, every: int) -> None:
+        """Run steps until k_end or done; ``every`` steps a row of the channels.  Raises FmuCallError."""
         r = self.run
-        r.t0, r.h, r.k, r.every, r.last = t0, h, progress.k, every, progress.last
-        r.timed = progress.timed
-        self.seconds[:] = [progress.timed_seconds[p.slot] for p in self.program.parts]
+        r.t0, r.h, r.k, r.every, r.last = t0, h, state.k, every, state.last
+        r.timed = state.timed
+        self.seconds[:] = [state.timed_seconds[p.slot] for p in self.program.parts]
         while True:
             code = self.library.gyrobench_run(ctypes.byref(r), c_int64(k_end))
-            self.empty(progress)
+            self.drain(state)
             if code != FULL:
                 break
-        progress.k, progress.last, progress.timed = int(r.k), float(r.last), int(r.timed)
+        state.k, state.last, state.timed = int(r.k), float(r.last), int(r.timed)
         for p, s in zip(self.program.parts, self.seconds, strict=True):
-            progress.timed_seconds[p.slot] = float(s)
+            state.timed_seconds[p.slot] = float(s)
         if code == DONE:
-            progress.finished = True
+            state.finished = True
         if code == FAILED:
-            slave = self.slaves[r.failed_part]
+            instance = self.instances[r.failed_part]
             kind = KINDS[r.failed_kind]
             call = (f"set{kind}", "doStep", f"get{kind}")[r.failed_call]
             status = f"status {r.failed_status} ({STATUS[r.failed_status] if r.failed_status < 6 else 'unknown'})"
-            raise FmuCallError(slave.slot, call, status, t0 + progress.k * h, slave.messages())
+            raise FmuCallError(instance.slot, call, status, t0 + state.k * h, instance.messages())
 
     def close(self) -> None:
-        """Drops the arrays; the slaves are freed by their owner."""
+        """Release the arrays; the instances are freed by their owner."""
         self.keep.clear()

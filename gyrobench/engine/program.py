@@ -2,7 +2,7 @@
 
 All outputs that are needed live in one buffer ``out`` of doubles.  Each part has a slice of it for what is read in
 every step (wired or watched), and further slices for what is read only when a row of the channels or of the windows
-is due.  A ``Group`` is one FMI get or set call with its arrays.
+is due.  A ``VariableGroup`` is one FMI get or set call with its arrays.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from gyrobench.system.wiring import Assembly
 KINDS = ("Real", "Integer", "Boolean")
 
 
-class Group:
-    """The arrays of one getXXX or setXXX call.
+class VariableGroup:
+    """The arrays of one fmi2GetXXX or fmi2SetXXX call.
 
     kind: Real, Integer or Boolean.  values: ctypes array the call reads or writes.  For a get, ``at`` is the place of
     the first value in ``out`` (a Real get writes there directly).  For a set, ``source[j]`` is the place in ``out``
@@ -40,17 +40,17 @@ class Group:
 
 @dataclass
 class PartProgram:
-    """What one part does in a step: sets, doStep, gets; and the rarely read outputs."""
+    """The calls of one part in a communication step: sets, doStep, gets; and the outputs read for rows only."""
 
     slot: str
-    sets: list[Group] = field(default_factory=list)
-    gets: list[Group] = field(default_factory=list)
-    channel_gets: list[Group] = field(default_factory=list)
-    window_gets: list[Group] = field(default_factory=list)
+    sets: list[VariableGroup] = field(default_factory=list)
+    gets: list[VariableGroup] = field(default_factory=list)
+    channel_gets: list[VariableGroup] = field(default_factory=list)
+    window_gets: list[VariableGroup] = field(default_factory=list)
 
 
 @dataclass
-class Row:
+class RecordRow:
     """A row of the record: column names and the places and factors of their values in ``out``."""
 
     names: list[str] = field(default_factory=list)
@@ -64,8 +64,8 @@ class Program:
 
     parts: list[PartProgram]
     out: np.ndarray[Any, np.dtype[np.float64]]
-    channel: Row
-    window: Row
+    channel: RecordRow
+    window: RecordRow
     watch: int  # place in out, -1: none
     done: int
 
@@ -76,10 +76,11 @@ class Program:
 
 
 def _needed(names: Iterable[tuple[str, Bound]]) -> dict[str, dict[int, Bound]]:
-    found: dict[str, dict[int, Bound]] = {}
+    """Return the variables by slot, each once."""
+    by_slot: dict[str, dict[int, Bound]] = {}
     for slot, b in names:
-        found.setdefault(slot, {})[_key(b)] = b
-    return found
+        by_slot.setdefault(slot, {})[_key(b)] = b
+    return by_slot
 
 
 def _key(b: Bound) -> int:
@@ -87,14 +88,17 @@ def _key(b: Bound) -> int:
 
 
 def build_program(assembly: Assembly) -> Program:
-    """Lays out the buffers of an assembly.  Raises WiringError for a channel or window column that does not exist."""
+    """Return the program of an assembly, with its buffers.
+
+    Raises WiringError for a channel or window column that does not exist.
+    """
     system = assembly.system
     channels = {n: assembly.output(n) for n in system.channels if not _absent(assembly, n)}
     windows = system.windows
     columns = {k: assembly.output(n) for k, n in windows.columns.items()} if windows else {}
     watch = assembly.output(windows.watch) if windows else None
     done = assembly.output(system.done) if system.done else None
-    always = _needed(
+    every_step = _needed(
         [*((c.source, c.output) for c in assembly.connections), *(x for x in (watch, done) if x is not None)]
     )
     rare = (_needed(channels.values()), _needed(columns.values()))
@@ -104,12 +108,12 @@ def build_program(assembly: Assembly) -> Program:
     for slot in assembly.order.order:
         p = PartProgram(slot)
         for which, groups in enumerate((p.gets, p.channel_gets, p.window_gets)):
-            wanted = (always, *rare)[which].get(slot, {})
-            new = [b for k, b in wanted.items() if which == 0 or (slot, k) not in places[0]]
+            needed = (every_step, *rare)[which].get(slot, {})
+            new = [b for k, b in needed.items() if which == 0 or (slot, k) not in places[0]]
             for kind in KINDS:
                 bounds = [b for b in new if b.kind == kind]
                 if bounds:
-                    group = Group(kind, [b.reference for b in bounds])
+                    group = VariableGroup(kind, [b.reference for b in bounds])
                     group.at = size
                     for b in bounds:
                         places[which][(slot, _key(b))] = size
@@ -125,7 +129,7 @@ def build_program(assembly: Assembly) -> Program:
         for kind in KINDS:
             links = [c for c in incoming if c.input.kind == kind]
             if links:
-                g = Group(kind, [c.input.reference for c in links])
+                g = VariableGroup(kind, [c.input.reference for c in links])
                 g.source = [places[0][(c.source, _key(c.output))] for c in links]
                 g.scaled = [(j, c.gain) for j, c in enumerate(links) if c.gain != 1.0]
                 p.sets.append(g)
@@ -136,14 +140,14 @@ def build_program(assembly: Assembly) -> Program:
         key = (where[0], _key(where[1]))
         return places[0][key] if key in places[0] else places[which][key]
 
-    def row(named: dict[str, tuple[str, Bound]], which: int) -> Row:
-        return Row(list(named), [at(w, which) for w in named.values()], [w[1].gain for w in named.values()])
+    def row(named: dict[str, tuple[str, Bound]], which: int) -> RecordRow:
+        return RecordRow(list(named), [at(w, which) for w in named.values()], [w[1].gain for w in named.values()])
 
     return Program(programs, out, row(channels, 1), row(columns, 2), at(watch), at(done))
 
 
 def _absent(assembly: Assembly, name: str) -> bool:
-    """True for an optional output that the FMU in the slot does not have."""
+    """Return whether this is an optional output that the FMU in the slot does not have."""
     slot, _, element = name.partition(".")
     binding = assembly.bindings.get(slot)
     return binding is not None and element not in binding.outputs and element.split("[")[0] in binding.absent

@@ -1,4 +1,4 @@
-"""Drives an engine in chunks: progress, interruption, the end of the plan."""
+"""Execution of an engine in chunks: progress, interruption, the end of the plan."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from gyrobench.engine.checkpoint import Keeper
-from gyrobench.engine.reference_engine import Progress
+from gyrobench.engine.checkpoint import CheckpointManager
+from gyrobench.engine.reference_engine import RunState
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.system import System
 
-CHUNK = 0.2  # s of wall time between two looks at the world
+CHUNK = 0.2  # s of wall time per engine call; progress and Ctrl-C are handled between calls
 PATIENCE = 3.0  # a plan may take this many times its own duration
 GRACE = 3600.0  # s, and this much longer
 
 
 @dataclass(frozen=True)
-class Status:
-    """How far a run is.
+class ProgressReport:
+    """Progress of a run.
 
     total: s, expected end of the simulated time; rate: steps per second of wall time; steps, elapsed (s of wall time):
     since the run was started or resumed, which was at the simulated time ``since``, s.
@@ -38,7 +38,7 @@ class Status:
 
     @property
     def fraction(self) -> float:
-        """Between 0 and 1; an estimate, as the ways between the phases of a plan are not known beforehand."""
+        """Completed fraction, 0 to 1; an estimate: the transitions between phases are not known beforehand."""
         return min(1.0, self.time / self.total) if self.total > 0.0 else 0.0
 
     @property
@@ -60,55 +60,58 @@ class _CtrlC:
     """While active, the first Ctrl-C only raises a flag, so that no step or row is lost; the second one kills."""
 
     def __init__(self) -> None:
-        self.hit = False
-        self.before: Any = None
+        self.pressed = False
+        self.previous_handler: Any = None
 
     def __enter__(self) -> _CtrlC:
         if threading.current_thread() is threading.main_thread():
-            self.before = signal.signal(signal.SIGINT, self._on)
+            self.previous_handler = signal.signal(signal.SIGINT, self._handle)
         return self
 
-    def _on(self, number: int, frame: FrameType | None) -> None:
-        self.hit = True
-        signal.signal(signal.SIGINT, self.before or signal.SIG_DFL)
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.pressed = True
+        signal.signal(signal.SIGINT, self.previous_handler or signal.SIG_DFL)
 
     def __exit__(self, *_: object) -> None:
-        if self.before is not None:
-            signal.signal(signal.SIGINT, self.before)
+        if self.previous_handler is not None:
+            signal.signal(signal.SIGINT, self.previous_handler)
 
 
-def drive(
+def run_to_end(
     engine: Any,
-    state: Progress,
+    state: RunState,
     system: System,
     every: int,
-    progress: Callable[[Status], None] | None,
-    keeper: Keeper | None = None,
+    progress: Callable[[ProgressReport], None] | None,
+    checkpoints: CheckpointManager | None = None,
 ) -> None:
-    """Runs to the end.  Raises FmuCallError from the engine, EngineStopped when stopped or when the plan never ends."""
+    """Run the engine to the end.
+
+    Raises FmuCallError from the engine, EngineStopped when stopped or when the plan never ends.
+    """
     h = system.step
     planned = system.plan().duration()
     total = system.stop if system.stop is not None else planned
     limit = total if system.stop is not None else PATIENCE * planned + GRACE
     k_limit = max(1, round(limit / h))
-    asked = keeper.last_step(h) if keeper is not None else None
-    k_stop = k_limit if asked is None else min(k_limit, max(asked, state.k))
+    k_asked = checkpoints.last_step(h) if checkpoints is not None else None
+    k_stop = k_limit if k_asked is None else min(k_limit, max(k_asked, state.k))
     chunk, k_first = 256, state.k
     began = time.perf_counter()
     with _CtrlC() as ctrl_c:
         while not state.finished and state.k < k_stop:
-            before, first = time.perf_counter(), state.k
+            chunk_began, k_before = time.perf_counter(), state.k
             engine.advance(state, min(k_stop, state.k + chunk), 0.0, h, every)
             now = time.perf_counter()
-            rate = (state.k - first) / max(now - before, 1e-9)
+            rate = (state.k - k_before) / max(now - chunk_began, 1e-9)
             chunk = max(16, min(8 * chunk, int(rate * CHUNK)))
             if progress is not None:
                 windows = sum(len(r) if r.ndim == 2 else 1 for r in state.window_rows)
-                progress(Status(state.k * h, total, state.k - k_first, windows, rate, now - began, k_first * h))
-            if ctrl_c.hit:
+                progress(ProgressReport(state.k * h, total, state.k - k_first, windows, rate, now - began, k_first * h))
+            if ctrl_c.pressed:
                 raise EngineStopped(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
-            if keeper is not None:
-                keeper.look(state)
+            if checkpoints is not None:
+                checkpoints.save_if_due(state)
     if not state.finished and state.k < k_limit:
         raise EngineStopped(f"stopped at t = {state.k * h:.9g} s, as asked for", by_user=True)
     if not state.finished and system.stop is None:

@@ -1,8 +1,8 @@
-"""Runs a system: builds or takes the FMUs, binds, checks, orders, runs, and returns the record.
+"""Runs of a system: its FMUs built or loaded, bound, checked and ordered once, then run, each run with its record.
 
     record = run(load_system("tumble_single_axis"), values={"latitude": "45.75deg"}, seed=3, out=Path("reports/out/x"))
 
-A :class:`Session` prepares once (unzip, load, bind, order) and runs many times with other values and seeds.
+A :class:`Session` is prepared once (unzip, load, bind, order) and runs many times with other values and seeds.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.engine.checkpoint import Keeper
-from gyrobench.engine.fmu_instance import FmuCallError, LocalSlave, Slave
+from gyrobench.engine.checkpoint import CheckpointManager
+from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
 from gyrobench.engine.program import build_program
-from gyrobench.engine.reference_engine import ReferenceEngine, initialize, start
-from gyrobench.engine.run_driver import EngineStopped, Status, drive
+from gyrobench.engine.reference_engine import ReferenceEngine, initial_state, initialize
+from gyrobench.engine.run_driver import EngineStopped, ProgressReport, run_to_end
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import sha256
 from gyrobench.record.record import Record, rows_to_columns
@@ -34,7 +34,7 @@ from gyrobench.system.wiring import Assembly, assemble
 
 
 class RunError(GyrobenchError):
-    """A run that did not end as it should; ``record`` holds what there was until then (or None)."""
+    """A run that did not end as it should; ``record`` holds what was recorded until then (or None)."""
 
     exit_code = 3
 
@@ -87,7 +87,7 @@ class Session:
         paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
         self.swaps = {slot: Path(part).stem for slot, part in (parts or {}).items()}
         self.swapped = sorted(self.swaps)
-        self.said: set[str] = set()
+        self.warned: set[str] = set()
         self.bench = bench
         self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
@@ -98,10 +98,10 @@ class Session:
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
         self.engine = self._choose(engine)
         self.folder = Path(tempfile.mkdtemp(prefix="gyrobench-"))
-        self.slaves: dict[str, Slave] = {}
+        self.instances: dict[str, FmuInstance] = {}
         try:
             for slot, path in paths.items():
-                self.slaves[slot] = self._slave(slot, path, timeout)
+                self.instances[slot] = self._load_instance(slot, path, timeout)
         except BaseException as error:
             self.close()
             if isinstance(error, FmuCallError):
@@ -125,16 +125,16 @@ class Session:
             return "reference"
         return "native"
 
-    def _slave(self, slot: str, path: Path, timeout: float) -> Slave:
+    def _load_instance(self, slot: str, path: Path, timeout: float) -> FmuInstance:
         from fmpy import extract
 
         folder = self.folder / slot
         extract(str(path), str(folder))
         if slot in self.isolate:
-            from gyrobench.engine.isolated_instance import RemoteSlave
+            from gyrobench.engine.isolated_instance import IsolatedInstance
 
-            return RemoteSlave(slot, folder, timeout)
-        return LocalSlave(slot, self.assembly.descriptions[slot], folder)
+            return IsolatedInstance(slot, folder, timeout)
+        return LocalInstance(slot, self.assembly.descriptions[slot], folder)
 
     def __enter__(self) -> Session:
         return self
@@ -143,10 +143,10 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """Frees all FMUs and removes the unzipped files."""
-        for slave in self.slaves.values():
-            slave.close()
-        self.slaves = {}
+        """Free all FMUs and remove the unzipped files."""
+        for instance in self.instances.values():
+            instance.close()
+        self.instances = {}
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def run(
@@ -155,10 +155,10 @@ class Session:
         seed: int = 1,
         step: float | None = None,
         out: Path | None = None,
-        progress: Callable[[Status], None] | None = None,
-        keeper: Keeper | None = None,
+        progress: Callable[[ProgressReport], None] | None = None,
+        checkpoints: CheckpointManager | None = None,
     ) -> Record:
-        """One run from t = 0, or from where ``keeper`` resumes it, to its end.  See :func:`run`."""
+        """Run from t = 0, or from where ``checkpoints`` resumes, to the end; return the record.  See :func:`run`."""
         system = self.system.with_values(values or {})
         if step is not None:
             system.step = float(step)
@@ -180,45 +180,47 @@ class Session:
         if linear is not None:
             document.linear = linear
         every = max(1, round(system.channel_period / system.step))
-        if keeper is not None:
+        if checkpoints is not None:
             job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
-            keeper.check({**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.slaves)
+            checkpoints.check(
+                {**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.instances
+            )
         self.program.out[:] = 0.0
         state = None
         engine: Any = None
         problem: Exception | None = None
         try:
             for slot in self.program.order:
-                self.slaves[slot].instantiate()
-                self.slaves[slot].set_start(starts[slot])
-            initialize(self.program, self.slaves, 0.0)
-            state = start(self.program, self.slaves, 0.0)
-            if keeper is not None:
-                state = keeper.restore(state)
+                self.instances[slot].instantiate()
+                self.instances[slot].set_start(starts[slot])
+            initialize(self.program, self.instances, 0.0)
+            state = initial_state(self.program, self.instances, 0.0)
+            if checkpoints is not None:
+                state = checkpoints.restore(state)
             if self.engine == "native":
                 from gyrobench.engine.native_engine import NativeEngine
 
-                engine = NativeEngine(self.program, self.slaves)  # type: ignore[arg-type]
+                engine = NativeEngine(self.program, self.instances)  # type: ignore[arg-type]
             else:
-                engine = ReferenceEngine(self.program, self.slaves)
-            drive(engine, state, system, every, progress, keeper)
+                engine = ReferenceEngine(self.program, self.instances)
+            run_to_end(engine, state, system, every, progress, checkpoints)
         except (FmuCallError, EngineStopped) as error:
             problem = error
-            if keeper is not None and state is not None and isinstance(error, EngineStopped) and error.by_user:
-                keeper.stopped(state)
+            if checkpoints is not None and state is not None and isinstance(error, EngineStopped) and error.by_user:
+                checkpoints.save_on_interrupt(state)
         finally:
             if engine is not None:
                 engine.close()
-            for slave in self.slaves.values():
-                slave.free()
+            for instance in self.instances.values():
+                instance.free()
         if state is None:
-            said = isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status
-            raise (ParameterRefusedError if said else RunError)(str(problem))
-        return self._finish(state, system, document, out, problem, keeper)
+            refused = isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status
+            raise (ParameterRefusedError if refused else RunError)(str(problem))
+        return self._finish(state, system, document, out, problem, checkpoints)
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
-        """Return the linear models for run.json; what they say against the run is told at once, and noted."""
+        """Return the linear models for run.json; their warnings are logged immediately, and noted."""
         from gyrobench.linear.crossovers import missed_crossovers
         from gyrobench.linear.linear_model import LinearizationError, loops
         from gyrobench.packaging import load_part
@@ -244,12 +246,12 @@ class Session:
         return models
 
     def _warn(self, system: System, texts: Iterable[str]) -> None:
-        """Tell the user at once, and once, what a report will say later."""
+        """Log each warning immediately, and once; the report repeats it."""
         import logging
 
         for text in texts:
-            if text not in self.said:
-                self.said.add(text)
+            if text not in self.warned:
+                self.warned.add(text)
                 logging.getLogger("gyrobench").warning("%s: %s", system.name, text)
 
     def _finish(
@@ -259,7 +261,7 @@ class Session:
         document: RunDocument,
         out: Path | None,
         problem: Exception | None,
-        keeper: Keeper | None,
+        checkpoints: CheckpointManager | None,
     ) -> Record:
         windows = system.windows
         names = list(windows.columns) if windows else []
@@ -268,8 +270,8 @@ class Session:
         document.complete = problem is None
         document.steps = state.k
         document.stopped_at = state.k * system.step
-        if keeper is not None and keeper.resumed_at:
-            document.resumed_at = keeper.resumed_at
+        if checkpoints is not None and checkpoints.resumed_at:
+            document.resumed_at = checkpoints.resumed_at
         if problem is not None:
             document.problem = str(problem)
         record = Record(
@@ -280,15 +282,17 @@ class Session:
         if out is not None:
             record.save(out)
         if isinstance(problem, EngineStopped) and problem.by_user:
-            raise RunInterrupted(f"{problem}; {keeper.says}" if keeper is not None else str(problem), record)
+            raise RunInterrupted(
+                f"{problem}; {checkpoints.resume_hint}" if checkpoints is not None else str(problem), record
+            )
         if problem is not None:
             raise RunError(str(problem), record)
-        if keeper is not None and out is not None:
-            keeper.done()
+        if checkpoints is not None and out is not None:
+            checkpoints.remove()
         return record
 
     def _document(self, system: System, seed: int, parameters: dict[str, Any], notes: list[str]) -> RunDocument:
-        """Return what run.json says of a run before its end."""
+        """Return the content of run.json that is known before the end of the run."""
         parts = {
             slot: PartInfo(
                 name=d.modelName,
@@ -333,18 +337,18 @@ def run(
     out: Path | None = None,
     step: float | None = None,
     isolate: Iterable[str] = (),
-    progress: Callable[[Status], None] | None = None,
+    progress: Callable[[ProgressReport], None] | None = None,
     target: str = "native",
     bench: Path | None = None,
     timeout: float = 10.0,
     resume: bool = False,
     stop_at: float | None = None,
 ) -> Record:
-    """One run; saved in ``out`` (a folder) when given.
+    """Run a system and return its record, saved in ``out`` (a folder) when given.
 
     values: options and "slot.parameter", numbers in SI or texts with units.  step: s, instead of the system's.
     seed: of all noise; each slot gets a seed of its own from it unless "slot.seed" is set.
-    progress: called about five times a second with a :class:`Status`.
+    progress: called about five times a second with a :class:`ProgressReport`.
     resume: go on with the interrupted run in ``out``, see :mod:`gyrobench.engine.checkpoint`.
     stop_at: s of simulated time at which the run is interrupted as if by the user.
     Raises the errors of :class:`Session`, InvalidConfigurationError, ResumeError and InvalidValueError before anything
@@ -353,11 +357,11 @@ def run(
     """
     if out is None and (resume or stop_at is not None):
         raise InvalidValueError("resume and stop_at: name the folder of the run in out")
-    keeper = Keeper(out, resume, stop_at=stop_at) if out is not None else None
+    checkpoints = CheckpointManager(out, resume, stop_at=stop_at) if out is not None else None
     with Session(
         system, parts, maps, engine=engine, isolate=isolate, target=target, bench=bench, timeout=timeout
     ) as session:
-        return session.run(values, seed, step, out, progress, keeper)
+        return session.run(values, seed, step, out, progress, checkpoints)
 
 
 @functools.cache
@@ -365,10 +369,11 @@ def package_versions() -> dict[str, str]:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {"python": platform.python_version()}
+    """Return the versions of Python and of the packages that determine a result."""
+    versions = {"python": platform.python_version()}
     for name in ("gyrobench", "fmpy", "numpy"):
         try:
-            found[name] = version(name)
+            versions[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            versions[name] = "not installed"
+    return versions

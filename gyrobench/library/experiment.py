@@ -29,7 +29,7 @@ from gyrobench.workflow.run_folders import prepare_folder
 from gyrobench.workflow.saved_run import RunOutcome, write_report
 
 if TYPE_CHECKING:
-    from gyrobench.engine.run_driver import Status
+    from gyrobench.engine.run_driver import ProgressReport
     from gyrobench.engine.session import Session
 
 KEPT = ("json",)  # of the report, in a folder named by ``out``; Run.report writes the rest
@@ -143,7 +143,7 @@ class Experiment:
         out: File | None = None,
         force: bool = False,
         resume: bool = False,
-        progress: Callable[[Status], None] | None = None,
+        progress: Callable[[ProgressReport], None] | None = None,
     ) -> Run:
         """Run the system and reduce its record.
 
@@ -241,9 +241,9 @@ def finished(outcome: RunOutcome) -> Run:
     return Run(outcome.record, outcome.folder, outcome.result)
 
 
-def feedback_of(progress: Callable[[Status], None] | None) -> Feedback:
+def feedback_of(progress: Callable[[ProgressReport], None] | None) -> Feedback:
     @contextlib.contextmanager
-    def reported(label: str) -> Iterator[Callable[[Status], None] | None]:
+    def reported(label: str) -> Iterator[Callable[[ProgressReport], None] | None]:
         yield progress
 
     return Feedback(progress=reported)

@@ -18,7 +18,7 @@ from gyrobench.workflow.suite_execution import execute_suite
 from gyrobench.workflow.suite_report import SuiteOutcome, reduce_runs
 
 if TYPE_CHECKING:
-    from gyrobench.engine.run_driver import Status
+    from gyrobench.engine.run_driver import ProgressReport
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,7 +72,7 @@ class SuiteExperiment:
         spec: File | None = None,
         force: bool = False,
         resume: bool = False,
-        progress: Callable[[Status], None] | None = None,
+        progress: Callable[[ProgressReport], None] | None = None,
     ) -> SuiteRun:
         """Run all tests, each in a folder inside ``out``, and write their reports and that of the suite.
 

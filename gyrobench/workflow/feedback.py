@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gyrobench.engine.run_driver import Status
+    from gyrobench.engine.run_driver import ProgressReport
 
-Progress = Callable[["Status"], None]
+Progress = Callable[["ProgressReport"], None]
 
 
 def _no_notes(notes: Iterable[str]) -> None:

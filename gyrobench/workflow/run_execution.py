@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench, display_path
-from gyrobench.engine.checkpoint import Keeper
+from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.report import FORMATS
 from gyrobench.result import Result
 from gyrobench.system.system import System
@@ -74,15 +74,15 @@ def execute_run(
     with open_session(request, system) if prepared is None else contextlib.nullcontext(prepared) as session:
         step = request.step or system.step
         folder: Path | None = None
-        keeper: Keeper | None = None
+        checkpoints: CheckpointManager | None = None
         if not request.in_memory:
-            folder, keeper = prepare_run_folder(
+            folder, checkpoints = prepare_run_folder(
                 session, system, request.seed, step, request.maps, request.out, request.force, request.resume
             )
-        feedback.notes([*session.notes, *(keeper.notes() if keeper else ())])
+        feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
         try:
             with feedback.progress(system.name) as progress:
-                record = session.run({}, request.seed, request.step, None, progress, keeper)
+                record = session.run({}, request.seed, request.step, None, progress, checkpoints)
         except RunError as error:
             if error.record is None or folder is None:
                 raise
@@ -91,9 +91,9 @@ def execute_run(
             if isinstance(error, RunInterrupted):
                 raise CommandInterrupted(f"{message} (gyrobench report says what it lacks)", error.record) from None
             raise PostRunError(message, error.record) from None
-        if folder is not None and keeper is not None:
+        if folder is not None and checkpoints is not None:
             record.save(folder)
-            keeper.done()
+            checkpoints.remove()
         stopped: PostRunError | None = None
         with record_kept(folder, record):
             if not system.has_reduction:

@@ -28,12 +28,12 @@ def prepare_run_folder(
     out: Path | None,
     force: bool,
     resume: bool = False,
-) -> tuple[Path, checkpoint.Keeper]:
-    """Return where the run is saved, --out, else a folder named by what is run; and the keeper of its checkpoint.
+) -> tuple[Path, checkpoint.CheckpointManager]:
+    """Return where the run is saved, --out, else a folder named by what is run; and the manager of its checkpoint.
 
-    With ``resume`` the keeper goes on from the checkpoint in that folder or in its :func:`incomplete_folder`, once it
-    has seen that it is of this run.  Raises UsageError when there is none to resume, and when --out holds another run,
-    unless ``force``, or files that do not belong to a run.
+    With ``resume`` the manager continues from the checkpoint in that folder or in its :func:`incomplete_folder`, once
+    it is known to belong to this run.  Raises UsageError when there is none to resume, and when --out holds another
+    run, unless ``force``, or files that do not belong to a run.
     """
     from gyrobench.system.parameters import resolve
 
@@ -60,11 +60,12 @@ def prepare_run_folder(
             else "no checkpoint of a run with these parts and values"
         )
         raise UsageError(
-            "--resume: " + (checkpoint.obstacle(session.slaves) or f"nothing to continue in {folder}: {state}")
+            "--resume: "
+            + (checkpoint.resume_obstacle(session.instances) or f"nothing to continue in {folder}: {state}")
         )
     elif folder not in kept:
         prepare_folder(folder, identity, force)
-    return folder, checkpoint.Keeper(partial_folder(folder), resume, kept[0] if kept else None)
+    return folder, checkpoint.CheckpointManager(partial_folder(folder), resume, kept[0] if kept else None)
 
 
 def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
@@ -79,7 +80,7 @@ def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Pa
             old = {}
     elif (folder / checkpoint.FILE).is_file():  # of a process that was killed
         try:
-            old = checkpoint.about(folder)
+            old = checkpoint.read_job(folder)
         except checkpoint.ResumeError:
             old = {}
     elif folder.is_dir() and any(not p.name.startswith(checkpoint.FILE) for p in folder.iterdir()):

@@ -16,9 +16,9 @@ import pytest
 
 from gyrobench.commands import cli, progress_display
 from gyrobench.engine import checkpoint
-from gyrobench.engine.checkpoint import FILE, Keeper, ResumeError
-from gyrobench.engine.fmu_instance import LocalSlave
-from gyrobench.engine.run_driver import Status
+from gyrobench.engine.checkpoint import FILE, CheckpointManager, ResumeError
+from gyrobench.engine.fmu_instance import LocalInstance
+from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.engine.session import RunInterrupted, Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.system import System
@@ -79,9 +79,9 @@ def test_a_session_resumes_among_other_runs(small: System, tmp_path: Path) -> No
     with Session(small) as session:
         whole = session.run(QUICK, seed=5)
         with pytest.raises(RunInterrupted):
-            session.run(QUICK, seed=5, keeper=Keeper(tmp_path, stop_at=0.3))
+            session.run(QUICK, seed=5, checkpoints=CheckpointManager(tmp_path, stop_at=0.3))
         session.run(QUICK, seed=6)
-        found = session.run(QUICK, seed=5, out=tmp_path, keeper=Keeper(tmp_path, resume=True))
+        found = session.run(QUICK, seed=5, out=tmp_path, checkpoints=CheckpointManager(tmp_path, resume=True))
     assert found.same_data(whole)
     assert not (tmp_path / FILE).exists()
 
@@ -168,9 +168,9 @@ def test_an_fmu_that_saves_only_half_of_its_state(
     stop(small, tmp_path, 0.3)
     whole = checkpoint.load_state
 
-    def forgetful(slave: LocalSlave, data: bytes) -> None:
-        if slave.slot != "gyro":
-            whole(slave, data)
+    def forgetful(instance: LocalInstance, data: bytes) -> None:
+        if instance.slot != "gyro":
+            whole(instance, data)
 
     monkeypatch.setattr(checkpoint, "load_state", forgetful)
     with pytest.raises(ResumeError, match="gyro: the outputs of the FMU are not those it had when its state was saved"):
@@ -189,7 +189,7 @@ def test_a_full_disk_does_not_cost_the_run(small: System, tmp_path: Path, monkey
 
 def test_time_left_is_that_of_this_process() -> None:
     # resumed at 800 of 1000 s; 100 s of simulated time took 5 s, so the other 100 s take 5 s
-    status = Status(time=900.0, total=1000.0, steps=100_000, windows=0, rate=2e4, elapsed=5.0, since=800.0)
+    status = ProgressReport(time=900.0, total=1000.0, steps=100_000, windows=0, rate=2e4, elapsed=5.0, since=800.0)
     assert status.eta == pytest.approx(5.0)
     assert progress_display.format_status(status) == "t = 900 of 1,000 s, 20,000 steps/s, 5 s left"
 
@@ -222,7 +222,7 @@ def command(words: list[str], capture: Any, patch: pytest.MonkeyPatch) -> tuple[
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
 
-    def interrupt(self: progress_display.ProgressDisplay, status: Status) -> None:
+    def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 

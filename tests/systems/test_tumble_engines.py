@@ -12,7 +12,7 @@ import pytest
 from tumbling import DPH, NAME, SHORT, drift_in, gyro, load, quiet
 
 from gyrobench import frames
-from gyrobench.engine.reference_engine import initialize, start
+from gyrobench.engine.reference_engine import initial_state, initialize
 from gyrobench.engine.session import Session, run
 from gyrobench.system.parameters import resolve
 from gyrobench.system.wiring import parse_wires
@@ -74,20 +74,20 @@ def test_gyro_sees_gravity_and_earth_rate_before_the_first_step(session: Session
     """
     system = load().with_values({"latitude": np.radians(30.0), **quiet(load())})
     starts, _, _ = resolve(session.assembly, system, 1, session.base)
-    program, slaves = session.program, session.slaves
+    program, instances = session.program, session.instances
     program.out[:] = 0.0
     try:
         for slot in program.order:
-            slaves[slot].instantiate()
-            slaves[slot].set_start(starts[slot])
-        initialize(program, slaves, 0.0)
-        first = start(program, slaves, 0.0)
+            instances[slot].instantiate()
+            instances[slot].set_start(starts[slot])
+        initialize(program, instances, 0.0)
+        first = initial_state(program, instances, 0.0)
         reference = {v.name: v.valueReference for v in session.assembly.descriptions["gyro"].modelVariables}
         names = [f"{x}[{k}]" for x in ("f", "omega") for k in (1, 2, 3)]
-        seen: Any = slaves["gyro"].fmu.getReal([reference[n] for n in names])  # type: ignore[attr-defined]
+        seen: Any = instances["gyro"].fmu.getReal([reference[n] for n in names])  # type: ignore[attr-defined]
     finally:
-        for slave in slaves.values():
-            slave.free()
+        for instance in instances.values():
+            instance.free()
     assert first.k == 0
     g, W = frames.normal_gravity(np.radians(30.0)), frames.EARTH_RATE
     np.testing.assert_allclose(seen[:3], [0.0, g, 0.0], rtol=0, atol=4e-15)
