@@ -324,7 +324,7 @@ def test_a_notebook_shows_tables_and_figures(run: gb.Run) -> None:
     assert "<svg" in run.record._repr_html_()  # type: ignore[operator]
     assert "geographic latitude" in shown(gb.load(NAME))
     both = gb.compare(run, run, names=("a", "b"))
-    assert "Differences to baseline A" in shown(both) and "D_IS" in shown(both)
+    assert "Differences from baseline A" in shown(both) and "D_IS" in shown(both)
 
 
 def test_a_verdict_is_shown_and_text_is_escaped(run: gb.Run) -> None:

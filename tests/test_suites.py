@@ -126,7 +126,7 @@ def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> No
     Reader().feed(page)
     assert checked > 200
     for text in (
-        "Methods against each other",
+        "Normalized errors between methods",
         "Statements and signatures",
         "A. B.",
         "gyro 17",

@@ -1,4 +1,4 @@
-"""Results side by side: what differs between the runs, then what that did to the coefficients."""
+"""Report page that compares runs: differing settings, then differences of the coefficients."""
 
 from __future__ import annotations
 
@@ -140,10 +140,10 @@ def page(doc: Json) -> Page:
     with styled():
         sections = [
             ranking_section.section(doc, [_letter(k) for k in range(len(runs))]),
-            Section("What differs", "differs", [_runs(doc), *_differing(doc)]),
+            Section("Differing settings", "differs", [_runs(doc), *_differing(doc)]),
             Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
-            Section("Side by side", "figures", [*responses.side_by_side(doc, _letter), *_figures(doc)]),
-            Section("What is equal", "equal", _equal(doc)),
+            Section("Responses and estimates of all runs", "figures", [*responses.side_by_side(doc, _letter), *_figures(doc)]),
+            Section("Common settings", "equal", _equal(doc)),
         ]
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
 
@@ -179,12 +179,12 @@ def _runs(doc: Json) -> Table:
         for k, run in enumerate(doc["runs"])
     ]
     columns = [Column(""), Column("run", wide=True), Column("system"), Column("report"), Column("verdict")]
-    return Table(columns, rows, "The runs.")
+    return Table(columns, rows, "Runs.")
 
 
 def _differing(doc: Json) -> list[Any]:
     if not doc["differing"]:
-        return [Text("The runs differ in nothing that was recorded.")]
+        return [Text("No recorded setting differs between the runs.")]
     count = len(doc["runs"])
     blocks = []
     for start in range(0, count, _ABREAST):
@@ -193,9 +193,9 @@ def _differing(doc: Json) -> list[Any]:
             Row([text_cell(row["what"]), *(_value(doc, ("differing", i, "values", k)) for k in part)])
             for i, row in enumerate(doc["differing"])
         ]
-        columns = [Column("what"), *(Column(_letter(k), wide=True) for k in part)]
+        columns = [Column("setting"), *(Column(_letter(k), wide=True) for k in part)]
         blocks.append(
-            Table(columns, rows, "Parts, parameters and settings that differ; parameters in SI units.", small=True)
+            Table(columns, rows, "Components, parameters and settings that differ; parameters in SI units.", small=True)
         )
     return blocks
 
@@ -259,13 +259,13 @@ def _differences(doc: Json) -> list[Any]:
             name = f"{_letter(k)} − {_letter(base)}"
             columns += [Column(name), Column("U (95 %)"), Column("")]
         caption = (
-            f"Differences to baseline {_letter(base)} with their expanded uncertainty, the runs taken as independent."
+            f"Differences from baseline {_letter(base)} with their expanded uncertainty; the runs are treated as independent."
         )
         blocks.append(Table(columns, rows, caption))
     blocks.append(
         Text(
             f"{marked} of {len(all_of_them)} differences exceed their expanded uncertainty; about "
-            f"{write_number(0.05 * len(all_of_them), significant=2).text} would do so by chance."
+            f"{write_number(0.05 * len(all_of_them), significant=2).text} are expected by chance."
         )
     )
     return blocks
@@ -288,7 +288,7 @@ def _figures(doc: Json) -> list[Any]:
             axes[0, 0], [n for n, _ in shown], [v for _, v in shown], m["unit"], m["name"], base and base["estimate"]
         )
         key = f"measure-{i + 1}"
-        caption = f"{m['name']}, {m['meaning']}: estimates with 95 % intervals; dashed: the baseline."
+        caption = f"{m['name']}, {m['meaning']}: estimates with 95 % coverage intervals; dashed: the baseline."
         alt = f"{m['name']} of all runs with intervals on one scale"
         pictures.append(Picture(key, svg(fig, key), caption, alt, half=True))
     return [Pictures(pictures)] if pictures else []
@@ -299,6 +299,6 @@ def _equal(doc: Json) -> list[Any]:
         return []
     rows = [Row([text_cell(row["what"]), _value(doc, ("equal", i, "value"))]) for i, row in enumerate(doc["equal"])]
     table = Table(
-        [Column("what"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
+        [Column("setting"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
     )
     return [Fold(f"{len(rows)} entries", [table])]

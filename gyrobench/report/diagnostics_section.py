@@ -1,4 +1,4 @@
-"""Why a result can be believed: residuals, stability, the estimates themselves, repeatability, error budget."""
+"""Sections on the validity of a result: residuals, stability, uncertainty, repeatability, uncertainty budget."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def residuals(doc: Json) -> list[Any]:
         Picture(
             "residuals-time",
             plots.residuals_in_time(doc["series"], "residuals-time"),
-            "Residuals against time, mounts or phases shaded and named. A drift or a jump would show here.",
+            "Residuals against time, phases shaded and labelled. A trend or a step is not part of the model.",
             "Residuals of all windows against time",
             zoom=True,
         )
@@ -29,14 +29,15 @@ def residuals(doc: Json) -> list[Any]:
         Picture(
             "acf",
             plots.acf(doc["acf"], "acf") if doc["acf"] else "",
-            "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside: correlated noise.",
+            "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
             "Autocorrelation of the residuals against lag, with bounds",
             half=True,
         ),
         Picture(
             "quantiles",
             plots.quantiles(left, "quantiles"),
-            "Residuals against normal quantiles. On the line and inside the 95 % band: normal; bent ends: outliers.",
+            "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
+            "distribution; points off it at the ends are outliers.",
             "Q-Q plot of the residuals against a normal distribution",
             half=True,
         ),
@@ -57,13 +58,13 @@ def residuals(doc: Json) -> list[Any]:
         )
     columns = [
         Column("test"),
-        Column("looks for", wide=True),
+        Column("sensitive to", wide=True),
         Column("statistic"),
         Column("p"),
         Column("finding", wide=True),
     ]
     if rows:
-        blocks.append(Table(columns, rows, "Tests of the residuals. A small p speaks against what the model assumes."))
+        blocks.append(Table(columns, rows, "Tests of the residuals. A small p is evidence against the model."))
     spread = number_cell(doc, ("residual_std",))
     dof = write_number(doc["dof"], significant=5).text
     sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
@@ -75,19 +76,20 @@ def stability(doc: Json) -> list[Any]:
         Picture(
             "allan",
             plots.allan(doc["allan"], "allan") if doc["allan"].get("tau") else "",
-            "Allan deviation with its 95 % interval. Slope −½: white noise; flat: bias instability; +½: random walk.",
+            "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
+            "bias instability; +½: random walk (of a rate: rate random walk).",
             "Allan deviation against averaging time, logarithmic axes",
             half=True,
         ),
         Picture(
             "psd",
             plots.psd(doc["psd"], "psd") if doc["psd"].get("f") else "",
-            "Power spectral density of the residuals. Flat: white; a line above it: a periodic disturbance.",
+            "Power spectral density of the residuals. Constant: white noise; a narrow peak: a periodic disturbance.",
             "Power spectral density of the residuals, logarithmic axes",
             half=True,
         ),
     )
-    return blocks + generic(doc, ("allan", "slopes"), "Slopes of the Allan deviation.", significant=3)
+    return blocks + generic(doc, ("allan", "slopes"), "Local slopes of the Allan deviation on logarithmic axes.", significant=3)
 
 
 def estimates(doc: Json) -> list[Any]:
@@ -98,8 +100,8 @@ def estimates(doc: Json) -> list[Any]:
         if not doc["rank"]
         else [
             Text(
-                f"The regression has rank {doc['rank']} for {len(names)} reported estimates; its condition number is "
-                f"{condition}. Above 100 a small error of the model makes a large one in some combination."
+                f"The design matrix has rank {doc['rank']} for {len(names)} reported estimates and condition number "
+                f"{condition}. Above 100, errors of the model are amplified in the least-determined combination."
             )
         ]
     )
@@ -107,13 +109,13 @@ def estimates(doc: Json) -> list[Any]:
         Column(h)
         for h in (
             "name",
-            "u, type A",
+            "u, Type A",
             "dof",
             "k",
             "U (95 %)",
             "t",
             "p (t)",
-            "closed formula",
+            "closed form",
             "difference",
         )
     ]
@@ -122,7 +124,7 @@ def estimates(doc: Json) -> list[Any]:
         columns.insert(1, Column("unit"))
     rows: list[Row] = []
     for unit, members in groups or [("", list(range(len(names))))]:
-        rows += [heading(f"u, U, closed formula and difference in {unit}")] if groups else []
+        rows += [heading(f"u, U, closed form and difference in {unit}")] if groups else []
         for k in members:
             c = doc["coefficients"][k]
             path, u = ("coefficients", k), c["u"]
@@ -142,26 +144,26 @@ def estimates(doc: Json) -> list[Any]:
                     ]
                 )
             )
-    caption = "Uncertainty of each estimate, and the source's closed formula against the reported estimate."
+    caption = "Uncertainty of each estimate. Closed form: the formula of the source; difference: closed form − estimate."
     blocks.append(Table(columns, rows, caption, small=True))
     z = [c["z"] for c in doc["coefficients"]]
     blocks += pictures(
         Picture(
             "correlation",
             plots.correlation(doc["correlation"], names, "correlation"),
-            "Correlation of the estimates. Near ±1 two coefficients are known only in combination.",
+            "Correlation of the estimates. Two coefficients with a correlation near ±1 are hardly separable.",
             "Correlation matrix of the estimates, lower triangle, as coloured cells with numbers",
             half=len(names) < 11,
         ),
         Picture(
             "scores",
             plots.scores(names, z, [c["k"] for c in doc["coefficients"]], "scores"),
-            "Estimates against truth in units of u. Band: ±k; 95 % of the points should lie inside.",
+            "Deviation of the estimates from the truth in units of u. Band: ±k, coverage probability 95 %.",
             "Estimate minus truth over standard uncertainty, one point per coefficient",
             half=True,
         ),
     )
-    caption = "Harmonics of the record. Those the model does not hold should be noise."
+    caption = "Harmonics of the record. Those outside the model are expected to be noise."
     return blocks + _method_tables(doc) + generic(doc, ("harmonics",), caption, by_u=True)
 
 
@@ -173,13 +175,13 @@ def _step(doc: Json) -> list[Any]:
     """The coupling error: what halving the step changes."""
     check = doc["step_check"]
     if not check.get("rows"):
-        unchecked = Text("The step was not checked in this run (option --check-step).", quiet=True)
+        unchecked = Text("The communication step was not checked in this run (option --check-step).", quiet=True)
         return [unchecked] if doc["simulated"] else []
     step = write_number(check.get("step"), significant=6).text
     worst = write_number(check.get("worst"), significant=2).text
-    caption = "Step check: change of each coefficient when the step is halved, noise off; ratio: change over u."
+    caption = "Step check: change of each coefficient when the communication step is halved, noise off; ratio: change / u."
     table = generic(doc, ("step_check", "rows"), caption, significant=2)
-    return [Text(f"Halving the step of {step} s changes no coefficient by more than {worst} of its u."), *table]
+    return [Text(f"Halving the communication step of {step} s changes no coefficient by more than {worst} u."), *table]
 
 
 def _method_tables(doc: Json) -> list[Any]:
@@ -228,15 +230,15 @@ def budget(doc: Json) -> list[Any]:
             )
         total = number_cell(doc, ("derived", "budget_sum", name), u.get(name))
         note = f"u stated: {write_number(u[name], u[name]).text}" if name in u else ""
-        rows.append(Row([text_cell("sum (root of squares)", "strong"), *[text_cell("")] * 4, total, text_cell(note)]))
-    heads = ("source", "size", "unit", "sensitivity", "unit", "contribution", "note")
+        rows.append(Row([text_cell("root sum of squares", "strong"), *[text_cell("")] * 4, total, text_cell(note)]))
+    heads = ("source", "u(x)", "unit", "sensitivity coefficient c", "unit", "|c|·u(x)", "note")
     columns = [Column(h, wide=h in ("source", "note")) for h in heads]
-    alt = "Error budget as bars: contribution of each source to the uncertainty of the coefficients"
-    caption = "Error budget. Which source makes the uncertainty, and whether the known sources explain the stated u."
+    alt = "Uncertainty budget as bars: contribution of each source to the uncertainty of the coefficients"
+    caption = "Uncertainty budget: contribution of each source, and their root sum of squares against the stated u."
     table = Table(
-        columns, rows, "Error budget: size times sensitivity of each source, as standard uncertainties.", small=True
+        columns, rows, "Uncertainty budget: standard uncertainty u(x) of each source, sensitivity coefficient and contribution to u.", small=True
     )
     return [
         *pictures(Picture("budget", diagrams.budget(lines, u, "budget"), caption, alt)),
-        Fold("Every line of the budget", [table]),
+        Fold("All lines of the budget", [table]),
     ]

@@ -45,7 +45,7 @@ def _bars(lines: Sequence[Mapping[str, Any]], observed: float | None, key: str) 
     rows = sorted(lines, key=lambda b: -b["contribution"])
     values = [b["contribution"] for b in rows]
     total = sum(v * v for v in values) ** 0.5
-    labels = [short(b["source"], 38) for b in rows] + ["sum (root of squares)"]
+    labels = [short(b["source"], 38) for b in rows] + ["root sum of squares"]
     fig, axes = figure(WIDE, 18 + 6.5 * len(labels))
     ax = axes[0, 0]
     ax.barh(range(len(rows)), values, color=BLUE, height=0.62)
@@ -73,7 +73,7 @@ def _shares(lines: Sequence[Mapping[str, Any]], names: Sequence[str], u: Mapping
     fig, axes = figure(WIDE, 24 + 6.2 * len(names) + 4.5 * ((len(shown) + bool(rest) + 1) // 2))
     ax = axes[0, 0]
     left = dict.fromkeys(names, 0.0)
-    for k, source in enumerate([*shown, *(["all others"] if rest else [])]):
+    for k, source in enumerate([*shown, *(["other sources"] if rest else [])]):
         members = rest if k == len(shown) else [source]
         pieces = dict.fromkeys(names, 0.0)
         for b in lines:
@@ -90,7 +90,7 @@ def _shares(lines: Sequence[Mapping[str, Any]], names: Sequence[str], u: Mapping
     ax.set_yticks(range(len(names)), [short(n, 22) for n in names])
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlim(0, 1.06 * max(1.0, *left.values()))
-    ax.set_xlabel("share of the stated variance u² / 1  (dashed: the sum explains all of it)")
+    ax.set_xlabel("fraction of the stated variance u² / 1  (dashed: all of it)")
     ax.grid(False, axis="y")
     fig.legend(loc="outside upper left", ncols=2, handlelength=1.6, columnspacing=1.5)
     return svg(fig, key)

@@ -38,14 +38,14 @@ def system(doc: Json) -> list[Any]:
     blocks: list[Any] = []
     if order:
         caption = (
-            "The system as it ran: parts on the diagonal in execution order. Above it (solid) values of this step go "
-            "forward; below it (dashed) values of the step before go back."
+            "Components on the diagonal in execution order. Connections above the diagonal (solid) carry values of the "
+            "current communication step, those below it (dashed) values of the previous one."
         )
         svg = diagrams.system(order, run, "system")
         blocks += pictures(
-            Picture("system", svg, caption, "Parts in execution order with their wires: " + ", ".join(order))
+            Picture("system", svg, caption, "Components in execution order with their connections: " + ", ".join(order))
         )
-        blocks.append(Items([f"Order: {', '.join(order)}.", *_cuts(run)]))
+        blocks.append(Items([f"Execution order: {', '.join(order)}.", *_cuts(run)]))
     rows = []
     keys = (
         "phase",
@@ -71,7 +71,7 @@ def system(doc: Json) -> list[Any]:
         ("label", ""),
         ("mode", ""),
         ("shape", ""),
-        ("face", ""),
+        ("orientation", ""),
         ("axis", ""),
         ("amplitude", ""),
         ("unit", ""),
@@ -91,17 +91,17 @@ def system(doc: Json) -> list[Any]:
         for row in rows:
             row.cells = [c for c, e in zip(row.cells, empty, strict=True) if not e]
         columns = [Column(h, unit) for (h, unit), e in zip(heads, empty, strict=True) if not e]
-        blocks.append(Table(columns, rows, "Plan of the test.", small=True))
+        blocks.append(Table(columns, rows, "Test plan.", small=True))
     return blocks
 
 
 def _cuts(run: Mapping[str, Any]) -> list[str]:
     """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
     cuts, delays = run.get("cuts") or [], run.get("delays") or []
-    said = [f"Cut at {c}" for c in map(str, cuts)] or ["No connection is cut: every value is used in its own step"]
+    said = [f"Delayed connection {c}" for c in map(str, cuts)] or ["No delayed connection: every value is used in the communication step in which it is computed"]
     times = dict(delays) if isinstance(delays, Mapping) else dict.fromkeys(delays)
     for wire, seconds in times.items():
-        time = "one step" if seconds is None else f"{write_number(seconds).text} s"
+        time = "one communication step" if seconds is None else f"{write_number(seconds).text} s"
         k = next((k for k, s in enumerate(said) if wire in s), None)
         if k is None:
             said.append(f"Delay on {wire}: {time}")
@@ -122,7 +122,7 @@ def full_values(doc: Json) -> list[Any]:
     columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
     return [
         Fold(
-            "All digits, as in result.json",
-            [Table(columns, rows, "Full values of the estimates, units as in the table of coefficients.", small=True)],
+            "Full precision, as in result.json",
+            [Table(columns, rows, "Estimates at full precision, units as in the table of coefficients.", small=True)],
         )
     ]

@@ -33,7 +33,7 @@ def format_result(result: Result) -> str:
     notes = [f"warning: {w}" for w in result.warnings]
     if result.step_check:
         worst = result.step_check["worst"]
-        notes.append(f"step check: halving the step changes no coefficient by more than {worst:.2g} u")
+        notes.append(f"step check: halving the communication step changes no coefficient by more than {worst:.2g} u")
     if judged:
         notes.append(f"verdict: {result.verdict}")
     left = {0, 4} | ({len(rows[0]) - 1} if judged else set())
@@ -42,7 +42,7 @@ def format_result(result: Result) -> str:
 
 
 def _agreement(result: SuiteResult) -> list[str]:
-    rows = [["quantity", "methods", "largest E_n", "p", ""]]
+    rows = [["measurand", "methods", "largest E_n", "p", ""]]
     for q in result.suite.quantities:
         if q["p"] is not None:
             rows.append([q["name"], str(len(q["values"])), f"{q['largest E_n']:.2f}", f"{q['p']:.2g}", q["words"]])
@@ -67,7 +67,7 @@ def format_ranking(comparison: Mapping[str, Any]) -> str:
     ranked = comparison["ranking"]
     if not ranked:
         return ""
-    rows = [["", "run", ranked["name"], "u", "unit", "over the best"]]
+    rows = [["", "run", ranked["name"], "u", "unit", "ratio to the smallest"]]
     for place, entry in enumerate(ranked["order"], 1):
         value, u = (write_number(entry[k], entry["u"]).text for k in ("value", "u"))
         over = write_number(entry["over_best"], significant=3).text

@@ -201,7 +201,7 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
     x, z = envelope(x.tolist(), z.tolist())
     ax.plot(x, z, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
     ax.set_xlabel(axis_label("normal quantile", "1"))
-    ax.set_ylabel(axis_label("residual / spread", "1").replace(" / 1", ""))
+    ax.set_ylabel("residual / standard deviation")
     return svg(fig, key)
 
 

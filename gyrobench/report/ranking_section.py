@@ -65,13 +65,13 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
         )
     unit = ranked["unit"] if ranked["unit"] != "1" else ""
     columns = [
-        Column("place"),
+        Column("rank"),
         Column(""),
         Column("run", wide=True),
         Column("instrument"),
         Column(ranked["name"], unit),
     ]
-    columns += [Column("u"), Column("over the best"), Column("apart from the one before")]
-    caption = f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest is the best."
-    note = "Less noise or a smoother curve does not rank: what is compared is how near each run comes to the truth."
+    columns += [Column("u"), Column("ratio to the smallest"), Column("significantly different from the preceding run")]
+    caption = f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first."
+    note = "Noise reduction alone does not improve the rank: the measure is the deviation from the truth."
     return Section("Ranking", "ranking", [Table(columns, rows, caption), Text(note, quiet=True)])

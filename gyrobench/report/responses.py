@@ -52,7 +52,7 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
             lines = alike[0][1]["curves"]
             several = alike[0][1]["kind"] == "time" and len(lines) > 1
             name = f"{r['name']}, {lines[0]['label']}" if several else r["name"]
-            text = f"{name[:1].upper()}{name[1:]}: all runs in one figure."
+            text = f"{name[:1].upper()}{name[1:]} of all runs."
             found += pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
     return found
 

@@ -41,21 +41,21 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
     """
     with styled():
         sections = [
-            Section("The answer", "answer", [answer(doc)]),
+            Section("Result and conformity", "answer", [answer(doc)]),
             Section("Simulated set-up errors", "setup-errors", setup_errors(doc)),
             Section("Coefficients", "coefficients", coefficients(doc)),
-            Section("What was measured", "measured", _measured(doc, record or {})),
-            Section("Can it be believed", "believed", []),
+            Section("Measurement data", "measured", _measured(doc, record or {})),
+            Section("Validity of the results", "believed", []),
             Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True),
-            Section("Drift in time and frequency", "stability", diagnostics_section.stability(doc), sub=True),
-            Section("The estimates", "estimates", diagnostics_section.estimates(doc), sub=True),
-            Section("Repeatability and step", "repeatability", diagnostics_section.repeatability(doc), sub=True),
-            Section("Error budget", "budget", diagnostics_section.budget(doc)),
-            Section("How it was done", "how", []),
+            Section("Stability: Allan deviation and spectrum", "stability", diagnostics_section.stability(doc), sub=True),
+            Section("Uncertainty of the estimates", "estimates", diagnostics_section.estimates(doc), sub=True),
+            Section("Repeatability and step check", "repeatability", diagnostics_section.repeatability(doc), sub=True),
+            Section("Uncertainty budget", "budget", diagnostics_section.budget(doc)),
+            Section("Method and provenance", "how", []),
             Section("Model and conventions", "model", method_section.model(doc), sub=True),
-            Section("System and plan", "system", method_section.system(doc), sub=True),
-            Section("Parts, parameters and provenance", "provenance", how_tables(doc), sub=True),
-            Section("Full values", "values", method_section.full_values(doc), sub=True),
+            Section("System and test plan", "system", method_section.system(doc), sub=True),
+            Section("Components, parameters and provenance", "provenance", how_tables(doc), sub=True),
+            Section("Values at full precision", "values", method_section.full_values(doc), sub=True),
             Section("Statements and signatures", "signatures", signing(doc)),
         ]
     return Page(doc["title"], doc["report_id"], head(doc), sections).finish()
@@ -123,7 +123,7 @@ def answer(doc: Json) -> Answer:
         Column("limit"),
         Column("verdict"),
     ]
-    table = Table(columns, rows, "Verdict per requirement.") if rows else None
+    table = Table(columns, rows, "Conformity with each requirement.") if rows else None
     rule = doc["decision_rule"] if rows or doc["verdict"] != NO_VERDICT else ""
     return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
 
@@ -134,8 +134,8 @@ def setup_errors(doc: Json) -> list[Any]:
     if not errors:
         return []
     text = (
-        "The instrument or its set-up was simulated otherwise than the test assumes. The estimates, their u and their "
-        "verdicts hold for a set-up without these errors."
+        "The simulated instrument or its set-up differs from what the test assumes. The estimates, their u and their "
+        "verdicts do not allow for these errors."
     )
     return [Text(text), Items([e.sentence() for e in errors], warn=True)]
 
@@ -177,11 +177,14 @@ def coefficients(doc: Json) -> list[Any]:
                 verdict = c["verdict"] if c["limit"] is not None else "–"
                 cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
             rows.append(Row(cells))
-    note = "u: combined standard uncertainty; estimates are rounded to its second significant digit."
+    note = (
+        "u: combined standard uncertainty; estimates are rounded to its second significant digit. 95 % from, to: limits "
+        "of the coverage interval."
+    )
     if truth:
-        note += " Truth: the value the simulation was given; z = (estimate − truth) / u."
+        note += " Truth: true value in the simulation; z = (estimate − truth) / u."
     if not limits:
-        note += " No specification given: no limits, no verdict."
+        note += " No specification was applied; conformity is not stated."
     return [Table(columns, rows, f"Coefficients. {note}")] if rows else []
 
 
@@ -215,16 +218,16 @@ def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
             key = f"fit-{number}"
             both = " and ".join(f"“{s['label']}”" for s in pair)
             caption = (
-                f"{_capital(pair[0]['y_name'])} against {axis[0]}, {both}. Points: measured windows; line: the fitted "
-                f"model; beneath: what is left. A model that fits leaves no pattern beneath."
+                f"{_capital(pair[0]['y_name'])} against {axis[0]}, {both}. Points: window means; line: fitted model; "
+                f"lower panel: residuals. A pattern in the residuals is evidence against the model."
             )
             alt = f"Points and fitted curve with residuals: {both}"
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
     units = doc["provenance"].get("units") or {}
     names = _shown(record, units)
     caption = (
-        "The run in time: recorded channels, one above the other. Long records are drawn by the smallest and largest "
-        "value of each stretch."
+        "Recorded channels against time. Long records are drawn as the envelope of minimum and maximum in each "
+        "interval."
     )
     svg = plots.channels(record, names, units, "channels") if names else ""
     blocks += pictures(
@@ -257,7 +260,7 @@ def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
             Table(
                 columns,
                 rows,
-                "Measured series: mean of the windows and rms of the residuals, in the unit of the quantity.",
+                "Measured series: mean of the windows and rms residual, in the unit of the quantity.",
             )
         )
     return blocks

@@ -1,5 +1,4 @@
-"""What makes a report one that can be signed: what it holds for, and room for those who answer for it.  [ISO/IEC 17025,
-7.8.2]"""
+"""Statements and signature lines of a report.  [ISO/IEC 17025, 7.8.2]"""
 
 from __future__ import annotations
 
@@ -13,18 +12,20 @@ ROLES = ("Tested by", "Checked by", "Approved by")
 
 
 def signing(doc: Json) -> list[Any]:
-    """Statements and signature lines; the operator's name stands on the first."""
+    """Return the statements and the signature lines, the operator's name on the first."""
     run = doc["provenance"]
-    item = doc["instrument"] or "the instrument tested"
-    said = [
-        f"The results hold for {item} alone, as it was when tested, under the conditions stated.",
-        "Uncertainties are expanded to 95 % where U or an interval is given; u is a standard uncertainty [GUM].",
-        "This report may be copied as a whole only.",
+    about = f" ({doc['instrument']})" if doc["instrument"] else ""
+    statements = [
+        f"The results relate only to the item tested{about}, in its condition at the time of the test.",
+        "U is the combined standard uncertainty u multiplied by the stated coverage factor k, for a coverage probability "
+        "of about 95 % [GUM].",
+        "This report shall not be reproduced except in full without approval of the laboratory.",
     ]
     missing = [name for name in ("operator", *ABOUT) if name != "customer" and not run.get(name)]
     if doc["simulated"]:
-        said.insert(0, "All data are simulated: no instrument was tested, and nothing here is traceable to a standard.")
+        statements[0] = f"The results relate only to the simulated instrument{about}, with the parameters stated."
+        statements.insert(0, "All data are simulated; no item was tested and no traceability is claimed.")
     elif missing:
-        said.append(f"Not stated, and wanted before signing: {', '.join(missing)}.")
+        statements.append(f"Missing before signature: {', '.join(missing)}.")
     names = [str(run.get("operator") or ""), "", ""]
-    return [Signatures(said, list(zip(ROLES, names, strict=True)))]
+    return [Signatures(statements, list(zip(ROLES, names, strict=True)))]

@@ -1,4 +1,4 @@
-"""The report of a suite: every quantity by every method that sees it, and whether the methods agree."""
+"""Report page of a suite: measurands by method, and consistency of the methods."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ def page(doc: Json) -> Page:
     """The report of a suite's result document (see :mod:`gyrobench.reduction.suite.method_comparison`)."""
     with styled():
         sections = [
-            Section("The answer", "answer", [_answer(doc)]),
+            Section("Result and conformity", "answer", [_answer(doc)]),
             Section("Combined values", "coefficients", _combined(doc)),
-            Section("Methods compared", "methods", []),
+            Section("Comparison of methods", "methods", []),
             Section("Consistency", "consistency", _consistency(doc), sub=True),
-            Section("Every quantity by every method", "cross", _cross(doc), sub=True),
-            Section("Methods against each other", "pairs", _pairs(doc), sub=True),
-            Section("The tests", "tests", _tests(doc)),
-            Section("How it was done", "how", []),
+            Section("Measurands by method", "cross", _cross(doc), sub=True),
+            Section("Normalized errors between methods", "pairs", _pairs(doc), sub=True),
+            Section("Member tests", "tests", _tests(doc)),
+            Section("Method and provenance", "how", []),
             Section("Comparison and conventions", "model", _how(doc), sub=True),
             Section("Provenance", "provenance", _provenance(doc), sub=True),
-            Section("Full values", "values", method_section.full_values(doc), sub=True),
+            Section("Values at full precision", "values", method_section.full_values(doc), sub=True),
             Section("Statements and signatures", "signatures", signing(doc)),
         ]
     return Page(doc["title"], doc["report_id"], _head(doc), sections).finish()
@@ -57,13 +57,13 @@ def _head(doc: Json) -> list[tuple[str, str]]:
     members = doc["suite"]["members"]
     dates = sorted(str(m["date"]) for m in members if m.get("date"))
     tests = ", ".join(f"{LETTERS[k % 26]} {m['label']}" for k, m in enumerate(members))
-    rows.insert(2, ("Tests made", " to ".join(dict.fromkeys(result_page.date(d) for d in (dates[:1] + dates[-1:])))))
+    rows.insert(2, ("Test dates", " to ".join(dict.fromkeys(result_page.date(d) for d in (dates[:1] + dates[-1:])))))
     return [*rows, ("Tests", tests)]
 
 
 def _answer(doc: Json) -> Answer:
     found = result_page.answer(doc)
-    said = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "methods not compared"
+    said = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "consistency not tested"
     plain = doc["verdict"] == NO_VERDICT
     found.verdict = f"{said}; {doc['verdict']}" if plain else doc["verdict"]
     found.rule = " ".join(filter(None, [doc["suite"]["rule"], found.rule]))
@@ -72,8 +72,8 @@ def _answer(doc: Json) -> Answer:
 
 def _combined(doc: Json) -> list[Any]:
     text = (
-        "Weighted mean over the methods that see a quantity (weights of least squares under their whole covariance); "
-        "where one method alone sees it, its value."
+        "Weighted mean over the methods that determine a measurand (generalized least squares with the full covariance "
+        "of their values); the value of the method where only one determines it."
     )
     return [Text(text), *result_page.coefficients(doc)]
 
@@ -106,12 +106,12 @@ def _consistency(doc: Json) -> list[Any]:
             )
         )
     if not rows:
-        return [Text("No quantity is seen by two methods.")]
-    heads = ("quantity", "methods", "Q", "dof", "Birge ratio", "p", "p, adjusted", "largest E_n")
+        return [Text("No measurand is determined by two methods.")]
+    heads = ("measurand", "methods", "Q", "dof", "Birge ratio", "p", "p, adjusted", "largest E_n")
     columns = [*(Column(h) for h in heads), Column("finding", wide=True)]
     caption = (
-        "Consistency test of each quantity. Q: sum of squares about the weighted mean, in units of the uncertainties; "
-        "p: of Q by Welch's test; adjusted for the number of quantities (Holm). Letters: the tests, as in the head."
+        "Consistency test of each measurand. Q: weighted sum of squared deviations from the weighted mean; p: of Q by "
+        "Welch's test; p, adjusted: for the number of measurands (Holm). Letters: the member tests, as in the head."
     )
     failed = [f"{f['label']} gave no result: {f['reason']}" for f in doc["suite"]["failed"]]
     return [Table(columns, rows, caption), *([Items(failed, warn=True)] if failed else [])]
@@ -151,14 +151,15 @@ def _cross(doc: Json) -> list[Any]:
             )
         if len(q["values"]) > 1:
             pictures.append(_forest(q, f"forest-{k + 1}"))
-    heads = ["method", "estimate", "u", "U (95 %)", *("type A", "type B", "shared")[: len(split)], "dof", "weight"]
-    columns = [*map(Column, heads), Column("how", wide=True)]
+    heads = ["method", "estimate", "u", "U (95 %)", *("Type A", "Type B", "shared")[: len(split)], "dof", "weight"]
+    columns = [*map(Column, heads), Column("source of the value", wide=True)]
     caption = (
-        "The same quantity by every method that sees it. dof: of type A, a dash where u is known well; weight: in the "
-        "mean."
+        "Values of each measurand by every method that determines it. dof: degrees of freedom of the Type A component, a "
+        "dash where they are infinite; weight: in the weighted mean."
     )
     if split:
-        caption += " Type A, type B, shared: parts of u; shared by the tests, see How it was done."
+        caption += " Type A, Type B, shared: components of u; shared: Type B components common to several tests, see Method and "
+            "provenance."
     return [Pictures(pictures), Table(columns, rows, caption, small=True)] if rows else []
 
 
@@ -174,7 +175,7 @@ def _forest(q: Json, key: str) -> Picture:
     if q["truth"] is not None:
         ax.axvline(q["truth"], color=INK, linestyle="--", linewidth=0.9)
     for i, v in enumerate(values):
-        off = q["verdict"] == "disagree" and q["words"].startswith(f"{v['label']} is off")
+        off = q["verdict"] == "disagree" and q["words"].startswith(f"{v['label']} deviates")
         colour = VERMILION if off else MUTED
         ax.plot([v["estimate"] - v["U"], v["estimate"] + v["U"]], [i, i], "-", color=colour, linewidth=1.4)
         ax.plot([v["estimate"]], [i], "s" if off else "o", color=colour, markersize=4.5, markeredgewidth=0)
@@ -183,7 +184,7 @@ def _forest(q: Json, key: str) -> Picture:
     ax.locator_params(axis="x", nbins=4)
     ax.set_xlabel(axis_label(q["name"] if len(q["name"]) < 24 else q["name"][:22] + "…", q["unit"]))
     truth = "; dashed: truth" if q["truth"] is not None else ""
-    caption = f"{q['name']}: estimates with 95 % intervals; band: weighted mean with its interval{truth}."
+    caption = f"{q['name']}: estimates with 95 % coverage intervals; band: weighted mean with its interval{truth}."
     alt = f"{q['name']} by {len(values)} methods, with intervals on one scale"
     return Picture(key, svg(fig, key), caption, alt, half=True)
 
@@ -213,8 +214,8 @@ def _pairs(doc: Json) -> list[Any]:
         rows.append(Row(cells))
     matrix = Table(
         [Column("largest E_n", wide=True), *(Column(letters[b]) for b in there)], rows,
-        "Largest normalized error between two methods, over all quantities that both see; above 1 they differ by more "
-        "than their expanded uncertainties allow.",
+        "Largest normalized error E_n between two methods over all measurands that both determine; above 1 the values "
+        "are inconsistent with their expanded uncertainties.",
     )  # fmt: skip
     every: list[Row] = []
     for name in dict.fromkeys(p["quantity"] for p in pairs):
@@ -234,7 +235,7 @@ def _pairs(doc: Json) -> list[Any]:
                     ]
                 )
             )
-    columns = [Column("pair", wide=True), Column("difference"), Column("U of it (95 %)"), Column("E_n")]
+    columns = [Column("pair", wide=True), Column("difference"), Column("U of the difference (95 %)"), Column("E_n")]
     table = Table(columns, every, "Normalized errors of all pairs.", small=True)
     return [matrix, Fold(f"All {len(pairs)} pairs", [table])]
 
@@ -261,7 +262,7 @@ def _tests(doc: Json) -> list[Any]:
         )
     columns = [Column(""), Column("test", wide=True), Column("report"), Column("date"), Column("duration", "s")]
     columns += [Column("phases"), Column("windows"), Column("residual"), Column("unit")]
-    caption = "The tests, each with a report of its own; residual: standard deviation of the windows about the model."
+    caption = "Member tests, each with a report of its own; residual: standard deviation of the residuals of the windows."
     blocks: list[Any] = [Table(columns, rows, caption, small=True)]
     for k, m in enumerate(members):
         where = f" Run and report in {m['folder']}." if m["folder"] else ""
@@ -270,9 +271,9 @@ def _tests(doc: Json) -> list[Any]:
         said = [*m["summary"]] if doc["site"] else [f"Site: {result_page.place(m['site'])}.", *m["summary"]]
         if m.get("step_check") is not None:
             worst = write_number(m["step_check"], significant=2).text
-            said.append(f"Halving the step changes no coefficient by more than {worst} u.")
+            said.append(f"Halving the communication step changes no coefficient by more than {worst} u.")
         said += [f"Warning: {w}" for w in m["warnings"]]
-        said += [] if m.get("complete", True) else ["The record is not complete."]
+        said += [] if m.get("complete", True) else ["The record is incomplete."]
         if said:
             blocks.append(Items(said))
     return blocks
@@ -281,15 +282,16 @@ def _tests(doc: Json) -> list[Any]:
 def _how(doc: Json) -> list[Any]:
     suite = doc["suite"]
     shared = (
-        f"Errors shared by the tests: {', '.join(suite['shared'])}; in a difference what is the same in both drops "
-        "out, in the mean they do not average out."
+        f"Errors shared by the tests: {', '.join(suite['shared'])}. An equal shared error cancels in a difference; it is "
+        "not reduced by averaging."
         if suite["shared"]
-        else "No test states an uncertainty that other tests share; all errors were taken as independent from test to "
-        "test."
+        else "No test states an uncertainty component in common with another test; all errors are treated as independent "
+        "from test to test."
     )
     text = (
-        "E_n = |a − b| / √(U_a² + U_b²), U expanded uncertainties (95 %, t of type A), less what both share. Random "
-        "errors of different tests are independent, as each has a record of its own."
+        "E_n = |a − b| / √(U_a² + U_b²), with the expanded uncertainties U (95 %, Student t for Type A) reduced by the "
+        "components that both methods share [ISO 13528]. Random errors of different tests are independent, as each test "
+        "has a record of its own."
     )
     blocks: list[Any] = [Text(text), Text(shared), Items(doc["conventions"])]
     rows = []
@@ -300,8 +302,8 @@ def _how(doc: Json) -> list[Any]:
             terms = " ".join(f"{signs[n]} {size} {n}" for n, size in sizes.items() if size != "0")
             rows.append(Row([text_cell(q["name"], "strong"), text_cell(terms.removeprefix("+ "))]))
     if rows:
-        caption = "Quantities that are combinations of coefficients (factors in powers of g)."
-        blocks.append(Table([Column("quantity"), Column("is", wide=True)], rows, caption))
+        caption = "Measurands that are combinations of coefficients (factors in powers of g)."
+        blocks.append(Table([Column("measurand"), Column("combination", wide=True)], rows, caption))
     return [*blocks, *source_blocks(doc["sources"])]
 
 
@@ -330,9 +332,9 @@ def _provenance(doc: Json) -> list[Any]:
             hashes.append(Row([text_cell(m["label"], "strong"), text_cell("data"), text_cell(compact(m["data"], 90))]))
     columns = [Column("test"), Column("seed"), Column("step", "s"), Column("engine"), Column("versions")]
     columns.append(Column("changed", wide=True))
-    blocks: list[Any] = [Table(columns, rows, "How each test was run, and what was set.", small=True)]
+    blocks: list[Any] = [Table(columns, rows, "Run settings of each test, and what was changed from the defaults.", small=True)]
     columns = [Column("test"), Column("file"), Column("SHA-256", wide=True)]
-    blocks.append(Table(columns, hashes, "What the tests left, by content.", small=True))
+    blocks.append(Table(columns, hashes, "Records and results of the tests, with their hash.", small=True))
     parts: dict[tuple[str, str, str, str], list[str]] = {}
     for m in members:
         for slot, p in (m.get("parts") or {}).items():
@@ -343,8 +345,8 @@ def _provenance(doc: Json) -> list[Any]:
             Row([text_cell(slot, "strong"), *map(text_cell, (*about, "".join(who))), Cell(sha, mark="hash")])
             for (slot, *about, sha), who in sorted(parts.items())
         ]
-        columns = [Column("slot"), Column("part"), Column("version"), Column("tests"), Column("SHA-256", wide=True)]
-        blocks.append(Table(columns, rows, "Parts of the simulated tests.", small=True))
+        columns = [Column("slot"), Column("component"), Column("version"), Column("tests"), Column("SHA-256", wide=True)]
+        blocks.append(Table(columns, rows, "Components of the simulated tests.", small=True))
     given = ", ".join(f"{n} = {v}" for n, v in (run.get("changed") or {}).items())
     facts = [("set", given), ("seed of the suite", run.get("seed")), ("versions", _versions(run.get("versions")))]
     said = [f"{name[0].upper()}{name[1:]}: {value}" for name, value in facts if value not in (None, "")]

@@ -1,4 +1,4 @@
-"""Tables of whatever a reduction or a record delivers: dictionaries, lists of rows, parameters, parts."""
+"""Report tables of JSON values: dictionaries, lists of rows, parameters, components."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def how_tables(doc: Any) -> list[Any]:
             )
         heads = (
             ("slot", ""),
-            ("part", ""),
+            ("component", ""),
             ("version", ""),
             ("target", ""),
             ("FMI", ""),
@@ -170,7 +170,7 @@ def how_tables(doc: Any) -> list[Any]:
             ("SHA-256", ""),
         )
         columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
-        blocks.append(Table(columns, rows, "Parts in their slots, with the time spent in each.", small=True))
+        blocks.append(Table(columns, rows, "Components in their slots, with the computing time of each.", small=True))
     blocks += _changed(doc) + _defaults(doc)
     facts = [
         k for k in ("seed", "step", "engine", "isolated", "complete", "stopped_at") if run.get(k) not in (None, [])
@@ -181,9 +181,9 @@ def how_tables(doc: Any) -> list[Any]:
             Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k), None, 8), text_cell(units.get(k, ""))])
             for k in facts
         ]
-        blocks.append(Table([Column("run"), Column("value"), Column("unit")], rows, "How the run was made."))
+        blocks.append(Table([Column("setting"), Column("value"), Column("unit")], rows, "Settings of the run."))
     if run.get("data"):
-        blocks += generic(doc, ("provenance", "data"), "The data that were reduced.")
+        blocks += generic(doc, ("provenance", "data"), "Data reduced.")
     if run.get("notes"):
         blocks.append(Items([str(n) for n in run["notes"]]))
     if run.get("versions"):
@@ -202,14 +202,14 @@ def _changed(doc: Any) -> list[Any]:
     run = doc["provenance"]
     changed = [str(c) for c in (run.get("changed") or [])]
     if not changed:
-        text = "Nothing was changed: every part ran with its defaults."
+        text = "No option, parameter or component differs from its default."
         return [Text(text)] if run.get("parameters") or run.get("options") else []
     rows = []
     for name in changed:
         where = next((k for k in ("parameters", "options") if name in (run.get(k) or {})), "")
         value = _plain(doc, ("provenance", where, name)) if where else text_cell("changed")
         rows.append(Row([text_cell(name, "strong"), value]))
-    return [Table([Column("changed"), Column("value (SI)")], rows, "What was changed, in SI units.", small=True)]
+    return [Table([Column("changed"), Column("value (SI)")], rows, "Options, parameters and components that differ from their defaults, in SI units.", small=True)]
 
 
 def _defaults(doc: Any) -> list[Any]:
@@ -217,11 +217,11 @@ def _defaults(doc: Any) -> list[Any]:
     run = doc["provenance"]
     changed = {str(c) for c in (run.get("changed") or [])}
     blocks: list[Any] = []
-    for key, what in (("options", "options of the system"), ("parameters", "parameters of the parts")):
+    for key, what in (("options", "options of the system"), ("parameters", "parameters of the components")):
         names = [n for n in (run.get(key) or {}) if n not in changed]
         if names:
             rows = [Row([text_cell(n), _plain(doc, ("provenance", key, n))]) for n in names]
-            caption = f"{what.capitalize()} left at their defaults, in SI units."
+            caption = f"{what.capitalize()} at their default values, in SI units."
             table = Table([Column("name"), Column("value (SI)")], rows, caption, small=True)
             blocks.append(Fold(f"Defaults: {len(names)} {what}", [table]))
     return blocks

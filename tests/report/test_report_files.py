@@ -172,8 +172,8 @@ def test_every_page_of_the_pdf_is_signed(written):
 def test_sections_in_order(written):
     titles = re.findall(r"<h2 id=\"[a-z]+\"><span>(\d+)</span> ([^<]+)</h2>", written.html)
     assert [t for _, t in titles] == [
-        "The answer", "Coefficients", "What was measured", "Can it be believed", "Error budget", "How it was done",
-        "Statements and signatures",
+        "Result and conformity", "Coefficients", "Measurement data", "Validity of the results", "Uncertainty budget",
+        "Method and provenance", "Statements and signatures",
     ]  # fmt: skip
     assert [n for n, _ in titles] == ["1", "2", "3", "4", "5", "6", "7"]
     text = written.pdf_text()
@@ -341,10 +341,10 @@ def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
     assert texts["/tables/0/rows/0/1"] == "0.2976"  # to the second digit of u
     assert texts["/tables/0/rows/0/2"] == "1.2·10⁻⁵"
     assert "/step_check/rows/3/ratio" in texts
-    assert "Halving the step of 0.0005 s changes no coefficient by more than 0.0001 of its u." in w.html
+    assert "Halving the communication step of 0.0005 s changes no coefficient by more than 0.0001 u." in w.html
     r.step_check = {}
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
-    assert "The step was not checked in this run" in w.html
+    assert "The communication step was not checked in this run" in w.html
 
 
 def test_wiring_drawing_stands_alone():
@@ -364,5 +364,5 @@ def test_delays_and_cuts_are_said(tmp_path):
     r.provenance["cuts"] = ["rebalance.i -> gyro.i: one step delay (no output depends on it at once)"]
     r.provenance["delays"] = {"rebalance.i -> gyro.i": 0.001, "table.angle -> sampler.angle": 0.002}
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
-    assert "Cut at rebalance.i → gyro.i: one step delay (no output depends on it at once), 0.001 s." in w.html
+    assert "Delayed connection rebalance.i → gyro.i: one step delay (no output depends on it at once), 0.001 s." in w.html
     assert "Delay on table.angle → sampler.angle: 0.002 s." in w.html

@@ -88,7 +88,7 @@ def test_each_response_has_its_figure(written: Written) -> None:
     html = written.paths["html"].read_text(encoding="utf-8")
     for k in (1, 2, 3):
         assert f'id="figure-response-{k}"' in html
-    assert "The regression has rank" not in html and "Residual standard deviation" not in html
+    assert "The design matrix has rank" not in html and "Residual standard deviation" not in html
 
 
 def test_plan_of_a_loop_shows_its_excitations(written: Written) -> None:

@@ -237,4 +237,4 @@ def test_swap_and_compare(command: Command, tmp_path: Path) -> None:
         "EstimatorNone",
     ]
     html = (tmp_path / "comparison.html").read_text()
-    assert html.index("Ranking by error") < html.index("Parts, parameters and settings that differ")
+    assert html.index("Ranking by error") < html.index("Components, parameters and settings that differ")

@@ -125,4 +125,4 @@ def test_halving_the_step_changes_nothing_that_matters(command: Command, tmp_pat
         assert row["u"] > 1e-4  # deg/h per g^n: noise is on
         assert row["ratio"] == abs(row["change"]) / row["u"] < 1e-3, row
     assert check["worst"] == max(r["ratio"] for r in check["rows"])
-    assert f"halving the step changes no coefficient by more than {check['worst']:.2g} u" in out
+    assert f"halving the communication step changes no coefficient by more than {check['worst']:.2g} u" in out
