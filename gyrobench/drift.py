@@ -39,16 +39,16 @@ TERM_SETS: dict[int, tuple[str, ...]] = {
     10: NAMES,
 }
 MEANING = {
-    "D_F": "constant drift",
-    "D_I": "mass unbalance along the spin axis (drift per g along the input axis)",
-    "D_O": "drift per g along the output axis",
-    "D_S": "mass unbalance along the input axis (drift per g along the spin axis)",
-    "D_II": "compliance, g² along the input axis",
-    "D_OO": "g² along the output axis (empirical)",
-    "D_SS": "compliance, g² along the spin axis",
-    "D_IO": "compliance, input and output axes",
-    "D_OS": "compliance, output and spin axes",
-    "D_IS": "anisoelasticity, input and spin axes",
+    "D_F": "acceleration-insensitive (fixed) drift rate",
+    "D_I": "acceleration-sensitive drift rate, input axis (mass unbalance along the spin axis)",
+    "D_O": "acceleration-sensitive drift rate, output axis (empirical)",
+    "D_S": "acceleration-sensitive drift rate, spin reference axis (mass unbalance along the input axis)",
+    "D_II": "acceleration-squared-sensitive drift rate, input axis (compliance)",
+    "D_OO": "acceleration-squared-sensitive drift rate, output axis (empirical)",
+    "D_SS": "acceleration-squared-sensitive drift rate, spin reference axis (compliance)",
+    "D_IO": "acceleration-squared-sensitive drift rate, input and output axes (compliance)",
+    "D_OS": "acceleration-squared-sensitive drift rate, output and spin reference axes (compliance)",
+    "D_IS": "acceleration-squared-sensitive drift rate, input and spin reference axes (anisoelasticity)",
 }
 #: the square that cannot be told from the others at constant |g| -> the three that take it up
 FOLDED = {
@@ -81,7 +81,11 @@ def meaning(name: str) -> str:
         return MEANING[name]
     channel, axes = name[1:].split("_")
     along = f"{axes[0]} axis" if len(set(axes)) == 1 else f"{axes[0]} and {axes[-1]} axes"
-    what = ("constant drift", f"drift per g along the {along}", f"drift per g² along the {along}")[order(name)]
+    what = (
+        "acceleration-insensitive (fixed) drift rate",
+        f"acceleration-sensitive drift rate, {along}",
+        f"acceleration-squared-sensitive drift rate, {along}",
+    )[order(name)]
     return f"{what}, {channel} channel"
 
 
@@ -124,7 +128,7 @@ def fold_problems(true: Mapping[str, float], prefix: str = "") -> list[str]:
     """
     return [
         f"{prefix}{square} = {true[prefix + square] / DPH:g} °/h/g²: at constant |g| it cannot be told from {a}, {b} "
-        f"and {c}; set fold=true to accept the combinations {a} + γ² {square}, {b} − {square}, {c} − {square}"
+        f"and {c}; set fold=true to report the combinations {a} + γ² {square}, {b} − {square}, {c} − {square}"
         for square, (a, b, c) in FOLDED.items()
         if true.get(prefix + square)
     ]

@@ -35,7 +35,7 @@ class Site:
         """From the options latitude, gravity and height and the site part; without gravity: WGS84 normal gravity."""
         options, parameters = run.options, run.parameters
         if "latitude" not in options:
-            raise ReductionError("the record does not say the latitude (option latitude)")
+            raise ReductionError("the record does not state the latitude; give the option latitude")
         latitude = float(options["latitude"])
         gravity = float(options.get("gravity") or parameters.get("site.gravity") or 0.0)
         if gravity == 0.0:
@@ -92,5 +92,5 @@ def finish(result: R, record: Record) -> R:
     result.provenance = record.run.as_dict()
     if not record.run.complete:
         stopped = record.run.stopped_at or 0.0
-        result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before its plan was done.")
+        result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before the end of its plan.")
     return result

@@ -19,11 +19,15 @@ def check_truth(result: Result, causes: Sequence[str]) -> None:
     if not far:
         return
     far.sort(key=lambda c: -abs(c.z or 0.0))
-    why = f"Set and may explain it: {'; '.join(causes)}." if causes else "Nothing was set: the model or its u is wrong."
+    why = (
+        f"Possible causes among the values set: {'; '.join(causes)}."
+        if causes
+        else "No value was set: the model or its u is wrong."
+    )
     result.warnings.insert(
         0,
-        f"The result misses the simulated truth by more than five standard uncertainties: {_shown(far)}. That is no "
-        f"chance; the coefficients, their u and every verdict on them are not to be used. {why}",
+        f"The result misses the simulated truth by more than five standard uncertainties: {_shown(far)}. Chance does "
+        f"not explain this; do not use the coefficients, their u or their verdicts. {why}",
     )
 
 

@@ -142,7 +142,11 @@ def page(doc: Json) -> Page:
             ranking_section.section(doc, [_letter(k) for k in range(len(runs))]),
             Section("Differing settings", "differs", [_runs(doc), *_differing(doc)]),
             Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
-            Section("Responses and estimates of all runs", "figures", [*responses.side_by_side(doc, _letter), *_figures(doc)]),
+            Section(
+                "Responses and estimates of all runs",
+                "figures",
+                [*responses.side_by_side(doc, _letter), *_figures(doc)],
+            ),
             Section("Common settings", "equal", _equal(doc)),
         ]
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
@@ -259,7 +263,8 @@ def _differences(doc: Json) -> list[Any]:
             name = f"{_letter(k)} − {_letter(base)}"
             columns += [Column(name), Column("U (95 %)"), Column("")]
         caption = (
-            f"Differences from baseline {_letter(base)} with their expanded uncertainty; the runs are treated as independent."
+            f"Differences from baseline {_letter(base)} with their expanded uncertainty; the runs are treated as "
+            "independent."
         )
         blocks.append(Table(columns, rows, caption))
     blocks.append(

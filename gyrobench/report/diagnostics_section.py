@@ -36,8 +36,8 @@ def residuals(doc: Json) -> list[Any]:
         Picture(
             "quantiles",
             plots.quantiles(left, "quantiles"),
-            "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
-            "distribution; points off it at the ends are outliers.",
+            "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a "
+            "normal distribution; points off it at the ends are outliers.",
             "Q-Q plot of the residuals against a normal distribution",
             half=True,
         ),
@@ -89,7 +89,9 @@ def stability(doc: Json) -> list[Any]:
             half=True,
         ),
     )
-    return blocks + generic(doc, ("allan", "slopes"), "Local slopes of the Allan deviation on logarithmic axes.", significant=3)
+    return blocks + generic(
+        doc, ("allan", "slopes"), "Local slopes of the Allan deviation on logarithmic axes.", significant=3
+    )
 
 
 def estimates(doc: Json) -> list[Any]:
@@ -144,7 +146,9 @@ def estimates(doc: Json) -> list[Any]:
                     ]
                 )
             )
-    caption = "Uncertainty of each estimate. Closed form: the formula of the source; difference: closed form − estimate."
+    caption = (
+        "Uncertainty of each estimate. Closed form: the formula of the source; difference: closed form − estimate."
+    )
     blocks.append(Table(columns, rows, caption, small=True))
     z = [c["z"] for c in doc["coefficients"]]
     blocks += pictures(
@@ -179,7 +183,9 @@ def _step(doc: Json) -> list[Any]:
         return [unchecked] if doc["simulated"] else []
     step = write_number(check.get("step"), significant=6).text
     worst = write_number(check.get("worst"), significant=2).text
-    caption = "Step check: change of each coefficient when the communication step is halved, noise off; ratio: change / u."
+    caption = (
+        "Step check: change of each coefficient when the communication step is halved, noise off; ratio: change / u."
+    )
     table = generic(doc, ("step_check", "rows"), caption, significant=2)
     return [Text(f"Halving the communication step of {step} s changes no coefficient by more than {worst} u."), *table]
 
@@ -236,7 +242,10 @@ def budget(doc: Json) -> list[Any]:
     alt = "Uncertainty budget as bars: contribution of each source to the uncertainty of the coefficients"
     caption = "Uncertainty budget: contribution of each source, and their root sum of squares against the stated u."
     table = Table(
-        columns, rows, "Uncertainty budget: standard uncertainty u(x) of each source, sensitivity coefficient and contribution to u.", small=True
+        columns,
+        rows,
+        "Uncertainty budget: standard uncertainty u(x) of each source, sensitivity coefficient and contribution to u.",
+        small=True,
     )
     return [
         *pictures(Picture("budget", diagrams.budget(lines, u, "budget"), caption, alt)),

@@ -47,7 +47,9 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
             Section("Measurement data", "measured", _measured(doc, record or {})),
             Section("Validity of the results", "believed", []),
             Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True),
-            Section("Stability: Allan deviation and spectrum", "stability", diagnostics_section.stability(doc), sub=True),
+            Section(
+                "Stability: Allan deviation and spectrum", "stability", diagnostics_section.stability(doc), sub=True
+            ),
             Section("Uncertainty of the estimates", "estimates", diagnostics_section.estimates(doc), sub=True),
             Section("Repeatability and step check", "repeatability", diagnostics_section.repeatability(doc), sub=True),
             Section("Uncertainty budget", "budget", diagnostics_section.budget(doc)),
@@ -178,8 +180,8 @@ def coefficients(doc: Json) -> list[Any]:
                 cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
             rows.append(Row(cells))
     note = (
-        "u: combined standard uncertainty; estimates are rounded to its second significant digit. 95 % from, to: limits "
-        "of the coverage interval."
+        "u: combined standard uncertainty; estimates are rounded to its second significant digit. 95 % from, to: "
+        "limits of the coverage interval."
     )
     if truth:
         note += " Truth: true value in the simulation; z = (estimate − truth) / u."

@@ -17,8 +17,8 @@ def signing(doc: Json) -> list[Any]:
     about = f" ({doc['instrument']})" if doc["instrument"] else ""
     statements = [
         f"The results relate only to the item tested{about}, in its condition at the time of the test.",
-        "U is the combined standard uncertainty u multiplied by the stated coverage factor k, for a coverage probability "
-        "of about 95 % [GUM].",
+        "U is the combined standard uncertainty u multiplied by the stated coverage factor k, for a coverage "
+        "probability of about 95 % [GUM].",
         "This report shall not be reproduced except in full without approval of the laboratory.",
     ]
     missing = [name for name in ("operator", *ABOUT) if name != "customer" and not run.get(name)]

@@ -154,12 +154,11 @@ def _cross(doc: Json) -> list[Any]:
     heads = ["method", "estimate", "u", "U (95 %)", *("Type A", "Type B", "shared")[: len(split)], "dof", "weight"]
     columns = [*map(Column, heads), Column("source of the value", wide=True)]
     caption = (
-        "Values of each measurand by every method that determines it. dof: degrees of freedom of the Type A component, a "
-        "dash where they are infinite; weight: in the weighted mean."
+        "Values of each measurand by every method that determines it. dof: degrees of freedom of the Type A "
+        "component, a dash where they are infinite; weight: in the weighted mean."
     )
     if split:
-        caption += " Type A, Type B, shared: components of u; shared: Type B components common to several tests, see Method and "
-            "provenance."
+        caption += " Type A, Type B, shared: components of u; shared: in several tests, see Method and provenance."
     return [Pictures(pictures), Table(columns, rows, caption, small=True)] if rows else []
 
 
@@ -262,7 +261,7 @@ def _tests(doc: Json) -> list[Any]:
         )
     columns = [Column(""), Column("test", wide=True), Column("report"), Column("date"), Column("duration", "s")]
     columns += [Column("phases"), Column("windows"), Column("residual"), Column("unit")]
-    caption = "Member tests, each with a report of its own; residual: standard deviation of the residuals of the windows."
+    caption = "Member tests, each with a report of its own; residual: residual standard deviation of the windows."
     blocks: list[Any] = [Table(columns, rows, caption, small=True)]
     for k, m in enumerate(members):
         where = f" Run and report in {m['folder']}." if m["folder"] else ""
@@ -282,16 +281,16 @@ def _tests(doc: Json) -> list[Any]:
 def _how(doc: Json) -> list[Any]:
     suite = doc["suite"]
     shared = (
-        f"Errors shared by the tests: {', '.join(suite['shared'])}. An equal shared error cancels in a difference; it is "
-        "not reduced by averaging."
+        f"Errors shared by the tests: {', '.join(suite['shared'])}. An equal shared error cancels in a difference; it "
+        "is not reduced by averaging."
         if suite["shared"]
-        else "No test states an uncertainty component in common with another test; all errors are treated as independent "
-        "from test to test."
+        else "No test states an uncertainty component in common with another test; all errors are treated as "
+        "independent from test to test."
     )
     text = (
         "E_n = |a − b| / √(U_a² + U_b²), with the expanded uncertainties U (95 %, Student t for Type A) reduced by the "
-        "components that both methods share [ISO 13528]. Random errors of different tests are independent, as each test "
-        "has a record of its own."
+        "components that both methods share [ISO 13528]. Random errors of different tests are independent, as each "
+        "test has a record of its own."
     )
     blocks: list[Any] = [Text(text), Text(shared), Items(doc["conventions"])]
     rows = []
@@ -332,7 +331,7 @@ def _provenance(doc: Json) -> list[Any]:
             hashes.append(Row([text_cell(m["label"], "strong"), text_cell("data"), text_cell(compact(m["data"], 90))]))
     columns = [Column("test"), Column("seed"), Column("step", "s"), Column("engine"), Column("versions")]
     columns.append(Column("changed", wide=True))
-    blocks: list[Any] = [Table(columns, rows, "Run settings of each test, and what was changed from the defaults.", small=True)]
+    blocks: list[Any] = [Table(columns, rows, "Run settings of each test, with changed defaults.", small=True)]
     columns = [Column("test"), Column("file"), Column("SHA-256", wide=True)]
     blocks.append(Table(columns, hashes, "Records and results of the tests, with their hash.", small=True))
     parts: dict[tuple[str, str, str, str], list[str]] = {}
@@ -345,7 +344,7 @@ def _provenance(doc: Json) -> list[Any]:
             Row([text_cell(slot, "strong"), *map(text_cell, (*about, "".join(who))), Cell(sha, mark="hash")])
             for (slot, *about, sha), who in sorted(parts.items())
         ]
-        columns = [Column("slot"), Column("component"), Column("version"), Column("tests"), Column("SHA-256", wide=True)]
+        columns = [*map(Column, ("slot", "component", "version", "tests")), Column("SHA-256", wide=True)]
         blocks.append(Table(columns, rows, "Components of the simulated tests.", small=True))
     given = ", ".join(f"{n} = {v}" for n, v in (run.get("changed") or {}).items())
     facts = [("set", given), ("seed of the suite", run.get("seed")), ("versions", _versions(run.get("versions")))]

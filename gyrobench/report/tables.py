@@ -209,7 +209,14 @@ def _changed(doc: Any) -> list[Any]:
         where = next((k for k in ("parameters", "options") if name in (run.get(k) or {})), "")
         value = _plain(doc, ("provenance", where, name)) if where else text_cell("changed")
         rows.append(Row([text_cell(name, "strong"), value]))
-    return [Table([Column("changed"), Column("value (SI)")], rows, "Options, parameters and components that differ from their defaults, in SI units.", small=True)]
+    return [
+        Table(
+            [Column("changed"), Column("value (SI)")],
+            rows,
+            "Options, parameters and components that differ from their defaults, in SI units.",
+            small=True,
+        )
+    ]
 
 
 def _defaults(doc: Any) -> list[Any]:

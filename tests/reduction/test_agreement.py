@@ -150,7 +150,7 @@ def test_a_shift_of_five_u_is_found_and_named() -> None:
         results["b"].coefficients[1].estimate += 6.0
         c = next(c for c in compare(results, ()) if c.quantity.name == "D_I")
         found += c.disagree
-        blamed += [c.words().split()[0]] if "is off by" in c.words() and c.disagree else []
+        blamed += [c.words().split()[0]] if "deviates by" in c.words() and c.disagree else []
     assert found >= 95 and blamed and set(blamed) == {"b"}
 
 
@@ -205,7 +205,7 @@ def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
     r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, specification=limits)
     f, i = r.coefficients
     assert r.suite.disagreeing == ["D_F"] and r.suite.consistency == "inconsistent"
-    assert "c is off by +2 °/h; the others agree" in " ".join(r.summary)
+    assert "c deviates by +2 °/h; the others are consistent" in " ".join(r.summary)
     assert f.u == pytest.approx(agree([Value("", x, 0.2) for x in values.values()]).birge * 0.2 / math.sqrt(3.0))
     assert (f.verdict, i.verdict, r.verdict) == ("inconclusive", "pass", "inconclusive")
     assert i.u == pytest.approx(0.2 / math.sqrt(3.0))
@@ -213,7 +213,7 @@ def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
 
 def test_tests_of_different_gyros_are_refused() -> None:
     one, two = result({"D_F": (1.0, 0.1)}), result({"Dx_0": (1.0, 0.1)})
-    with pytest.raises(ReductionError, match=r"a: of a single-degree.*; b: of a two-degree.*a suite is of one gyro"):
+    with pytest.raises(ReductionError, match=r"a: of a single-degree.*; b: of a two-degree.*a suite compares"):
         suite({"a": one, "b": two})
     with pytest.raises(ReductionError, match="different instruments: gyro 7: a; gyro 8: b"):
         suite({n: result({"D_F": (1.0, 0.1)}, instrument=f"gyro {k}") for n, k in (("a", 7), ("b", 8))})

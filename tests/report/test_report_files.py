@@ -330,7 +330,7 @@ def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
     r = tumble(windows=12)
     r.tables = [
         {
-            "title": "Least squares and closed formulas",
+            "title": "Least squares and closed form",
             "caption": "From the same windows",
             "columns": ["coefficient", "least squares", "difference", "u", "turn / (°/h)"],
             "rows": [["D_F", 0.29761, 1.2345e-5, 0.0025, 3]],
@@ -364,5 +364,7 @@ def test_delays_and_cuts_are_said(tmp_path):
     r.provenance["cuts"] = ["rebalance.i -> gyro.i: one step delay (no output depends on it at once)"]
     r.provenance["delays"] = {"rebalance.i -> gyro.i": 0.001, "table.angle -> sampler.angle": 0.002}
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
-    assert "Delayed connection rebalance.i → gyro.i: one step delay (no output depends on it at once), 0.001 s." in w.html
+    assert (
+        "Delayed connection rebalance.i → gyro.i: one step delay (no output depends on it at once), 0.001 s." in w.html
+    )
     assert "Delay on table.angle → sampler.angle: 0.002 s." in w.html

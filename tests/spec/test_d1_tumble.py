@@ -466,7 +466,7 @@ def test_from_a_run() -> None:
     assert s.faces[2] == pytest.approx(faces["mount 1"])
     r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, document))
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
-    assert "before its plan was done" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
+    assert "before the end of its plan" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
     del document.parameters["gyro.k"]
     with pytest.raises(T.reduction.ReductionError, match="scale factor unknown"):
         T.reduction.setup_of(document)

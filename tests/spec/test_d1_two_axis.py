@@ -84,7 +84,7 @@ def test_recovery(latitude: float, m: int, n: int, positions: int) -> None:
             assert abs(c.closed - c.truth) < 1e-9 * scale, c.name
         else:
             assert c.closed is None
-    assert any("No closed formulas" in w for w in r.warnings) == (max(m, n) < 5)
+    assert any("No closed-form estimates" in w for w in r.warnings) == (max(m, n) < 5)
 
 
 def test_equator_needs_least_squares() -> None:

@@ -159,7 +159,7 @@ def test_a_gyro_that_changed_in_one_test_is_found(sessions: dict[str, Session], 
     assert found.suite.consistency == "inconsistent"
     assert name in found.suite.disagreeing
     words = next(q["words"] for q in found.suite.quantities if q["name"] == name)
-    assert words.startswith(f"{culprit} is off by +0.5 °/h/g; the others agree")
+    assert words.startswith(f"{culprit} deviates by +0.5 °/h/g; the others are consistent")
     assert any(f"gyro.{name} = " in w and "Not the same in all tests" in w for w in found.warnings)
 
 
@@ -187,7 +187,7 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     apart = report(results(sessions, blind, 3), blind)
     assert name in apart.suite.disagreeing
     words = next(q["words"] for q in apart.suite.quantities if q["name"] == name)
-    assert words.startswith("servo_polar is off by")  # what an unstated common error does
+    assert words.startswith("servo_polar deviates by")  # what an unstated common error does
 
 
 def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> None:
@@ -195,7 +195,7 @@ def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> N
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)
     found = report(results(sessions, chosen, 3), chosen)
     words = next(q["words"] for q in found.suite.quantities if q["name"] == "D_I")
-    assert "disagree: E_n of tumble_single_axis and servo_polar" in words and "cannot be told" in words
+    assert "inconsistent: E_n of tumble_single_axis and servo_polar" in words and "cannot be identified" in words
     assert next(c for c in found.coefficients if c.name == "D_I").truth is None  # there are two
 
 

@@ -75,7 +75,7 @@ def test_measures_of_the_vendors_platform(both: Any) -> None:
         assert b[f"f_c {axis}"] == pytest.approx(a[f"f_c {axis}"], rel=1e-3)
         assert b[f"PM {axis}"] == pytest.approx(a[f"PM {axis}"], abs=0.1)
     assert b["rate gain"] == pytest.approx(1.0001, rel=1e-5)
-    assert "No linear model to compare with: the FMU in slot platform" in theirs.warnings[-1]
+    assert "No linear model for comparison: the FMU in slot platform" in theirs.warnings[-1]
     assert not any("No linear model" in w for w in ours.warnings)
     assert theirs.provenance["parts"]["platform"]["name"] == "Vendor TGP-3"
 

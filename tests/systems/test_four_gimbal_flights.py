@@ -128,7 +128,7 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
     """With noise: margins within 1 dB and 3 degrees up to twice the crossover; error and ring angles over time."""
     values = {"hold": 5.0}
     result = bench.system.with_values(values).reduce(bench.run(values, seed=5))
-    rows = table(result, "Linear models against the measured loop")["rows"]
+    rows = table(result, "Linear models and measured loop")["rows"]
     assert len(rows) == 6 and all(r[3] < 0.02 and r[4] < 0.6 for r in rows)
     c = measures(result)
     for axis in ("pitch", "roll", "azimuth"):

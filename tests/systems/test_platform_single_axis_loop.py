@@ -33,7 +33,7 @@ def quiet():
 def test_margins_of_the_sweep_are_those_of_the_linear_parts(quiet):
     """Within 1 dB and 3 degrees up to twice the crossover; without noise far closer, as the delays are in the model."""
     _, result, found = quiet
-    (row,) = rows(result, "Linear models against")
+    (row,) = rows(result, "Linear models and")
     assert row["gain / dB"] < 0.01 and row["phase / °"] < 0.1
     assert found["f_c"].estimate == pytest.approx(10.0, rel=0.03)  # the gain is set for it; delays shift it
     margins = rows(result, "Stability margins")
@@ -91,7 +91,7 @@ def test_servo_with_a_current_loop_swaps_and_isolates_better():
     _, result, found = reduced({"stabilizer": "servo_three_loop"}, **QUIET)
     _, _, plain = reduced(**QUIET)
     assert found["platform error"].estimate < 0.3 * plain["platform error"].estimate
-    assert rows(result, "Linear models against")[0]["gain / dB"] < 0.05
+    assert rows(result, "Linear models and")[0]["gain / dB"] < 0.05
 
 
 def test_halving_the_step_moves_the_margin_by_its_delay():

@@ -234,7 +234,7 @@ def test_composite_drift_and_turns(polar: Session) -> None:
     """Two turns of each mount, noise on: systematic and random part of each phase, turns alike."""
     values = {**DAY500, "turns": 2, "time": 100.0, "route": "combination", "gyro.markov": 0.0, "gyro.white": 1e-7}
     result = load_system(NAME).reduce(polar.run(values, seed=4))
-    table = next(t for t in result.tables if t["title"] == "Composite drift")
+    table = next(t for t in result.tables if t["title"] == "Systematic and random drift rate")
     assert [row[0] for row in table["rows"]] == ["polar S", "polar N"] and "4.8 s" in table["caption"]
     truth = {c.name: c.truth for c in result.coefficients}
     g, phi = frames.normal_gravity(math.radians(45.75)) / frames.G0, math.radians(45.75)
@@ -248,7 +248,7 @@ def test_composite_drift_and_turns(polar: Session) -> None:
     less = next(t for t in result.tables if t["title"] == "Turns less the first turn")
     assert [row[:2] for row in less["rows"]] == [["polar S", 2], ["polar N", 2]]
     assert all(abs(row[3]) < 5.0 * row[4] / math.sqrt(row[2]) for row in less["rows"])
-    rho = next(t for t in result.tables if t["title"] == "Correlation of the random part")["rows"]
+    rho = next(t for t in result.tables if t["title"] == "Autocorrelation of the random drift rate")["rows"]
     assert rho[0][1] == 1.0 and rho[-1][0] == table["rows"][0][1] // 4
 
 

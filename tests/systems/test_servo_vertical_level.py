@@ -105,7 +105,7 @@ def test_noise_and_composite(bench: Session) -> None:
     result = load_system(NAME).reduce(bench.run(values, seed=5))
     for c in result.coefficients:
         assert c.z is not None and abs(c.z) < 4.0 and c.u > 1e-4, c.name
-    table = next(t for t in result.tables if t["title"] == "Composite drift")
+    table = next(t for t in result.tables if t["title"] == "Systematic and random drift rate")
     assert len(table["rows"]) == 12 and all(row[1] == 10 and row[2] == 30.0 for row in table["rows"])
 
 

@@ -171,14 +171,14 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, the delay of the step included.  The
     continuous model differs by the delay: half a step of holding and nothing else, 360 f h/2 = 0.048 deg at 2.66 Hz."""
     result = load().reduce(whole)
-    table = next(t for t in result.tables if t["title"].startswith("Linear models against"))
+    table = next(t for t in result.tables if t["title"].startswith("Linear models and"))
     (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(2.659, abs=0.01) and count >= 5
     assert db < 1e-3 and degrees < 5e-3
     assert db_c < 1e-3 and degrees_c == pytest.approx(360.0 * 2.0 * 0.5e-4, abs=5e-3)
     rows = next(t for t in result.tables if t["title"].startswith("Stability margins"))
-    assert "delays inserted by the order of the parts: gyro.u_y → stabilizer.u: 0.0001 s" in rows["caption"]
+    assert "delays of delayed connections: gyro.u_y → stabilizer.u: 0.0001 s" in rows["caption"]
 
 
 def test_measures_of_the_whole_run(whole: Any) -> None:

@@ -212,7 +212,7 @@ def test_motor_takes_the_load_off_the_float(session):
     assert b[-1] == pytest.approx(10.0 / 2000.0, rel=0.02)
     result = session.system.reduce(record)
     assert any(r.kind == "loop" for r in result.responses)
-    agree = next(t for t in result.tables if t["title"].startswith("Linear models against"))
+    agree = next(t for t in result.tables if t["title"].startswith("Linear models and"))
     assert agree["rows"][0][3] < 0.1 and agree["rows"][0][4] < 1.0
 
 

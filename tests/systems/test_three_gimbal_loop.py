@@ -179,7 +179,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; by hand the crossover is 6.346 Hz, the margin 85.44
     less the delay, 360 f h / 2 = 0.57 deg at most."""
     result = load_system(NAME).reduce(whole)
-    rows = table(result, "Linear models against the measured loop")["rows"]
+    rows = table(result, "Linear models and measured loop")["rows"]
     assert len(rows) == 6
     for label, _, count, db, degrees in (r[:5] for r in rows):
         assert count >= 5 and db < 0.01 and degrees < (0.05 if "delays" in label else 0.6), label

@@ -44,16 +44,16 @@ def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list
         found.append(f"{d.size} windows: at least {LEAST} are needed")
         return found
     if not np.all(np.isfinite(d)):
-        return ["a drift rate is no finite number"]
+        return ["a drift rate is not a finite number"]
     length = t_end - t_start
     if np.ptp(length) > 0.01 * np.median(length) or np.any(np.abs(t_start[1:] - t_end[:-1]) > 0.01 * length[1:]):
         found.append("windows of different length or with gaps: σ and correlation need one ΔT")
     if np.ptp(d) <= 1e-12 * float(np.max(np.abs(d))):
-        found.append("a constant series has no correlation: the data are not measured, or the quantum hides the drift")
+        found.append("the drift rate is constant and has no correlation: not measured data, or too coarse a resolution")
     if abs(earth) > 1e-7 and abs(float(np.mean(d)) + earth) < 0.2 * abs(earth):
         found.append(
-            f"the mean {np.degrees(float(np.mean(d))) * 3600.0:.4g} °/h is the table's own turn against the Earth: add "
-            f"the Earth rate along the input axis, {np.degrees(earth) * 3600.0:.4g} °/h"
+            f"the mean {np.degrees(float(np.mean(d))) * 3600.0:.4g} °/h is the table rate against the Earth: add the "
+            f"Earth rate along the input axis, {np.degrees(earth) * 3600.0:.4g} °/h"
         )
     return found
 
@@ -82,11 +82,11 @@ def tables(found: Mapping[str, Composite | str], scale: float, unit: str) -> lis
             time = c.time if c.time is not None else f"> {(c.correlation.size - 1) * c.dT:g}"
             rows.append([label, c.n, c.dT, c.mean / scale, c.sigma / scale, time])
     dTs = sorted({c.dT for c in found.values() if not isinstance(c, str)})
-    caption = "Mean: can be compensated; σ: the random drift, of windows of " + (
+    caption = "Mean: systematic drift rate, can be compensated; σ: random drift rate in windows of " + (
         ", ".join(f"{t:g} s" for t in dTs) or "no length"
     )
-    head = ["series", "windows", "ΔT / s", f"mean / ({unit})", f"σ / ({unit})", "correlation below 1/e after / s"]
-    out = [{"title": "Composite drift", "caption": caption, "columns": head, "rows": rows}]
+    head = ["series", "windows", "ΔT / s", f"mean / ({unit})", f"σ / ({unit})", "correlation time (1/e) / s"]
+    out = [{"title": "Systematic and random drift rate", "caption": caption, "columns": head, "rows": rows}]
     whole = {n: c for n, c in found.items() if not isinstance(c, str)}
     if whole:
         lags = _shown(max(c.correlation.size for c in whole.values()))
@@ -99,8 +99,10 @@ def tables(found: Mapping[str, Composite | str], scale: float, unit: str) -> lis
                 for n, c in whole.items()
             ]
             head = ["series, at lag / ΔT =", *(str(q) for q in across)]
-        caption = "Autocovariance over that at lag 0, to a quarter of the windows"
-        out.append({"title": "Correlation of the random part", "caption": caption, "columns": head, "rows": body})
+        caption = "Autocovariance divided by its value at lag 0, for lags up to a quarter of the windows"
+        out.append(
+            {"title": "Autocorrelation of the random drift rate", "caption": caption, "columns": head, "rows": body}
+        )
     return out
 
 

@@ -45,8 +45,8 @@ def fit(start: Array, end: Array, y: Array, order: int = 2) -> Fit:
     width = float(np.max(np.abs(end - start)))
     if order and abs(np.sinc(order * width / (2.0 * math.pi))) < 0.1:
         raise RegressionError(
-            f"windows of {math.degrees(width):.4g} deg average harmonic {order} away; at most "
-            f"{math.degrees(1.8 * math.pi / order):.0f} deg leave something of it"
+            f"windows of {math.degrees(width):.4g} deg average harmonic {order} away; use windows of at "
+            f"most {math.degrees(1.8 * math.pi / order):.0f} deg"
         )
     X, names = columns(start, end, range(order + 1))
     if len(y) < X.shape[1] + 1:

@@ -68,9 +68,12 @@ def linear_result(
     design = found.est.design
     said = [*found.est.warnings, *found.warnings()]
     if no_closed:
-        said.append(f"No closed formulas: {no_closed}.")
+        said.append(f"No closed-form estimates: {no_closed}.")
     if design.condition > CONDITION:
-        said.append(f"Condition {design.condition:.3g}: hardly seen is {design.weakest}.")
+        said.append(
+            f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
+            f"is {design.weakest}; errors of the model are amplified in it."
+        )
     return DriftTestResult(
         system=system,
         title=title,
@@ -147,7 +150,7 @@ def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Spe
 
 def _budget(found: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
     lines = []
-    note = "type A, from the residuals" + ("" if found.white else " under the estimated noise")
+    note = "Type A, from the residuals" + ("" if found.white else " under the estimated noise model")
     for j, q in enumerate(found.quantities):
         u_a = float(found.u[j]) / q.scale
         lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
@@ -179,6 +182,6 @@ def _closed_table(found: Findings, caption: str) -> list[dict[str, Any]]:
         if q.closed is not None:
             a, b = float(found.value[j]) / q.scale, q.closed / q.scale
             rows.append([q.name, a, b, a - b, float(found.u[j]) / q.scale, q.unit])
-    head = ["coefficient", "least squares", "closed formula", "difference", "u", "unit"]
-    title = "Least squares and closed formulas"
+    head = ["coefficient", "least squares", "closed form", "difference", "u", "unit"]
+    title = "Least squares and closed form"
     return [{"title": title, "caption": caption, "columns": head, "rows": rows}] if rows else []

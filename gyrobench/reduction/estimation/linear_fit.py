@@ -262,16 +262,16 @@ class Findings:
         return found
 
     def noise_sentence(self, what: str = "windows") -> str:
-        """The scatter in words, for the summary."""
-        text = f"Residual scatter of the {what} {self.residual_std:.3g} {self.y_unit}"
+        """Return the residual standard deviation and its noise model as a sentence, for the summary."""
+        text = f"Residual standard deviation of the {what}: {self.residual_std:.3g} {self.y_unit}"
         if self.ideal:
             return text + ", rounding only."
         if self.white:
-            return text + ", taken as white noise."
+            return text + ", treated as white noise."
         if self.est.best[1] == 0.0:
-            more = " and errors of the readings" if self.est.reading > 0.0 else ""
+            more = " and reading errors" if self.est.reading > 0.0 else ""
             return text + f", compatible with white noise{more}."
-        return text + f", correlated over about {self.est.tau[0]:.3g} s; the intervals allow for it."
+        return text + f"; correlation time about {self.est.tau[0]:.3g} s, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests
     def _residual_tests(self) -> list[Test]:
@@ -281,31 +281,33 @@ class Findings:
         lags = min(20, max(n // 5, 3))
         q, p = series.ljung_box(series.autocorrelation(self._parts(e.residual / self.y_scale), lags), n, lags)
         text = (
-            "no correlation seen"
+            "no significant autocorrelation"
             if p >= 0.05
-            else "the noise is correlated, the intervals for white noise are too narrow"
+            else "the residuals are autocorrelated; the coverage intervals, which assume white noise, are too narrow"
             if self.white
-            else "the noise is correlated; ordinary least squares would be too sure of itself"
+            else "the residuals are autocorrelated; ordinary least squares would understate the uncertainties"
         )
-        found = [Test(RAW, q, p, f"correlation up to lag {lags}", text)]
+        found = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
         whitened = ", residuals" if self.white else ", whitened residuals"
         if not self.white:
             acf = series.autocorrelation(self._parts(e.whitened), lags)
             q, p = series.ljung_box(acf, n, lags, 2 if e.best[1] > 0.0 else 0)
-            text = "the noise model leaves some correlation" if p < 0.05 else "the noise model explains the correlation"
-            found.append(Test("Ljung-Box" + whitened, q, p, "correlation the noise model does not hold", text))
+            text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
+            found.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
         z, p = series.runs_test(e.whitened)
-        text = "signs of the residuals do not change at random" if p < 0.05 else "signs change at random"
-        found.append(Test("runs" + whitened, z, p, "slow trends and jumps", text))
+        text = "the signs of the residuals are not random" if p < 0.05 else "compatible with random signs"
+        found.append(Test("runs" + whitened, z, p, "trends and steps", text))
         w, p = series.normality(e.whitened)
-        text = "not normal; look for outliers" if p < 0.05 else "compatible with a normal distribution"
+        text = (
+            "the residuals are not normal; check for outliers" if p < 0.05 else "compatible with a normal distribution"
+        )
         found.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
         return found
 
     def warnings(self) -> list[str]:
-        """What the tests say loudly; correlation that the noise model allows for is none."""
+        """Return a sentence for each test with p < 0.001, but not for autocorrelation that the noise model includes."""
         loud = [t for t in self.tests if t.p is not None and t.p < 0.001 and (self.white or t.name != RAW)]
-        return [f"{t.name}: p = {t.p:.2g}, {t.finding}." for t in loud]
+        return [f"{t.name}: p < 0.001, {t.finding}. The stated u may be too small." for t in loud]
 
     def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
         """Coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""

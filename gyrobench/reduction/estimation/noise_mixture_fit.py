@@ -150,7 +150,8 @@ def fit(
     if slow and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
-            f"{tau[2]:.3g} s): slower drift looks like the constant term, whose interval holds for this record only."
+            f"{tau[2]:.3g} s). Slower drift is confounded with the constant term, whose interval is valid for this "
+            "record only."
         )
     return Estimate(
         tuple(names), beta, covariance, u, half, probability, dof_of(half / u), y - X @ beta,

@@ -157,9 +157,11 @@ def check_data(X: Array, y: Array, names: Sequence[str], limit: float = 1e3) -> 
         raise RegressionError(f"{n} data for {p} coefficients: at least {p + 1} are needed")
     design = examine(X, names)
     if design.rank < p:
-        raise RegressionError(f"rank {design.rank} for {p} coefficients; the data do not see {'; '.join(design.lost)}")
+        raise RegressionError(f"rank {design.rank} for {p} coefficients; not estimable: {'; '.join(design.lost)}")
     if design.condition > limit:
-        raise RegressionError(f"condition {design.condition:.4g} above {limit:g}; weakest direction {design.weakest}")
+        raise RegressionError(
+            f"condition number {design.condition:.4g} above {limit:g}; least determined: {design.weakest}"
+        )
     return design
 
 

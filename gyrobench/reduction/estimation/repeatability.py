@@ -96,13 +96,13 @@ def combine_days(
             )
         )  # fmt: skip
         c = coefficients[-1]
-        note = f"type A, standard deviation over {n} {what}s divided by √{n}"
+        note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
         budget.append(
-            BudgetLine(f"scatter from {what} to {what}", found.u, c.unit, 1.0, "1", found.u, c.unit, name, note)
+            BudgetLine(f"repeatability from {what} to {what}", found.u, c.unit, 1.0, "1", found.u, c.unit, name, note)
         )
-        budget += [b for b in parts[0].budget if b.coefficient == name and not b.note.startswith("type A")]
+        budget += [b for b in parts[0].budget if b.coefficient == name and not b.note.startswith("Type A")]
     varying = [t.name.split(", ", 1)[1] for t in tests if t.p is not None and t.p < 0.05]
-    said = f"{', '.join(varying)} vary" if varying else "nothing varies"
+    said = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
     first = parts[0]
     return replace(
         first,
@@ -110,7 +110,7 @@ def combine_days(
         series=series,
         correlation=_correlation(table) if n > 2 else first.correlation,
         dof=float(n - 1),
-        noise={"model": f"scatter of {n} {what}s, taken as independent"},
+        noise={"model": f"standard deviation over {n} {what}s, treated as independent"},
         tests=tests,
         residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
         acf={}, allan={}, psd={}, harmonics=[],
@@ -176,6 +176,6 @@ def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: st
     rows: list[list[Any]] = [[day, *row] for day, row in zip(days, table.tolist(), strict=True)]
     rows += [["mean", *(s.mean for s in each)], ["σ (n − 1)", *(s.sigma for s in each)], [f"u within a {what}", *own]]
     head = [f"{c.name} / ({c.unit})" for c in parts[0].coefficients]
-    title = f"{what.capitalize()} by {what}"
+    title = f"Estimates by {what}"
     return {"title": title, "caption": f"Estimates of each {what}, their mean and standard deviation",
             "columns": [what, *head], "rows": rows}  # fmt: skip

@@ -9,8 +9,8 @@ from gyrobench.result import NO_VERDICT
 
 NORMAL = 1.959963984540054
 DECISION_RULE = (
-    "Guard band equal to the expanded uncertainty U (95 %): pass when estimate ± U lies inside the limits, fail when "
-    "it lies outside, inconclusive when it holds a limit."
+    "Guard band equal to U (coverage probability 95 %). Pass: the coverage interval lies within the limits. Fail: it "
+    "lies entirely outside. Otherwise inconclusive."
 )
 
 
@@ -22,6 +22,11 @@ def combine(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[
     """
     b2 = sum(c * c for c in contributions)
     return math.sqrt(u_a * u_a + b2), math.sqrt(half_a * half_a + NORMAL**2 * b2)
+
+
+def p_text(p: float) -> str:
+    """Return a probability as the tables write it: "p < 0.001" or "p = 0.23"."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
 def verdict(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:

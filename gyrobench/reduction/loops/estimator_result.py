@@ -54,15 +54,15 @@ class Signals:
             elif not np.all(np.isfinite(x)):
                 found.append(f"{name} is not finite at {int(np.count_nonzero(~np.isfinite(x)))} samples")
         if not found and not np.ptp(self.truth) > 0.0:
-            found.append("the truth does not move: an estimate that is always 0 would win, so nothing can be measured")
+            found.append("the truth is constant: an estimate of zero would rank first, so no estimator can be ranked")
         if not found and not np.any(self.z != self.truth):
-            found.append("the readings are the truth: there is no noise to be reduced")
+            found.append("the readings equal the truth: there is no noise to reduce")
         if self.time.size < 400:
             found.append(f"{self.time.size} samples: at least 400 are needed")
         else:
             steps = np.diff(self.time)
             if np.ptp(steps) > 0.01 * float(np.median(steps)) or not steps[0] > 0.0:
-                found.append("the samples are not even in time (1 %): an estimator is judged on an even record")
+                found.append("the samples are not equally spaced in time (to 1 %); record at a fixed rate")
         if not math.isfinite(self.latency) or self.latency < 0.0:
             found.append(f"latency = {self.latency:g} s: must be 0 or more")
         return found
@@ -102,7 +102,7 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     behind = estimator_metrics.late(s.time, s.truth, s.latency)
     known = slice(math.ceil(s.latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
     if s.time[known].size < 400:
-        raise ReductionError(f"the record is hardly longer than the latency of {s.latency:g} s")
+        raise ReductionError(f"the record is too short for the latency of {s.latency:g} s")
     m = Measures()
     try:
         _errors(m, s, behind, known, frequency, unit)
@@ -111,7 +111,7 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
         found = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
     except ValueError as error:
         raise ReductionError(str(error)) from None
-    said = "delay at which the truth fits best; closed formula: as the estimator states it"
+    said = "delay of the best fit to the truth; closed form: the latency stated by the estimator"
     scale, in_unit = (1.0, "s") if step > 0.1 else (1e-3, "ms")
     m.add("delay", said, in_unit, _times(found, 1.0 / scale), closed=s.latency / scale)
     _consistency(m, s, R)
@@ -132,9 +132,9 @@ def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: flo
 
     raw, m.error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
     now, late = size(s.time, m.error), size(s.time[known], (s.estimate - behind)[known])
-    m.add(RANKED, "rms error against the truth of the same instant", unit, now)
-    m.add("error re raw", "the same over the rms error of the readings", "dB", estimator_metrics.decibels(now, raw))
-    against = "the same against the truth of one latency ago"
+    m.add(RANKED, "rms error against the truth at the same time", unit, now)
+    m.add("error re raw", "rms error relative to that of the readings", "dB", estimator_metrics.decibels(now, raw))
+    against = "rms error against the delayed truth (delay-compensated), relative to that of the readings"
     m.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
 
 
@@ -149,16 +149,25 @@ def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency:
         gain = f"gain at {frequency:g} Hz"
     else:
         r = estimator_metrics.response_to_truth(s.estimate[known], behind[known])
-        gain = "gain on the truth of one latency ago (regression)"
+        gain = "gain on the delayed truth (regression)"
     noise = estimator_metrics.decibels(estimator_metrics.rms(r.rest), estimator_metrics.rms(s.z - s.truth))
-    m.add("noise re raw", "what is not the truth as it comes through, over the readings", "dB", noise)
+    m.add(
+        "noise re raw",
+        "rms of the estimate without its response to the truth, relative to the error of the readings",
+        "dB",
+        noise,
+    )
     m.add("gain", gain, "1", r.gain)
     if r.phase is not None:
-        m.add("phase", f"phase at {frequency:g} Hz, negative: late", "°", _times(r.phase, 180.0 / math.pi))
+        m.add("phase", f"phase at {frequency:g} Hz, negative: lag", "°", _times(r.phase, 180.0 / math.pi))
     if not 0.9 <= r.gain.value <= 1.1:
         worse = m.named("error re raw").estimate > 0.0
-        so = "it is farther from the truth than the readings" if worse else "that is part of its noise reduction"
-        m.warnings.append(f"The estimator scales the signal by {r.gain.value:.3g}: {so}.")
+        so = (
+            "Its error is larger than that of the readings"
+            if worse
+            else "Part of the noise reduction is attenuation of the signal"
+        )
+        m.warnings.append(f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
 
 
 def _consistency(m: Measures, s: Signals, R: float | None) -> None:
@@ -168,24 +177,28 @@ def _consistency(m: Measures, s: Signals, R: float | None) -> None:
         _against_chi_square(m, "NIS", "innovation", estimator_metrics.nis(s.nis[s.nis > 0.0]))
     if s.innovation is not None and np.any(s.innovation != 0.0):
         m.acf, q, p = estimator_metrics.whiteness(s.innovation[s.innovation != 0.0])
-        white = "white: the model holds" if p >= 0.001 else "not white: the model of the signal does not hold"
-        m.tests.append(Test("Ljung-Box, innovations", q, p, "correlation that a right model would not leave", white))
+        white = (
+            "white: compatible with the signal model" if p >= 0.001 else "not white: the signal model does not apply"
+        )
+        m.tests.append(Test("Ljung-Box, innovations", q, p, "autocorrelation, absent for the correct model", white))
         if p < 0.001:
-            m.warnings.append(f"The innovations are not white (Ljung-Box, p = {p:.1g}): {white.split(': ')[1]}.")
+            m.warnings.append(
+                "The innovations are not white (Ljung-Box, p < 0.001). The signal model of the filter does not apply."
+            )
     if s.R_hat is not None and R:
-        m.add("R̂/R", "estimated variance of a reading over the true one", "1",
+        m.add("R̂/R", "estimated variance of a reading divided by the true one", "1",
               estimator_metrics.variance_ratio(s.R_hat, R), truth=1.0)  # fmt: skip
 
 
 def _against_chi_square(m: Measures, name: str, what: str, c: Consistency) -> None:
-    m.add(name, f"mean squared {what} over its stated variance", "1", c.value, truth=1.0)
+    m.add(name, f"mean squared {what} divided by its stated variance", "1", c.value, truth=1.0)
     if c.holds:
-        finding = "consistent: the stated variance is right"
+        finding = "consistent with the stated variance"
     elif c.mean > 1.0:
-        finding = f"too confident: the {what} is larger than stated"
+        finding = f"inconsistent: the filter understates its {what} variance"
     else:
-        finding = f"too cautious: the {what} is smaller than stated"
+        finding = f"inconsistent: the filter overstates its {what} variance"
     what_for = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
     m.tests.append(Test(name, c.mean, c.p, what_for, finding))
     if not c.holds:
-        m.warnings.append(f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}: the filter is {finding}.")
+        m.warnings.append(f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {finding}.")

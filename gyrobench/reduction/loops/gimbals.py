@@ -40,7 +40,7 @@ class Flight:
 
     def __init__(self, gates: Sequence[Gate], attitude: str, rest: Gate | None = None) -> None:
         if not gates:
-            raise ReductionError("no leg of the flight is whole in this record")
+            raise ReductionError("no leg of the flight is complete in this record")
         self.gates = list(gates)
         self.channels = gates[0].channels
         self.first, self.last = gates[0].inside.start, gates[-1].inside.stop
@@ -93,9 +93,9 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
             rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
     return {
         "title": "Gimbal lock",
-        "caption": "When the gimbals were locked or too near to it, in time of the record",
-        "columns": ["what", "leg", "from / s", "to / s", f"{name} then / °", "at the end / °",
-                    "platform error then / °", "largest / °"],
+        "caption": "Intervals in which the gimbals were locked or close to lock; times are those of the record",
+        "columns": ["event", "leg", "from / s", "to / s", f"{name} at the start / °", "at the end / °",
+                    "platform error at the start / °", "largest / °"],
         "rows": sorted(rows, key=lambda r: float(r[2])),
     }  # fmt: skip
 

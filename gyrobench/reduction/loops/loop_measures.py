@@ -101,7 +101,7 @@ def gates(record: Record, slot: str = "exciter") -> list[Gate]:
         span = slice(int(inside[0]), int(inside[-1]) + 1)
         found.append(Gate(row, time[span], span, slice(middle, int(inside[0])), channels))
     if not found:
-        raise ReductionError("no phase of the plan is whole in this record")
+        raise ReductionError("no phase of the plan is complete in this record")
     return found
 
 
@@ -143,7 +143,7 @@ def response(t: Array, x: Array, y: Array, f: float) -> Point:
         raise ReductionError(f"{f:g} Hz: a sample every {dt:g} s is too coarse; record at least 4 a period")
     whole = phasor(t, x, f)
     if not abs(whole) > 1e-12 * float(np.max(np.abs(x)) or 1.0):
-        raise ReductionError(f"{f:g} Hz: the reference signal has no such sine in it")
+        raise ReductionError(f"{f:g} Hz: the reference signal has no component at this frequency")
     value = phasor(t, y, f) / whole
     n = min(SEGMENTS, periods)
     if n < 2:
@@ -293,4 +293,4 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
             cells.append(None if own is None or there is None or not own else 100.0 * abs(there / own))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
-    return {"title": f"Coupling between the axes, {what}", "caption": "", "columns": columns, "rows": rows}
+    return {"title": f"Cross-axis coupling, {what}", "caption": "", "columns": columns, "rows": rows}

@@ -63,7 +63,7 @@ class LoopFindings:
         self.warnings: list[str] = []
         self.allan: dict[str, Any] = {}
         if self.linear.missing:
-            self.warnings.append(f"No linear model to compare with: {self.linear.missing}")
+            self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
         """The phases of a kind, in their order."""
@@ -138,7 +138,8 @@ class LoopFindings:
         title = name or f"open loop, {loop}"
         models = self.linear.loops.get(loop, LinearPair())
         caption = (
-            f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % bars; lines: linear."
+            f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % error bars; lines: "
+            "linear models."
         )
         curves, rows = [], []
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
@@ -166,7 +167,7 @@ class LoopFindings:
         values = m.measured_values(points)
         if "phase" in values:
             closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
-            self.measure(f"f_c{key}", "crossover frequency", "Hz", *values["crossover"], closed=closest[1])
+            self.measure(f"f_c{key}", "gain crossover frequency", "Hz", *values["crossover"], closed=closest[1])
             self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
             self._missed(title, *values["crossover"], self.linear.wanted.get(loop) if self.linear.missing else None)
         return points
@@ -182,11 +183,13 @@ class LoopFindings:
         limit = up_to * float(found.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
-        table = next((t for t in self.tables if t["title"].startswith("Linear models against")), None)
+        table = next((t for t in self.tables if t["title"] == "Linear models and measured loop"), None)
         if table is None:
             table = {
-                "title": "Linear models against the measured loop",
-                "caption": "Largest differences of the measured points to the model, up to twice the crossover",
+                "title": "Linear models and measured loop",
+                "caption": (
+                    "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
+                ),
                 "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"],
                 "rows": [],
             }
@@ -197,7 +200,7 @@ class LoopFindings:
         if found.lower is not None:
             text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {found.lower:.3g}"
             upper = f" or rises to {found.upper:.3g}" if found.upper is not None else ""
-            self.warnings.append(f"{text}{upper} of the present one; a saturating motor lowers it.")
+            self.warnings.append(f"{text}{upper} times its value. Saturation of the motor reduces the gain.")
 
     def ratio(
         self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
@@ -281,7 +284,9 @@ class LoopFindings:
             Response(
                 name=f"{gate.label}, {what}",
                 kind="step",
-                caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear.",
+                caption=(
+                    f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear model."
+                ),
                 x=t[pick].tolist(),
                 x_name="time",
                 x_unit="s",
@@ -305,7 +310,9 @@ class LoopFindings:
         scaled: dict[str, Any] = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
         self.allan = {**found.allan, **scaled, "unit": "°/h"} if found.allan else {}
         true = None if truth is None else truth / DPH
-        self.measure(f"drift{key}", "of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true)
+        self.measure(
+            f"drift{key}", "mean drift rate of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true
+        )
         if found.walk is not None:
             size, u = (math.degrees(w) * 60.0 for w in found.walk)
             true = math.degrees(walk) * 60.0 if walk else None
@@ -406,9 +413,8 @@ def _simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:
 
 def _margin_note(run: RunDocument) -> str:
     cuts = ", ".join(f"{w.replace('->', '→')}: {s:g} s" for w, s in run.delays.items()) or "none"
-    delays = (
-        f" The communication step is {run.step:g} s; delays inserted by the order of the parts: {cuts}."
-        if run.step
-        else ""
+    delays = f" Communication step: {run.step:g} s; delays of delayed connections: {cuts}." if run.step else ""
+    return (
+        "Gain margin and gain-reduction margin: changes of the gain that bring the loop to its stability "
+        f"limit.{delays}"
     )
-    return f"Upper and lower gain limits as factors on the gain in dB.{delays}"

@@ -32,7 +32,7 @@ def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[f
     """
     names = ("motion_angle", "motion_rate", "motion_acceleration") if kind == "motion" else (kind,)
     if output not in model.outputs:
-        raise KeyError(f"{output} is no channel of the linear model; {', '.join(model.outputs)}")
+        raise KeyError(f"{output}: unknown channel of the linear model; available: {', '.join(model.outputs)}")
     all_of_them = model_response(model, f)[:, model.outputs.index(output), :]
     s = 2j * np.pi * np.asarray(f, float)
     total = np.zeros(s.size, complex)
@@ -43,7 +43,7 @@ def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[f
                 total += s**power * all_of_them[:, j]
                 found = True
     if not found:
-        raise KeyError(f"{kind} on axis {axis} goes nowhere in this system")
+        raise KeyError(f"{kind} on axis {axis} is not connected in this system")
     return total
 
 
@@ -93,13 +93,13 @@ class Margins:
 
 
 COLUMNS = [
-    "loop gain",
-    "crossover / Hz",
+    "open loop",
+    "gain crossover / Hz",
     "phase margin / °",
     "gain margin / dB",
-    "at / Hz",
-    "lower gain limit / dB",
-    "at_Hz",
+    "phase crossover / Hz",
+    "gain-reduction margin / dB",
+    "phase_crossover_Hz",  # shown as the other one; names of columns differ
 ]
 
 

@@ -17,7 +17,7 @@ from typing import Any
 from gyrobench import drift
 from gyrobench.record.run_document import RunDocument, SuiteTestRun
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, Value
 from gyrobench.reduction.suite.estimable_combinations import Compared
@@ -36,10 +36,10 @@ FAMILIES = {
     "two-degree-of-freedom gyro": sum(drift.NAMES_2DOF.values(), ()),
 }
 RULE = (
-    "Where the normalized error E_n of two methods exceeds 1 they differ by more than their expanded uncertainties; of "
-    "methods that agree 5 % of the pairs do. The methods agree about a quantity when the consistency test gives p ≥ "
-    f"{LEVEL:g}, p adjusted for the number of quantities (Holm). Where they do not, the u of the combined value is "
-    "enlarged by the Birge ratio and conformity is not stated (inconclusive)."
+    "Two methods whose normalized error E_n exceeds 1 differ by more than their expanded uncertainties; of consistent "
+    "methods 5 % of the pairs do. The values of a measurand are consistent when the consistency test gives p ≥ "
+    f"{LEVEL:g}, p adjusted for the number of measurands (Holm). Otherwise u of the combined value is multiplied by "
+    "the Birge ratio, and conformity is not stated (inconclusive)."
 )
 
 
@@ -75,19 +75,19 @@ class Compare:
     def words(self) -> str:
         """Which methods disagree, and by how much."""
         if self.found is None:
-            return "one method only" if len(self.values) == 1 else "no noise: nothing to weigh with"
+            return "one method only" if len(self.values) == 1 else "not tested: no noise"
         far = [f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0]
         if not self.disagree:
-            return f"agree; E_n > 1: {', '.join(far)}" if far else "agree"
+            return f"consistent; E_n > 1: {', '.join(far)}" if far else "consistent"
         off = consistency.outlier(self.values)
         if off is not None:
             others = consistency.agree([v for v in self.values if v.label != off[0]])
             mine = next(v for v in self.values if v.label == off[0])
             apart = mine.estimate - others.mean
             size = f"{apart:+.2g} {self.quantity.unit}".replace("-", "−")
-            return f"{off[0]} is off by {size}; the others agree (p = {off[1]:.2g})"
-        which = "; which of them is off cannot be told" if len(self.values) < 3 or len(far) < 2 else ""
-        return f"disagree: {', '.join(f'E_n of {x}' for x in far) or 'all of them a little'}{which}"
+            return f"{off[0]} deviates by {size}; the others are consistent (p = {off[1]:.2g})"
+        which = "; the deviating method cannot be identified" if len(self.values) < 3 or len(far) < 2 else ""
+        return f"inconsistent: {', '.join(f'E_n of {x}' for x in far) or 'no single pair'}{which}"
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[Compare]:
@@ -124,7 +124,7 @@ def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
                 families.setdefault(family, []).append(label)
     if len(families) > 1:
         said = "; ".join(f"{', '.join(labels)}: of a {family}" for family, labels in families.items())
-        found.append(f"{said}; a suite is of one gyro, so leave out the tests of one of the two")
+        found.append(f"{said}; a suite compares tests of one gyro, so leave out the tests of one of the two")
     kinds = {kind: [n for n, r in results.items() if r.simulated is kind] for kind in (True, False)}
     if all(kinds.values()):
         found.append(f"{', '.join(kinds[True])}: simulated; {', '.join(kinds[False])}: measured; not of one gyro")
@@ -179,7 +179,13 @@ def combine_methods(
     coefficients = [_coefficient(c, specification or {}) for c in compared]
     first = next(iter(results.values()))
     tests = [
-        Test(f"methods agree, {c.quantity.name}", c.found.Q, c.found.p, "methods that differ by more than u", c.words())
+        Test(
+            f"consistency, {c.quantity.name}",
+            c.found.Q,
+            c.found.p,
+            "differences beyond the u of the methods",
+            c.words(),
+        )
         for c in compared
         if c.found is not None
     ]
@@ -251,7 +257,7 @@ def _row(c: Compare) -> dict[str, Any]:
 
 def _how(reported: str, name: str) -> str:
     if not reported:
-        return "from several of its estimates"
+        return "combination of several estimates"
     return "as reported" if reported == name else f"reported as {reported}"
 
 
@@ -284,15 +290,17 @@ def _consistency(compared: Sequence[Compare]) -> dict[str, Any]:
 
 def _summary(suite: SuiteComparison, compared: Sequence[Compare]) -> list[str]:
     if suite.consistency == "not tested":
-        return ["No quantity is seen by two methods with a noise of their own: nothing was compared."]
+        return ["No measurand is determined by two methods with noise: consistency was not tested."]
     many = len(suite.pairs)
-    agreed = f"The methods agree wherever two or more see the same ({suite.tested} of {len(compared)} quantities)"
-    apart = f"The methods do not agree about {', '.join(suite.disagreeing)}"
+    agreed = (
+        f"The methods are consistent in all {suite.tested} of {len(compared)} measurands that two or more determine"
+    )
+    apart = f"The methods are inconsistent in {', '.join(suite.disagreeing)}"
     first = agreed if suite.consistency == "consistent" else apart
     return [
-        f"{first}; smallest adjusted p = {suite.p or 0.0:.2g}.",
+        f"{first}; smallest adjusted {p_text(suite.p or 0.0)}.",
         *(f"{c.quantity.name}: {c.words()}." for c in compared if c.disagree),
-        f"E_n > 1 in {suite.pairs_apart} of {many} pairs; about {0.05 * many:.2g} would be by chance.",
+        f"E_n > 1 in {suite.pairs_apart} of {many} pairs; about {0.05 * many:.2g} are expected by chance.",
     ]
 
 
@@ -304,18 +312,21 @@ def _warnings(
     sites = {label: str(r.site) for label, r in results.items()}
     if len(set(sites.values())) > 1:
         out.append(
-            "The site values of the tests differ, as each test says below; where gravity differs, what is folded in "
-            "from D_OO differs too."
+            "The tests were made at different site values, stated with each test. Where gravity differs, the "
+            "contribution of D_OO to the combinations differs too."
         )
     own = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
     if own:
-        out.append(f"Tests with warnings of their own, which stand with each test: {', '.join(own)}.")
+        out.append(f"Tests with warnings, stated with each test: {', '.join(own)}.")
     lonely = [c.quantity.name for c in compared if len(c.values) == 1]
     if lonely:
-        out.append(f"Seen by one method only, so confirmed by no other: {', '.join(lonely)}.")
+        out.append(f"Determined by one method only and not confirmed by another: {', '.join(lonely)}.")
     negative = [c.quantity.name for c in compared if c.found is not None and min(c.found.weights) < 0.0]
     if negative:
-        out.append(f"{', '.join(negative)}: a weight is negative, as methods share an error of different size.")
+        out.append(
+            f"{', '.join(negative)}: a weight in the mean is negative, because methods share an error of different "
+            "size."
+        )
     return out
 
 
