@@ -135,7 +135,7 @@ def test_model_response_and_excitations() -> None:
     np.testing.assert_allclose(excited(model(), "motion", 2, "p.y", f), 1.0 + s * s / (s + 2.0), rtol=1e-14)
     with pytest.raises(KeyError, match="is not connected"):
         excited(model(), "command", 1, "p.y", f)
-    with pytest.raises(KeyError, match="no channel"):
+    with pytest.raises(KeyError, match="unknown channel"):
         excited(model(), "torque", 1, "p.z", f)
 
 
