@@ -20,7 +20,7 @@ def residuals(doc: Json) -> list[Any]:
         Picture(
             "residuals-time",
             plots.residuals_in_time(doc["series"], "residuals-time"),
-            "Residuals against time, phases shaded and labelled. A trend or a step is not part of the model.",
+            "Residuals against time, phases shaded and labelled. A trend or a step is drift outside the model.",
             "Residuals of all windows against time",
             zoom=True,
         )

@@ -23,7 +23,9 @@ def signing(doc: Json) -> list[Any]:
     ]
     missing = [name for name in ("operator", *ABOUT) if name != "customer" and not run.get(name)]
     if doc["simulated"]:
-        statements[0] = f"The results relate only to the simulated instrument{about}, with the parameters stated."
+        statements[0] = (
+            f"The results relate only to {doc['instrument'] or 'the simulated instrument'}, with the parameters stated."
+        )
         statements.insert(0, "All data are simulated; no item was tested and no traceability is claimed.")
     elif missing:
         statements.append(f"Missing before signature: {', '.join(missing)}.")

@@ -178,7 +178,13 @@ def how_tables(doc: Any) -> list[Any]:
     if facts:
         units = {"step": "s", "stopped_at": "s"}
         rows = [
-            Row([text_cell(words(k)[0]), _cell(doc, ("provenance", k), None, 8), text_cell(units.get(k, ""))])
+            Row(
+                [
+                    text_cell({"stopped_at": "end of the run"}.get(k, k)),
+                    _cell(doc, ("provenance", k), None, 8),
+                    text_cell(units.get(k, "")),
+                ]
+            )
             for k in facts
         ]
         blocks.append(Table([Column("setting"), Column("value"), Column("unit")], rows, "Settings of the run."))

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench import units
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
@@ -279,7 +280,7 @@ class LoopFindings:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
             curves.append({**curve, "y": ((found.initial + simulated[pick]) / scale).tolist()})
         what = y_name or output
-        cause = f"{gate.amplitude:g} {gate.row.unit} on axis {gate.axis} from t = 0 on"
+        cause = f"{gate.amplitude:g} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
         self.responses.append(
             Response(
                 name=f"{gate.label}, {what}",

@@ -293,7 +293,7 @@ def _summary(suite: SuiteComparison, compared: Sequence[Compare]) -> list[str]:
         return ["No measurand is determined by two methods with noise: consistency was not tested."]
     many = len(suite.pairs)
     agreed = (
-        f"The methods are consistent in all {suite.tested} of {len(compared)} measurands that two or more determine"
+        f"The methods are consistent in all measurands that two or more determine ({suite.tested} of {len(compared)})"
     )
     apart = f"The methods are inconsistent in {', '.join(suite.disagreeing)}"
     first = agreed if suite.consistency == "consistent" else apart
