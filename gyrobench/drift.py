@@ -261,22 +261,22 @@ def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer:
     out: dict[str, float] = {}
     used: set[str] = set()
     for channel, own in _OWN.items():
-        here: dict[str, float] = {}
+        given: dict[str, float] = {}
         for key in PHYSICAL:
             name = "".join(own.get(letter, letter) for letter in key)
             if name in physical:
-                here[key] = physical[name] * (-1 if channel == "y" and key.count("O") == 1 else 1)
+                given[key] = physical[name] * (-1 if channel == "y" and key.count("O") == 1 else 1)
                 used.add(name)
-        if "K_SS" in here and "K_II" not in here and f"K_{own['O']}{own['O']}" in physical:
-            del here["K_SS"]  # K_zz was meant for the other channel
-        if channel == "y" and "l_S" in here:
-            here["l_S"] += outer / m
+        if "K_SS" in given and "K_II" not in given and f"K_{own['O']}{own['O']}" in physical:
+            del given["K_SS"]  # K_zz was meant for the other channel
+        if channel == "y" and "l_S" in given:
+            given["l_S"] += outer / m
         try:
-            found = from_physical(H, m, here)
+            coefficients = from_physical(H, m, given)
         except ValueError as e:
             axes = "I, O, S = " + ("x, y, z" if channel == "x" else "y, -x, z")
             raise ValueError(f"{channel} channel ({axes}): {e}") from e
-        for n, v in found.items():
+        for n, v in coefficients.items():
             out[name_2dof(channel, n)] = v * (-1 if channel == "y" and n.count("O") == 1 else 1)
     unknown = sorted(physical.keys() - used)
     if unknown:

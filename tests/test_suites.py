@@ -280,7 +280,7 @@ def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
         assert gyrobench("reduce", "fixed_position", "--data", f"{k}.csv", "--out", f"run{k}", pages=not k)[0] == 0
         runs.append(f"run{k}")
     page = Path("run0/report.html").read_text(encoding="utf-8")
-    assert "22 °C, warm for 4 h" in page and "wanted before signing: laboratory, equipment" in page
+    assert "22 °C, warm for 4 h" in page and "Missing before signature: laboratory, equipment" in page
     code, out, _ = gyrobench("reduce", NAME, "--data", "run0", "--data", "run1", "--set", "laboratory=L", "--json")
     found = json.loads(out)
     assert code == 0 and found["instrument"] == "gyro 17" and not found["simulated"]

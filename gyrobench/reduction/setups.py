@@ -96,8 +96,8 @@ class RebalanceSetup(SiteSetup):
 
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
-        found = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
-        return super().of(run, specification, **{**found, **own})
+        options = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
+        return super().of(run, specification, **{**options, **own})
 
     def problems(self, folding: bool = True) -> list[str]:
         """Return what is wrong with gravity and polarity, and, with ``folding``, with squares that are simulated."""
@@ -112,9 +112,9 @@ class RebalanceSetup(SiteSetup):
         book = "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
         sign = "k i = ω_IA − ω_d" if self.polarity == "project" else book
         return [
-            "Drift ω_d in precession sign; for the sign of an indicated rate turn all coefficients round.",
-            "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); "
-            "g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
+            "Drift ω_d in precession sign; for the sign of an indicated rate invert the sign of all coefficients.",
+            "X, Y, Z = −f/g0 along the input, output and spin reference axes (sign of Hu 1981: a body axis that "
+            "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
             f"Torquer current: {sign}; k = {k * 1e-3 / drift.DPH:.6g} °/h/mA.",
         ]
 
@@ -145,13 +145,13 @@ class TumbleSetup(RebalanceSetup):
     ) -> Self:
         """Return the setup with the plan of run.json; faces: its mounts by name."""
         plan = phases(run, faces)
-        found = {
+        of_run = {
             "faces": {p: faces[row.face] for p, row in plan.items()},
             "labels": {p: row.label for p, row in plan.items()},
             "modes": {p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
             "tilt": bool(run.options.get("tilt", False)),
         }
-        return cls.of(run, specification, **found, **own)
+        return cls.of(run, specification, **of_run, **own)
 
     def label(self, phase: int) -> str:
         return self.labels.get(phase, f"phase {phase}")
@@ -181,23 +181,27 @@ class TumbleSetup(RebalanceSetup):
     def table_problems(self, windows: Mapping[str, Array]) -> list[str]:
         """Missing phases, a table that stands still or turns where it should not, windows too wide."""
         phase = np.asarray(windows["phase"]).astype(int)
-        there = set(phase.tolist())
-        found = [f"phase {p} ({self.label(p)}) is missing in the record" for p in self.faces if p not in there]
-        found += [f"phase {p} is in the record, but its mount is not given" for p in sorted(there - set(self.faces))]
+        present = set(phase.tolist())
+        problems = [f"phase {p} ({self.label(p)}) is missing in the record" for p in self.faces if p not in present]
+        problems += [
+            f"phase {p} is in the record, but its mount is not given" for p in sorted(present - set(self.faces))
+        ]
         width = np.abs(np.asarray(windows["angle_end"], dtype=float) - np.asarray(windows["angle_start"], dtype=float))
         for p in self.faces:
-            most = float(np.max(width[phase == p], initial=0.0))
+            largest = float(np.max(width[phase == p], initial=0.0))
             where = f"phase {p} ({self.label(p)}): "
-            if p not in there:
+            if p not in present:
                 continue
             if not self.turns(p):
-                if most > 1e-2:
-                    found.append(f"{where}the table turns by {math.degrees(most):.3g}° in a dwell")
-            elif most < 1e-3:
-                found.append(f"{where}the table angle does not move, expected a turning table (rate 0?)")
-            elif most > 2.0 * math.pi / 5.0 * 1.001:
-                found.append(f"{where}{2 * math.pi / most:.2g} windows a turn, at least 5 are needed for two harmonics")
-        return found
+                if largest > 1e-2:
+                    problems.append(f"{where}the table turns by {math.degrees(largest):.3g}° in a dwell")
+            elif largest < 1e-3:
+                problems.append(f"{where}the table angle does not move, expected a turning table (rate 0?)")
+            elif largest > 2.0 * math.pi / 5.0 * 1.001:
+                problems.append(
+                    f"{where}{2 * math.pi / largest:.2g} windows a turn, at least 5 are needed for two harmonics"
+                )
+        return problems
 
 
 def scale_factor_problems(k: float, name: str = "k") -> list[str]:

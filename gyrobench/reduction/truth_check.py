@@ -15,10 +15,10 @@ def check_truth(result: Result, causes: Sequence[str]) -> None:
 
     causes: what was set and may explain it, see :func:`set_values`.
     """
-    far = [c for c in result.coefficients if c.z is not None and abs(c.z) > LIMIT]
-    if not far:
+    deviating = [c for c in result.coefficients if c.z is not None and abs(c.z) > LIMIT]
+    if not deviating:
         return
-    far.sort(key=lambda c: -abs(c.z or 0.0))
+    deviating.sort(key=lambda c: -abs(c.z or 0.0))
     why = (
         f"Possible causes among the values set: {'; '.join(causes)}."
         if causes
@@ -26,14 +26,14 @@ def check_truth(result: Result, causes: Sequence[str]) -> None:
     )
     result.warnings.insert(
         0,
-        f"The result misses the simulated truth by more than five standard uncertainties: {_shown(far)}. Chance does "
-        f"not explain this; do not use the coefficients, their u or their verdicts. {why}",
+        f"The result misses the simulated truth by more than five standard uncertainties: {_shown(deviating)}. Chance "
+        f"does not explain this; do not use the coefficients, their u or their verdicts. {why}",
     )
 
 
-def _shown(far: Sequence[Coefficient], most: int = 4) -> str:
-    text = ", ".join(f"{c.name} (z = {c.z:+,.1f})" for c in far[:most]).replace("-", "−")
-    return text + (f" and {len(far) - most} more" if len(far) > most else "")
+def _shown(deviating: Sequence[Coefficient], most: int = 4) -> str:
+    text = ", ".join(f"{c.name} (z = {c.z:+,.1f})" for c in deviating[:most]).replace("-", "−")
+    return text + (f" and {len(deviating) - most} more" if len(deviating) > most else "")
 
 
 def set_values(run: RunDocument) -> list[str]:

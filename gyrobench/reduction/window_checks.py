@@ -42,31 +42,31 @@ def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQU
         return [f"columns of different length: {sizes}"]
     if sizes["t_start"] == 0:
         return ["the record holds no windows"]
-    found = []
+    problems = []
     for c in required:
-        bad = np.flatnonzero(~np.isfinite(np.asarray(windows[c], dtype=float)))
-        if bad.size:
-            found.append(f"column {c}: non-finite number in row {_list(bad)}")
-    if found:
-        return found
+        invalid = np.flatnonzero(~np.isfinite(np.asarray(windows[c], dtype=float)))
+        if invalid.size:
+            problems.append(f"column {c}: non-finite number in row {_list(invalid)}")
+    if problems:
+        return problems
     t0, t1 = np.asarray(windows["t_start"], dtype=float), np.asarray(windows["t_end"], dtype=float)
     length = t1 - t0
-    bad = np.flatnonzero(length <= 0.0)
-    if bad.size:
-        found.append(f"windows without length (t_end <= t_start) in row {_list(bad)}")
+    invalid = np.flatnonzero(length <= 0.0)
+    if invalid.size:
+        problems.append(f"windows without length (t_end <= t_start) in row {_list(invalid)}")
     slack = 1e-6 * max(float(np.median(length)), 0.0)
     twice = np.flatnonzero(np.abs(np.diff(t0)) <= slack) + 1
     if twice.size:
-        found.append(f"duplicate windows: row {_list(twice)} starts when the row before it starts")
+        problems.append(f"duplicate windows: row {_list(twice)} starts when the row before it starts")
     back = np.flatnonzero((np.diff(t0) < -slack) | ((t0[1:] < t1[:-1] - slack) & (np.diff(t0) > slack))) + 1
     if back.size:
-        found.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
+        problems.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
     for c in (c for c in windows if c.startswith("flagged")):
-        bad = np.flatnonzero(np.asarray(windows[c]) > 0)
-        if bad.size:
+        invalid = np.flatnonzero(np.asarray(windows[c]) > 0)
+        if invalid.size:
             channel = "" if c == "flagged" else f" ({c})"
-            found.append(
-                f"flagged windows{channel} (saturated torquer or lost lock) in row {_list(bad)}; a flagged mean is no "
-                "measurement: repeat the phase or leave these rows out"
+            problems.append(
+                f"flagged windows{channel} (saturated torquer or lost lock) in row {_list(invalid)}; a flagged mean "
+                "is no measurement: repeat the phase or leave these rows out"
             )
-    return found
+    return problems

@@ -78,9 +78,9 @@ def _key(coefficient: Json) -> tuple[str, str]:
 
 
 def _measure(docs: Sequence[Json], key: tuple[str, str], baseline: int) -> Json:
-    found = [next((c for c in doc["coefficients"] if _key(c) == key), None) for doc in docs]
-    runs = [None if c is None else {k: c[k] for k in ("estimate", "u", "k", "interval", "truth")} for c in found]
-    meaning = next(c["meaning"] for c in found if c is not None)
+    coefficients = [next((c for c in doc["coefficients"] if _key(c) == key), None) for doc in docs]
+    runs = [None if c is None else {k: c[k] for k in ("estimate", "u", "k", "interval", "truth")} for c in coefficients]
+    meaning = next(c["meaning"] for c in coefficients if c is not None)
     differences = [None if k == baseline else _difference(runs[k], runs[baseline]) for k in range(len(runs))]
     return {"name": key[0], "unit": key[1], "meaning": meaning, "runs": runs, "differences": differences}
 

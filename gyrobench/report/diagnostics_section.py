@@ -15,7 +15,7 @@ Json = dict[str, Any]
 def residuals(doc: Json) -> list[Any]:
     if not doc["series"] and not doc["tests"]:
         return generic(doc, ("noise",), "Noise model of the estimation.")
-    left = [r for s in doc["series"] for r in s["residual"]]
+    values = [r for s in doc["series"] for r in s["residual"]]
     blocks = pictures(
         Picture(
             "residuals-time",
@@ -35,7 +35,7 @@ def residuals(doc: Json) -> list[Any]:
         ),
         Picture(
             "quantiles",
-            plots.quantiles(left, "quantiles"),
+            plots.quantiles(values, "quantiles"),
             "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a "
             "normal distribution; points off it at the ends are outliers.",
             "Q-Q plot of the residuals against a normal distribution",
@@ -216,10 +216,10 @@ def budget(doc: Json) -> list[Any]:
     u = {c["name"]: c["u"] for c in doc["coefficients"]}
     rows = []
     for name in dict.fromkeys(b["coefficient"] for b in lines):
-        mine = [k for k, b in enumerate(lines) if b["coefficient"] == name]
-        unit = lines[mine[0]]["unit"]
+        numbers = [k for k, b in enumerate(lines) if b["coefficient"] == name]
+        unit = lines[numbers[0]]["unit"]
         rows.append(heading(f"{name}, contribution in {unit}"))
-        for k in sorted(mine, key=lambda k: -(lines[k]["contribution"] or 0.0)):
+        for k in sorted(numbers, key=lambda k: -(lines[k]["contribution"] or 0.0)):
             b = lines[k]
             rows.append(
                 Row(

@@ -68,28 +68,28 @@ def _shares(lines: Sequence[Mapping[str, Any]], names: Sequence[str], u: Mapping
             share = (b["contribution"] / float(u[b["coefficient"]] or 1.0)) ** 2
             weight[b["source"]] = weight.get(b["source"], 0.0) + share
     sources = sorted(weight, key=lambda s: -weight[s])
-    shown, rest = sources[:5], sources[5:]
+    shown, minor = sources[:5], sources[5:]
     colours = dict(zip(shown, (BLUE, VERMILION, GREEN, PURPLE, ORANGE), strict=False))
-    fig, axes = figure(WIDE, 24 + 6.2 * len(names) + 4.5 * ((len(shown) + bool(rest) + 1) // 2))
+    fig, axes = figure(WIDE, 24 + 6.2 * len(names) + 4.5 * ((len(shown) + bool(minor) + 1) // 2))
     ax = axes[0, 0]
-    left = dict.fromkeys(names, 0.0)
-    for k, source in enumerate([*shown, *(["other sources"] if rest else [])]):
-        members = rest if k == len(shown) else [source]
+    starts = dict.fromkeys(names, 0.0)
+    for k, source in enumerate([*shown, *(["other sources"] if minor else [])]):
+        members = minor if k == len(shown) else [source]
         pieces = dict.fromkeys(names, 0.0)
         for b in lines:
             if b["source"] in members and b["coefficient"] in pieces:
                 pieces[b["coefficient"]] += (b["contribution"] / float(u[b["coefficient"]] or 1.0)) ** 2
         ax.barh(
-            range(len(names)), [pieces[n] for n in names], left=[left[n] for n in names], height=0.66,
+            range(len(names)), [pieces[n] for n in names], left=[starts[n] for n in names], height=0.66,
             color=colours.get(source, SKY), hatch=_HATCHES[k], edgecolor="#fefefe", linewidth=0.4,
             label=short(source, 46),
         )  # fmt: skip
         for n in names:
-            left[n] += pieces[n]
+            starts[n] += pieces[n]
     ax.axvline(1.0, color=INK, linestyle="--", linewidth=0.9)
     ax.set_yticks(range(len(names)), [short(n, 22) for n in names])
     ax.set_ylim(len(names) - 0.4, -0.6)
-    ax.set_xlim(0, 1.06 * max(1.0, *left.values()))
+    ax.set_xlim(0, 1.06 * max(1.0, *starts.values()))
     ax.set_xlabel("fraction of the stated variance u² / 1  (dashed: all of it)")
     ax.grid(False, axis="y")
     fig.legend(loc="outside upper left", ncols=2, handlelength=1.6, columnspacing=1.5)

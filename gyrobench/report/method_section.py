@@ -98,18 +98,18 @@ def system(doc: Json) -> list[Any]:
 def _cuts(run: Mapping[str, Any]) -> list[str]:
     """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
     cuts, delays = run.get("cuts") or [], run.get("delays") or []
-    said = [f"Delayed connection {c}" for c in map(str, cuts)] or [
+    sentences = [f"Delayed connection {c}" for c in map(str, cuts)] or [
         "No delayed connection: every value is used in the communication step in which it is computed"
     ]
     times = dict(delays) if isinstance(delays, Mapping) else dict.fromkeys(delays)
     for wire, seconds in times.items():
         time = "one communication step" if seconds is None else f"{write_number(seconds).text} s"
-        k = next((k for k, s in enumerate(said) if wire in s), None)
+        k = next((k for k, s in enumerate(sentences) if wire in s), None)
         if k is None:
-            said.append(f"Delay on {wire}: {time}")
+            sentences.append(f"Delay on {wire}: {time}")
         else:
-            said[k] += f", {time}"
-    return [s.replace("->", "→") + "." for s in said]
+            sentences[k] += f", {time}"
+    return [s.replace("->", "→") + "." for s in sentences]
 
 
 def full_values(doc: Json) -> list[Any]:

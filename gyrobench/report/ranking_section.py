@@ -20,8 +20,8 @@ def ranking(docs: Sequence[Json]) -> Json:
     (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
     if others or not name:
         return {}
-    found = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
-    known = [(c["estimate"], k, c) for k, c in enumerate(found) if c is not None and c["estimate"] is not None]
+    ranked = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
+    known = [(c["estimate"], k, c) for k, c in enumerate(ranked) if c is not None and c["estimate"] is not None]
     if len(known) < 2 or len({c["unit"] for _, _, c in known}) > 1:
         return {}
     known.sort(key=lambda entry: entry[:2])

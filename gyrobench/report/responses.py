@@ -16,14 +16,14 @@ LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their orde
 
 def blocks(doc: Json) -> list[Any]:
     """One figure for each response of a result document."""
-    found: list[Any] = []
+    figures: list[Any] = []
     for k, r in enumerate(doc.get("responses") or []):
         key = f"response-{k + 1}"
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
-        found += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
+        figures += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
         if r["kind"] not in ("step", "time") and r["x"]:
-            found.append(Fold(f"Points of the {r['name']}", [_points(doc, k)]))
-    return found
+            figures.append(Fold(f"Points of the {r['name']}", [_points(doc, k)]))
+    return figures
 
 
 def _points(doc: Json, k: int) -> Table:
@@ -43,7 +43,7 @@ def _points(doc: Json, k: int) -> Table:
 
 def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
     """One figure for each response that two runs or more of a comparison document have, all runs in it."""
-    found: list[Any] = []
+    figures: list[Any] = []
     for k, r in enumerate(doc["responses"]):
         named = [(f"{letter(i)} {doc['runs'][i]['name']}", run) for i, run in enumerate(r["runs"]) if run is not None]
         alike = [n for n in named if (n[1]["kind"], n[1]["y_unit"]) == (named[0][1]["kind"], named[0][1]["y_unit"])]
@@ -53,8 +53,8 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
             several = alike[0][1]["kind"] == "time" and len(lines) > 1
             name = f"{r['name']}, {lines[0]['label']}" if several else r["name"]
             text = f"{name[:1].upper()}{name[1:]} of all runs."
-            found += pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
-    return found
+            figures += pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
+    return figures
 
 
 def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = ()) -> str:

@@ -62,12 +62,12 @@ def _head(doc: Json) -> list[tuple[str, str]]:
 
 
 def _answer(doc: Json) -> Answer:
-    found = result_page.answer(doc)
-    said = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "consistency not tested"
+    box = result_page.answer(doc)
+    consistency = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "consistency not tested"
     plain = doc["verdict"] == NO_VERDICT
-    found.verdict = f"{said}; {doc['verdict']}" if plain else doc["verdict"]
-    found.rule = " ".join(filter(None, [doc["suite"]["rule"], found.rule]))
-    return found
+    box.verdict = f"{consistency}; {doc['verdict']}" if plain else doc["verdict"]
+    box.rule = " ".join(filter(None, [doc["suite"]["rule"], box.rule]))
+    return box
 
 
 def _combined(doc: Json) -> list[Any]:
@@ -89,7 +89,7 @@ def _consistency(doc: Json) -> list[Any]:
         if len(q["values"]) < 2:
             continue
         path: tuple[str | int, ...] = ("suite", "quantities", k)
-        bad = q["verdict"] == "disagree"
+        inconsistent = q["verdict"] == "disagree"
         rows.append(
             Row(
                 [
@@ -99,9 +99,9 @@ def _consistency(doc: Json) -> list[Any]:
                     number_cell(doc, (*path, "dof")),
                     number_cell(doc, (*path, "birge"), significant=3),
                     number_cell(doc, (*path, "p"), write=write_p),
-                    number_cell(doc, (*path, "p_adjusted"), write=write_p, mark="warn" if bad else ""),
+                    number_cell(doc, (*path, "p_adjusted"), write=write_p, mark="warn" if inconsistent else ""),
                     number_cell(doc, (*path, "largest E_n"), significant=3),
-                    text_cell(q["words"], "warn" if bad else ""),
+                    text_cell(q["words"], "warn" if inconsistent else ""),
                 ]
             )
         )
@@ -174,10 +174,10 @@ def _forest(q: Json, key: str) -> Picture:
     if q["truth"] is not None:
         ax.axvline(q["truth"], color=INK, linestyle="--", linewidth=0.9)
     for i, v in enumerate(values):
-        off = q["verdict"] == "disagree" and q["words"].startswith(f"{v['label']} deviates")
-        colour = VERMILION if off else MUTED
+        deviates = q["verdict"] == "disagree" and q["words"].startswith(f"{v['label']} deviates")
+        colour = VERMILION if deviates else MUTED
         ax.plot([v["estimate"] - v["U"], v["estimate"] + v["U"]], [i, i], "-", color=colour, linewidth=1.4)
-        ax.plot([v["estimate"]], [i], "s" if off else "o", color=colour, markersize=4.5, markeredgewidth=0)
+        ax.plot([v["estimate"]], [i], "s" if deviates else "o", color=colour, markersize=4.5, markeredgewidth=0)
     ax.set_yticks(range(len(values)), [v["label"] for v in values])
     ax.set_ylim(len(values) - 0.4, -0.6)
     ax.locator_params(axis="x", nbins=4)
@@ -198,11 +198,11 @@ def _pairs(doc: Json) -> list[Any]:
         for both in ((p["a"], p["b"]), (p["b"], p["a"])):
             if both not in worst or (p["E_n"] or 0.0) > (pairs[worst[both]]["E_n"] or 0.0):
                 worst[both] = k
-    there = [n for n in letters if any(n in both for both in worst)]
+    compared = [n for n in letters if any(n in both for both in worst)]
     rows = []
-    for a in there:
+    for a in compared:
         cells = [text_cell(f"{letters[a]} {a}", "strong")]
-        for b in there:
+        for b in compared:
             k = worst.get((a, b), -1)
             apart = k >= 0 and (pairs[k]["E_n"] or 0.0) > 1.0
             cells.append(
@@ -212,19 +212,19 @@ def _pairs(doc: Json) -> list[Any]:
             )
         rows.append(Row(cells))
     matrix = Table(
-        [Column("largest E_n", wide=True), *(Column(letters[b]) for b in there)], rows,
+        [Column("largest E_n", wide=True), *(Column(letters[b]) for b in compared)], rows,
         "Largest normalized error E_n between two methods over all measurands that both determine; above 1 the values "
         "are inconsistent with their expanded uncertainties.",
     )  # fmt: skip
-    every: list[Row] = []
+    pair_rows: list[Row] = []
     for name in dict.fromkeys(p["quantity"] for p in pairs):
-        mine = [k for k, p in enumerate(pairs) if p["quantity"] == name]
-        every.append(heading(f"{name} in {pairs[mine[0]]['unit']}"))
-        for k in mine:
+        numbers = [k for k, p in enumerate(pairs) if p["quantity"] == name]
+        pair_rows.append(heading(f"{name} in {pairs[numbers[0]]['unit']}"))
+        for k in numbers:
             p = pairs[k]
             path: tuple[str | int, ...] = ("suite", "pairs", k)
             mark = "warn" if (p["E_n"] or 0.0) > 1.0 else ""
-            every.append(
+            pair_rows.append(
                 Row(
                     [
                         text_cell(f"{p['a']} − {p['b']}"),
@@ -235,7 +235,7 @@ def _pairs(doc: Json) -> list[Any]:
                 )
             )
     columns = [Column("pair", wide=True), Column("difference"), Column("U of the difference (95 %)"), Column("E_n")]
-    table = Table(columns, every, "Normalized errors of all pairs.", small=True)
+    table = Table(columns, pair_rows, "Normalized errors of all pairs.", small=True)
     return [matrix, Fold(f"All {len(pairs)} pairs", [table])]
 
 
@@ -267,14 +267,14 @@ def _tests(doc: Json) -> list[Any]:
         where = f" Run and report in {m['folder']}." if m["folder"] else ""
         text = f"{LETTERS[k % 26]}  {m['label']}, report {m['report_id']}. {m['method']}.{where}"
         blocks.append(Text(text, link=f"{m['folder']}/report.html" if m["folder"] else ""))
-        said = [*m["summary"]] if doc["site"] else [f"Site: {result_page.place(m['site'])}.", *m["summary"]]
+        sentences = [*m["summary"]] if doc["site"] else [f"Site: {result_page.place(m['site'])}.", *m["summary"]]
         if m.get("step_check") is not None:
             worst = write_number(m["step_check"], significant=2).text
-            said.append(f"Halving the communication step changes no coefficient by more than {worst} u.")
-        said += [f"Warning: {w}" for w in m["warnings"]]
-        said += [] if m.get("complete", True) else ["The record is incomplete."]
-        if said:
-            blocks.append(Items(said))
+            sentences.append(f"Halving the communication step changes no coefficient by more than {worst} u.")
+        sentences += [f"Warning: {w}" for w in m["warnings"]]
+        sentences += [] if m.get("complete", True) else ["The record is incomplete."]
+        if sentences:
+            blocks.append(Items(sentences))
     return blocks
 
 
@@ -348,9 +348,9 @@ def _provenance(doc: Json) -> list[Any]:
         blocks.append(Table(columns, rows, "Components of the simulated tests.", small=True))
     given = ", ".join(f"{n} = {v}" for n, v in (run.get("changed") or {}).items())
     facts = [("set", given), ("seed of the suite", run.get("seed")), ("versions", _versions(run.get("versions")))]
-    said = [f"{name[0].upper()}{name[1:]}: {value}" for name, value in facts if value not in (None, "")]
-    return [*blocks, *([Text("; ".join(said) + ".", quiet=True)] if said else [])]
+    settings = [f"{name[0].upper()}{name[1:]}: {value}" for name, value in facts if value not in (None, "")]
+    return [*blocks, *([Text("; ".join(settings) + ".", quiet=True)] if settings else [])]
 
 
-def _versions(found: Any) -> str:
-    return ", ".join(f"{k} {v}" for k, v in found.items()) if isinstance(found, dict) else ""
+def _versions(versions: Any) -> str:
+    return ", ".join(f"{k} {v}" for k, v in versions.items()) if isinstance(versions, dict) else ""

@@ -50,11 +50,11 @@ def unit_groups(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[int]]
     Empty where most units have one row only, as in loop tests: there the unit belongs into a column, for headings
     would tear the table.
     """
-    found: dict[str, list[int]] = {}
+    by_unit: dict[str, list[int]] = {}
     for k, row in enumerate(rows):
-        found.setdefault(str(row["unit"]), []).append(k)
-    alone = sum(len(members) == 1 for members in found.values())
-    return [] if 2 * alone > len(found) > 1 else list(found.items())
+        by_unit.setdefault(str(row["unit"]), []).append(k)
+    alone = sum(len(members) == 1 for members in by_unit.values())
+    return [] if 2 * alone > len(by_unit) > 1 else list(by_unit.items())
 
 
 def limit_text(limit: Sequence[float | None] | None) -> str:

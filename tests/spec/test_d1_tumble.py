@@ -444,7 +444,7 @@ def test_correlated_noise_is_seen_and_said() -> None:
     assert r.noise["weight of white noise alone"] < 1e-3
     low, high = r.noise["correlation time, 90 % range / s"]
     assert low < 360.0 < high
-    assert "correlated over about" in r.summary[2]
+    assert "correlation time about" in r.summary[2]
     quiet = T.reduction.reduce(T.record(s, drift.STANDARD, noise=white(0.005)), s)
     assert r.coefficients[0].u > 1.5 * quiet.coefficients[0].u
 

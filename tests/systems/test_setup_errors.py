@@ -143,7 +143,7 @@ def test_an_estimate_far_from_its_truth_is_said_first(z: tuple[float | None, ...
     assert result.warnings[1:] == ["another"]
     places = [result.warnings[0].index(f"{n} (z = ") for n in named]
     assert places == sorted(places) and result.warnings[0].count("(z = ") == len(named)
-    assert "Nothing was set" in result.warnings[0]
+    assert "No value was set" in result.warnings[0]
 
 
 def test_an_estimate_near_its_truth_is_not() -> None:

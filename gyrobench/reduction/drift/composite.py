@@ -39,64 +39,68 @@ class Composite:
 
 def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list[str]:
     """Why there are no composite statistics, as sentences.  earth: Earth rate along the input axis, rad/s."""
-    found = []
+    sentences = []
     if d.size < LEAST:
-        found.append(f"{d.size} windows: at least {LEAST} are needed")
-        return found
+        sentences.append(f"{d.size} windows: at least {LEAST} are needed")
+        return sentences
     if not np.all(np.isfinite(d)):
         return ["a drift rate is not a finite number"]
     length = t_end - t_start
     if np.ptp(length) > 0.01 * np.median(length) or np.any(np.abs(t_start[1:] - t_end[:-1]) > 0.01 * length[1:]):
-        found.append("windows of different length or with gaps: σ and correlation need one ΔT")
+        sentences.append("windows of different length or with gaps: σ and correlation need one ΔT")
     if np.ptp(d) <= 1e-12 * float(np.max(np.abs(d))):
-        found.append("the drift rate is constant and has no correlation: not measured data, or too coarse a resolution")
+        sentences.append(
+            "the drift rate is constant and has no correlation: not measured data, or too coarse a resolution"
+        )
     if abs(earth) > 1e-7 and abs(float(np.mean(d)) + earth) < 0.2 * abs(earth):
-        found.append(
+        sentences.append(
             f"the mean {np.degrees(float(np.mean(d))) * 3600.0:.4g} °/h is the table rate against the Earth: add the "
             f"Earth rate along the input axis, {np.degrees(earth) * 3600.0:.4g} °/h"
         )
-    return found
+    return sentences
 
 
 def composite(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> Composite:
     """Statistics of the drift rates ``d`` (n,), rad/s.  Raises ReductionError with :func:`problems`."""
-    if wrong := problems(d, t_start, t_end, earth):
-        raise ReductionError(wrong)
+    if reasons := problems(d, t_start, t_end, earth):
+        raise ReductionError(reasons)
     n, dT = d.size, round(float(np.median(t_end - t_start)), 9)
     mean = float(np.mean(d))
-    rest = d - mean
-    c = np.array([float(rest[: n - q] @ rest[q:]) / (n - q) for q in range(n // 4 + 1)])
+    random = d - mean
+    c = np.array([float(random[: n - q] @ random[q:]) / (n - q) for q in range(n // 4 + 1)])
     rho = c / c[0]
     below = np.flatnonzero(rho < math.exp(-1.0))
-    sigma = math.sqrt(float(rest @ rest) / (n - 1))
+    sigma = math.sqrt(float(random @ random) / (n - 1))
     return Composite(n, dT, mean, sigma, rho, float(below[0]) * dT if below.size else None)
 
 
-def tables(found: Mapping[str, Composite | str], scale: float, unit: str) -> list[dict[str, Any]]:
+def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -> list[dict[str, Any]]:
     """What was found in each series (a sentence where there is nothing), and the correlations, for Result.tables."""
     rows: list[list[Any]] = []
-    for label, c in found.items():
+    for label, c in statistics.items():
         if isinstance(c, str):
             rows.append([label, "", "", "", "", c])
         else:
             time = c.time if c.time is not None else f"> {(c.correlation.size - 1) * c.dT:g}"
             rows.append([label, c.n, c.dT, c.mean / scale, c.sigma / scale, time])
-    dTs = sorted({c.dT for c in found.values() if not isinstance(c, str)})
+    dTs = sorted({c.dT for c in statistics.values() if not isinstance(c, str)})
     caption = "Mean: systematic drift rate, can be compensated; σ: random drift rate in windows of " + (
         ", ".join(f"{t:g} s" for t in dTs) or "no length"
     )
     head = ["series", "windows", "ΔT / s", f"mean / ({unit})", f"σ / ({unit})", "correlation time (1/e) / s"]
     out = [{"title": "Systematic and random drift rate", "caption": caption, "columns": head, "rows": rows}]
-    whole = {n: c for n, c in found.items() if not isinstance(c, str)}
-    if whole:
-        lags = _shown(max(c.correlation.size for c in whole.values()))
-        body = [[q, *(float(c.correlation[q]) if q < c.correlation.size else "" for c in whole.values())] for q in lags]
-        head = ["lag / ΔT", *whole]
-        if len(whole) > 4:  # a page holds few columns: the series go down, the first lags across
+    complete = {n: c for n, c in statistics.items() if not isinstance(c, str)}
+    if complete:
+        lags = _shown(max(c.correlation.size for c in complete.values()))
+        body = [
+            [q, *(float(c.correlation[q]) if q < c.correlation.size else "" for c in complete.values())] for q in lags
+        ]
+        head = ["lag / ΔT", *complete]
+        if len(complete) > 4:  # a page holds few columns: the series go down, the first lags across
             across = lags[:8]
             body = [
                 [n, *(float(c.correlation[q]) if q < c.correlation.size else "" for q in across)]
-                for n, c in whole.items()
+                for n, c in complete.items()
             ]
             head = ["series, at lag / ΔT =", *(str(q) for q in across)]
         caption = "Autocovariance divided by its value at lag 0, for lags up to a quarter of the windows"

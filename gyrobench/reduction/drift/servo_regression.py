@@ -108,11 +108,11 @@ def window_problems(
     """What is wrong with the rows of the held phases, as sentences."""
     for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
         windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
-    found = window_checks.window_problems(windows, required)
-    if found:
-        return found
-    there = set(np.asarray(windows["phase"]).astype(int).tolist())
-    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in there]
+    problems = window_checks.window_problems(windows, required)
+    if problems:
+        return problems
+    present = set(np.asarray(windows["phase"]).astype(int).tolist())
+    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in present]
     return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
 
 
@@ -126,18 +126,19 @@ def tracking_problems(
     if not gain or "mean" not in windows or not limit > 0.0:
         return []
     size = (np.abs(windows["mean"]) + np.nan_to_num(windows["std"])) / gain
-    bad = np.flatnonzero(rows & (size > limit))
-    if not bad.size:
+    exceeding = np.flatnonzero(rows & (size > limit))
+    if not exceeding.size:
         return []
-    arcsec = np.degrees(float(np.max(size[bad]))) * 3600.0
+    arcsec = np.degrees(float(np.max(size[exceeding]))) * 3600.0
     return [
-        f"the table is up to {arcsec:.3g} arcsec away from the gyro in {bad.size} windows (first: row {bad[0] + 1}); "
+        f"the table is up to {arcsec:.3g} arcsec away from the gyro in {exceeding.size} windows (first: row "
+        f"{exceeding[0] + 1}); "
         f"{np.degrees(limit) * 3600.0:.3g} arcsec are allowed: friction or torque ripple too large for the loop"
     ]
 
 
 def effects(
-    held: Held, site: Site, found: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
+    held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
     sizes: Mapping[str, float],
 ) -> list[Effect]:  # fmt: skip
     """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
@@ -152,7 +153,7 @@ def effects(
         dy, dX = np.zeros_like(y), np.zeros_like(X)
         dy[rows] = (drift_rate(other, site) - y)[rows]
         dX[rows] = (columns(other) - X)[rows]
-        return found.change(dy, dX) / SMALL
+        return fit.change(dy, dX) / SMALL
 
     def axis(k: int) -> Array:
         tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
@@ -171,7 +172,7 @@ def effects(
     def order(n: int) -> Array:
         length = held.t_end - held.t_start
         ends = n * held.angle_start, n * held.angle_end
-        return np.array([found.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
+        return np.array([fit.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
 
     def unbalance() -> Array:
         down = held.axes @ np.array([0.0, 0.0, -site.g])
@@ -180,7 +181,7 @@ def effects(
             c, s = np.cos(a), np.sin(a)
             ends.append((c * down[:, 1] + s * down[:, 2], c * down[:, 2] - s * down[:, 1]))
         length = held.t_end - held.t_start
-        return np.array([found.change((late - early) / length) for early, late in zip(*ends, strict=True)])
+        return np.array([fit.change((late - early) / length) for early, late in zip(*ends, strict=True)])
 
     def mount(k: int) -> Array:
         return moved(replace(held, body=frames.rotation(np.eye(3)[k], SMALL)))
@@ -195,14 +196,14 @@ def effects(
         Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder"),
         Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder"),
         Effect("unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis"),
-        Effect("time base", sizes["u_time"], "1", found.change(-held.rate), "relative"),
+        Effect("time base", sizes["u_time"], "1", fit.change(-held.rate), "relative"),
     ]
 
 
-def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
+def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
     """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
     rows: list[list[Any]] = []
-    for q, value, u in zip(found.quantities, found.value.tolist(), found.u.tolist(), strict=True):
+    for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
             symbol, sign = BOOK[q.name]
             words = (combined or {}).get(q.name, symbol)
@@ -217,8 +218,8 @@ def book_table(found: Findings, combined: Mapping[str, str] | None = None) -> di
 
 CONVENTIONS = (
     "Drift ω_d in precession sign: table rate plus Earth rate along the input axis; ω_M of Hu 1981 is −ω_d.",
-    "X, Y, Z = −f/g0 along input, output and spin axis (sign of Hu 1981: a body axis that points up reads −1); g0 = "
-    "9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
+    "X, Y, Z = −f/g0 along the input, output and spin reference axes (sign of Hu 1981: a body axis that points up "
+    "reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
     "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
     "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
 )

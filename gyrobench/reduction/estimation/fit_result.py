@@ -1,12 +1,11 @@
 """From a linear fit to a result: what every test method needs beside its design matrix, its formulas and its tables.
 
-    found = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
-    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.change(-k * current))]
-    result = linear_result(found, system="...", title="...", ..., effects=effects, specification=limits)
+    fitted = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
+    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", fitted.change(-k * current))]
+    result = linear_result(fitted, system="...", title="...", ..., effects=effects, specification=limits)
 
-Two channels measured at once: one result each, then gyrobench.reduction.merge_channels.  Everything inside is SI;
-what a
-Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
+Two channels measured at once: one result each, then gyrobench.reduction.merge_channels.  Everything inside is SI; what
+a Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ class Effect:
 
 
 def linear_result(
-    found: Findings, *, system: str, title: str, method: str, sources: Sequence[str], equation: str,
+    fit: Findings, *, system: str, title: str, method: str, sources: Sequence[str], equation: str,
     conventions: Sequence[str], effects: Sequence[Effect] = (), specification: Specification | None = None,
     site: Mapping[str, Any] | None = None, instrument: str = "", simulated: bool | None = None,
     no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
@@ -64,13 +63,13 @@ def linear_result(
     {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
     """
-    coefficients = [_coefficient(found, j, effects, specification or {}) for j in range(len(found.quantities))]
-    design = found.est.design
-    said = [*found.est.warnings, *found.warnings()]
+    coefficients = [_coefficient(fit, j, effects, specification or {}) for j in range(len(fit.quantities))]
+    design = fit.est.design
+    fit_warnings = [*fit.est.warnings, *fit.warnings()]
     if no_closed:
-        said.append(f"No closed-form estimates: {no_closed}.")
+        fit_warnings.append(f"No closed-form estimates: {no_closed}.")
     if design.condition > CONDITION:
-        said.append(
+        fit_warnings.append(
             f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
             f"is {design.weakest}; errors of the model are amplified in it."
         )
@@ -82,30 +81,30 @@ def linear_result(
         equation=equation,
         conventions=list(conventions),
         coefficients=coefficients,
-        series=found.series(),
-        correlation=regression.correlation(found.reported.covariance).tolist(),
+        series=fit.series(),
+        correlation=regression.correlation(fit.reported.covariance).tolist(),
         condition=design.condition,
         rank=design.rank,
-        dof=float(found.y.size - found.X.shape[1]),
-        noise=found.noise(),
-        tests=list(found.tests),
-        residual_std=found.residual_std,
-        residual_unit=found.y_unit,
-        acf=found.acf(),
-        allan=found.allan(),
-        psd=found.psd(),
+        dof=float(fit.y.size - fit.X.shape[1]),
+        noise=fit.noise(),
+        tests=list(fit.tests),
+        residual_std=fit.residual_std,
+        residual_unit=fit.y_unit,
+        acf=fit.acf(),
+        allan=fit.allan(),
+        psd=fit.psd(),
         harmonics=list(harmonics),
-        budget=_budget(found, effects, random),
-        type_b=_type_b(found, effects),
+        budget=_budget(fit, effects, random),
+        type_b=_type_b(fit, effects),
         repeatability=dict(repeatability or {}),
-        tables=[*_closed_table(found, closed_caption), *tables],
-        warnings=[*said, *warnings],
+        tables=[*_closed_table(fit, closed_caption), *tables],
+        warnings=[*fit_warnings, *warnings],
         summary=list(summary),
         decision_rule=uncertainty.DECISION_RULE,
         verdict=uncertainty.overall(c.verdict for c in coefficients),
         site=dict(site or {}),
         instrument=instrument,
-        simulated=any(q.truth is not None for q in found.quantities) if simulated is None else simulated,
+        simulated=any(q.truth is not None for q in fit.quantities) if simulated is None else simulated,
     )
 
 
@@ -118,8 +117,8 @@ def plus_minus(c: Coefficient) -> str:
     return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
 
 
-def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Specification) -> Coefficient:
-    q, r = found.quantities[j], found.reported
+def _coefficient(fit: Findings, j: int, effects: Sequence[Effect], limits: Specification) -> Coefficient:
+    q, r = fit.quantities[j], fit.reported
     contributions = [float(e.sensitivity[j]) * e.size for e in effects]
     u, U = uncertainty.combine(float(r.u[j]), float(r.half_width[j]), contributions)
     limit = limits.get(q.title, limits.get(q.name))
@@ -145,14 +144,14 @@ def _coefficient(found: Findings, j: int, effects: Sequence[Effect], limits: Spe
         verdict=uncertainty.verdict(estimate, U_s, limit),
         combination=dict(q.combination or {q.name: 1.0}),
     )
-    return replace(c, z=None) if found.ideal else c  # u is rounding: nothing to compare with
+    return replace(c, z=None) if fit.ideal else c  # u is rounding: nothing to compare with
 
 
-def _budget(found: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
+def _budget(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
     lines = []
-    note = "Type A, from the residuals" + ("" if found.white else " under the estimated noise model")
-    for j, q in enumerate(found.quantities):
-        u_a = float(found.u[j]) / q.scale
+    note = "Type A, from the residuals" + ("" if fit.white else " under the estimated noise model")
+    for j, q in enumerate(fit.quantities):
+        u_a = float(fit.u[j]) / q.scale
         lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
         for e in effects:
             change = float(e.sensitivity[j]) / q.scale
@@ -164,11 +163,11 @@ def _budget(found: Findings, effects: Sequence[Effect], random: str) -> list[Bud
     return lines
 
 
-def _type_b(found: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+def _type_b(fit: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
     """The standard uncertainties of the sources with their signs, which the budget does not show: what one source does
     to two estimates belongs together.
     """
-    scale = np.array([q.scale for q in found.quantities])
+    scale = np.array([q.scale for q in fit.quantities])
     return [
         {"source": e.source, "changes": (np.atleast_2d(e.change) * e.size / scale).tolist()}
         for e in effects
@@ -176,12 +175,12 @@ def _type_b(found: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
     ]
 
 
-def _closed_table(found: Findings, caption: str) -> list[dict[str, Any]]:
+def _closed_table(fit: Findings, caption: str) -> list[dict[str, Any]]:
     rows: list[list[Any]] = []
-    for j, q in enumerate(found.quantities):
+    for j, q in enumerate(fit.quantities):
         if q.closed is not None:
-            a, b = float(found.value[j]) / q.scale, q.closed / q.scale
-            rows.append([q.name, a, b, a - b, float(found.u[j]) / q.scale, q.unit])
+            a, b = float(fit.value[j]) / q.scale, q.closed / q.scale
+            rows.append([q.name, a, b, a - b, float(fit.u[j]) / q.scale, q.unit])
     head = ["coefficient", "least squares", "closed form", "difference", "u", "unit"]
     title = "Least squares and closed form"
     return [{"title": title, "caption": caption, "columns": head, "rows": rows}] if rows else []

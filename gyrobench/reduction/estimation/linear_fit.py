@@ -1,8 +1,8 @@
 """A linear fit of averaged data with everything a report shows beside its coefficients.
 
-    found = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
-    found.f_test("harmonics 3 and higher", columns, ...)
-    found.gain, found.value, found.u ...                    all in SI, in the order of ``found.quantities``
+    fitted = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
+    fitted.f_test("harmonics 3 and higher", columns, ...)
+    fitted.gain, fitted.value, fitted.u ...                    all in SI, in the order of ``found.quantities``
 
 Groups are the phases of a plan: rows of the data that are drawn together, against an angle, a time or a number.
 Where what is wanted is a function of what the data are linear in (R = (R/k)/(1/k)), :meth:`Findings.derive` turns
@@ -170,8 +170,8 @@ class Findings:
 
     def change(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
         """Change (q,) of the reported values, to first order, when the data and the design were wrong by dy, dX."""
-        wrong = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
-        out: Array = self.gain @ (wrong if dX is None else wrong - dX @ self.est.beta)
+        error = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
+        out: Array = self.gain @ (error if dX is None else error - dX @ self.est.beta)
         return out
 
     def derive(self, quantities: Sequence[Quantity], function: Callable[[Array], ArrayLike]) -> Findings:
@@ -228,24 +228,24 @@ class Findings:
         return series.autocorrelation(parts, min(40, max(max(p.size for p in parts) // 2, 1)))
 
     def allan(self) -> dict[str, Any]:
-        found = {} if self.ideal else series.allan(self.stretches)
-        return {**found, "unit": self.y_unit} if found else {}
+        values = {} if self.ideal else series.allan(self.stretches)
+        return {**values, "unit": self.y_unit} if values else {}
 
     def psd(self) -> dict[str, Any]:
-        found = {} if self.ideal else series.spectrum(self.stretches)
-        return {**found, "unit": f"({self.y_unit})²/Hz"} if found else {}
+        values = {} if self.ideal else series.spectrum(self.stretches)
+        return {**values, "unit": f"({self.y_unit})²/Hz"} if values else {}
 
     # ------------------------------------------------------------------------------------------ noise
     def noise(self) -> dict[str, Any]:
         """The noise model of the estimation; units in the keys."""
         e, unit, scale = self.est, self.y_unit, self.y_scale
         if self.white:
-            found: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
-            return {**found, f"standard deviation / ({unit})": self.residual_std}
+            parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
+            return {**parameters, f"standard deviation / ({unit})": self.residual_std}
         share = e.best[1]
         model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
         model += " with reading errors" if e.reading > 0.0 else ""
-        found = {
+        parameters = {
             "model": "none (ideal data)" if self.ideal else model,
             "weight of white noise alone": e.white,
             f"white density / ({unit}/√Hz)": e.density[0] / scale,
@@ -254,12 +254,12 @@ class Findings:
             f"Gauss-Markov rms, 90 % range / ({unit})": [v / scale for v in e.sigma[1:]],
         }
         if e.sigma_reading[2] > 0.0:
-            found[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
-            found[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
+            parameters[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
+            parameters[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
         if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
-            found["correlation time / s"] = e.tau[0]
-            found["correlation time, 90 % range / s"] = list(e.tau[1:])
-        return found
+            parameters["correlation time / s"] = e.tau[0]
+            parameters["correlation time, 90 % range / s"] = list(e.tau[1:])
+        return parameters
 
     def noise_sentence(self, what: str = "windows") -> str:
         """Return the residual standard deviation and its noise model as a sentence, for the summary."""
@@ -269,8 +269,8 @@ class Findings:
         if self.white:
             return text + ", treated as white noise."
         if self.est.best[1] == 0.0:
-            more = " and reading errors" if self.est.reading > 0.0 else ""
-            return text + f", compatible with white noise{more}."
+            reading_errors = " and reading errors" if self.est.reading > 0.0 else ""
+            return text + f", compatible with white noise{reading_errors}."
         return text + f"; correlation time about {self.est.tau[0]:.3g} s, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests
@@ -287,22 +287,22 @@ class Findings:
             if self.white
             else "the residuals are autocorrelated; ordinary least squares would understate the uncertainties"
         )
-        found = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
+        tests = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
         whitened = ", residuals" if self.white else ", whitened residuals"
         if not self.white:
             acf = series.autocorrelation(self._parts(e.whitened), lags)
             q, p = series.ljung_box(acf, n, lags, 2 if e.best[1] > 0.0 else 0)
             text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
-            found.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
+            tests.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
         z, p = series.runs_test(e.whitened)
         text = "the signs of the residuals are not random" if p < 0.05 else "compatible with random signs"
-        found.append(Test("runs" + whitened, z, p, "trends and steps", text))
+        tests.append(Test("runs" + whitened, z, p, "trends and steps", text))
         w, p = series.normality(e.whitened)
         text = (
             "the residuals are not normal; check for outliers" if p < 0.05 else "compatible with a normal distribution"
         )
-        found.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
-        return found
+        tests.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
+        return tests
 
     def warnings(self) -> list[str]:
         """Return a sentence for each test with p < 0.001, but not for autocorrelation that the noise model includes."""

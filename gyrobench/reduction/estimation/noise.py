@@ -176,12 +176,12 @@ def _whiten_readings(
     n, c = columns.shape
     length = (t1 - t0)[:, None]
     window = float(np.median(length))
-    rest = 1.0 - reading
-    size = rest * share / mean_variance(window / tau)
+    without_reading = 1.0 - reading
+    size = without_reading * share / mean_variance(window / tau)
     q = reading * window**2 / 2.0  # variance of one reading error
     r = length / tau
     phi, a, v = np.exp(-r), mean_gain(r), mean_variance(r)
-    noise = np.maximum(v - a * a, 0.0) * size + rest * (1.0 - share) * window / length + q / length**2
+    noise = np.maximum(v - a * a, 0.0) * size + without_reading * (1.0 - share) * window / length + q / length**2
     cross, drive = a * (1.0 - phi) * size, (1.0 - phi * phi) * size
     gap = np.append(t0[1:] - t1[:-1], 0.0)
     pause = np.exp(-np.maximum(gap, 0.0)[:, None] / tau)

@@ -104,25 +104,25 @@ def fit(
     scale = np.linalg.norm(X, axis=0)
     Q, R = np.linalg.qr(X / scale)
     start = Q.T @ y
-    rest = y - Q @ start
-    both = np.column_stack([Q, rest])
+    remainder = y - Q @ start
+    both = np.column_stack([Q, remainder])
     M, xy, yy, logdet = _moments(t0, t1, both, grid)
     Mi = np.linalg.inv(M)
     b = np.einsum("gpq,gq->gp", Mi, xy)
     rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
     ll = -0.5 * (logdet + np.linalg.slogdet(M)[1] + (n - p) * np.log(np.maximum(rss, 1e-300)))
     ll += np.log(grid.prior)
-    if np.linalg.norm(rest) <= 1e-12 * np.linalg.norm(y):  # ideal data: what is left is rounding, no noise
+    if np.linalg.norm(remainder) <= 1e-12 * np.linalg.norm(y):  # ideal data: what is left is rounding, no noise
         ll = np.where((grid.share == 0.0) & (grid.reading == 0.0), 0.0, -np.inf)
     w = np.exp(ll - ll.max())
     w /= w.sum()
 
     T = np.linalg.inv(R) / scale[:, None]  # back from orthonormal columns
-    each = (start + b) @ T.T
+    estimates = (start + b) @ T.T
     beta = T @ (start + w @ b)
     s2 = rss / (n - p)
     cov_each = s2[:, None, None] * (T @ Mi @ T.T)
-    off = each - beta
+    off = estimates - beta
     covariance = np.einsum("g,gpq->pq", w, cov_each) + np.einsum("g,gp,gq->pq", w, off, off)
     counts = w > LIGHT * w.max()
     mixture = Mixture(w[counts] / w[counts].sum(), off[counts], cov_each[counts], n - p)
@@ -140,10 +140,10 @@ def fit(
     window = float(np.median(t1 - t0))
     v = noise.mean_variance(window / grid.tau)
     white = float(w[(grid.share == 0.0) & (grid.reading == 0.0)].sum())
-    left = s2 * (1.0 - grid.reading)
+    without_reading = s2 * (1.0 - grid.reading)
     tau = _spread(w, grid.tau, k, grid.share > 0.0)
-    sigma = _spread(w, np.sqrt(left * grid.share / v), k)
-    density = _spread(w, np.sqrt(left * (1.0 - grid.share) * window), k)
+    sigma = _spread(w, np.sqrt(without_reading * grid.share / v), k)
+    density = _spread(w, np.sqrt(without_reading * (1.0 - grid.share) * window), k)
     record = float(t1[-1] - t0[0])
     warnings = []
     slow = float(w[grid.share == 0.0].sum()) < 0.5
@@ -171,16 +171,16 @@ def ordinary(
     """
     design = check_data(X, y, names, limit)
     check_windows(t0, t1)
-    found = least_squares(X, y, names, weights)
+    ols = least_squares(X, y, names, weights)
     root = np.ones_like(y) if weights is None else np.sqrt(weights)
-    spread = found.s / float(np.median(root))
+    spread = ols.s / float(np.median(root))
     density = spread * math.sqrt(float(np.median(t1 - t0)))
-    whitened = found.residual * root / found.s if found.s > 0.0 else np.zeros_like(y)
-    dof = np.full(len(names), float(found.dof))
+    whitened = ols.residual * root / ols.s if ols.s > 0.0 else np.zeros_like(y)
+    dof = np.full(len(names), float(ols.dof))
     return Estimate(
-        found.names, found.beta, found.covariance, found.u, found.half_width(), found.p, dof, found.residual, whitened,
-        found.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
-        Mixture(np.ones(1), np.zeros((1, len(names))), found.covariance[None], found.dof),
+        ols.names, ols.beta, ols.covariance, ols.u, ols.half_width(), ols.p, dof, ols.residual, whitened,
+        ols.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
+        Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof),
     )  # fmt: skip
 
 

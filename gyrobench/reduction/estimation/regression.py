@@ -132,8 +132,8 @@ class Fit:
         if not np.any(np.all(np.isclose(self.gain.sum(axis=1)[:, None], np.eye(p), atol=1e-9), axis=0)):
             raise RegressionError("the F test needs a constant column")
         total = float(np.sum((y - y.mean()) ** 2))
-        rest = float(np.sum(self.residual**2))
-        value = ((total - rest) / (p - 1)) / (rest / (n - p))
+        unexplained = float(np.sum(self.residual**2))
+        value = ((total - unexplained) / (p - 1)) / (unexplained / (n - p))
         return value, float(special.fdtrc(p - 1, n - p, value))
 
 

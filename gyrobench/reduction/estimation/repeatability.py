@@ -79,30 +79,30 @@ def combine_days(
     table = np.array([[c.estimate for c in r.coefficients] for r in parts])
     coefficients, series, tests, budget = [], [], [], []
     for j, name in enumerate(names):
-        each = [r.coefficients[j] for r in parts]
-        coefficients.append(_mean(each, (specification or {}).get(name, each[0].limit)))
-        found = statistics(table[:, j].tolist())
-        own = [c.u_a or 0.0 for c in each]
-        if min(own) > 0.0 and found.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
-            q, p = agreement(table[:, j].tolist(), own)
+        per_day = [r.coefficients[j] for r in parts]
+        coefficients.append(_mean(per_day, (specification or {}).get(name, per_day[0].limit)))
+        stats = statistics(table[:, j].tolist())
+        u_own = [c.u_a or 0.0 for c in per_day]
+        if min(u_own) > 0.0 and stats.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
+            q, p = agreement(table[:, j].tolist(), u_own)
             text = f"varies from {what} to {what} by more than its noise" if p < 0.05 else "constant within its noise"
             tests.append(Test(f"{what} to {what}, {name}", q, p, f"change between the {what}s", text))
         x = [float(k + 1) for k in range(n)]
         y = table[:, j].tolist()
         series.append(
             Series(
-                label=name, x=x, x_name=what, x_unit="", y=y, fit=[found.mean] * n,
-                residual=(table[:, j] - found.mean).tolist(), y_name=name, y_unit=each[0].unit, t=x,
+                label=name, x=x, x_name=what, x_unit="", y=y, fit=[stats.mean] * n,
+                residual=(table[:, j] - stats.mean).tolist(), y_name=name, y_unit=per_day[0].unit, t=x,
             )
         )  # fmt: skip
         c = coefficients[-1]
         note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
         budget.append(
-            BudgetLine(f"repeatability from {what} to {what}", found.u, c.unit, 1.0, "1", found.u, c.unit, name, note)
+            BudgetLine(f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note)
         )
         budget += [b for b in parts[0].budget if b.coefficient == name and not b.note.startswith("Type A")]
     varying = [t.name.split(", ", 1)[1] for t in tests if t.p is not None and t.p < 0.05]
-    said = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
+    variation = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
     first = parts[0]
     return replace(
         first,
@@ -120,7 +120,9 @@ def combine_days(
         tables=[_table(days, parts, table, what), *({**t, "title": f"{t['title']}, {what} {days[0]}"}
                                                     for t in first.tables)],
         warnings=list(dict.fromkeys(w for r in parts for w in r.warnings)),
-        summary=[f"{n} {what}s; {said} from {what} to {what} by more than noise.", *_few(coefficients, table, what)],
+        summary=[
+            f"{n} {what}s; {variation} from {what} to {what} by more than noise.", *_few(coefficients, table, what)
+        ],
         verdict=uncertainty.overall(c.verdict for c in coefficients),
     )  # fmt: skip
 
@@ -131,50 +133,57 @@ def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:
     return [f"{c.name} = {c.estimate:.6g} {c.unit}, σ over the {what}s {s:.2g} {c.unit}." for c, s in both]
 
 
-def _mean(each: list[Coefficient], limit: tuple[float | None, float | None] | None) -> Coefficient:
-    found = statistics([c.estimate for c in each])
-    half = float(special.stdtrit(found.n - 1, 0.975)) * found.u
-    common = math.sqrt(float(np.mean([max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0) for c in each])))
-    u, U = uncertainty.combine(found.u, half, [common])
-    first = each[0]
-    closed = [c.closed for c in each if c.closed is not None]
-    truth = [c.truth for c in each if c.truth is not None]
-    true = float(np.mean(truth)) if len(truth) == len(each) else None
-    t = found.mean / found.u if found.u > 0.0 else None
+def _mean(per_day: list[Coefficient], limit: tuple[float | None, float | None] | None) -> Coefficient:
+    stats = statistics([c.estimate for c in per_day])
+    half = float(special.stdtrit(stats.n - 1, 0.975)) * stats.u
+    common = math.sqrt(float(np.mean([max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0) for c in per_day])))
+    u, U = uncertainty.combine(stats.u, half, [common])
+    first = per_day[0]
+    closed = [c.closed for c in per_day if c.closed is not None]
+    truth = [c.truth for c in per_day if c.truth is not None]
+    true = float(np.mean(truth)) if len(truth) == len(per_day) else None
+    t = stats.mean / stats.u if stats.u > 0.0 else None
     return replace(
         first,
-        estimate=found.mean,
+        estimate=stats.mean,
         u=u,
         k=U / u if u > 0.0 else uncertainty.NORMAL,
-        interval=(found.mean - U, found.mean + U),
+        interval=(stats.mean - U, stats.mean + U),
         t=t,
-        p=None if t is None else float(2.0 * special.stdtr(found.n - 1, -abs(t))),
-        u_a=found.u,
-        dof=float(found.n - 1),
-        closed=float(np.mean(closed)) if len(closed) == len(each) else None,
+        p=None if t is None else float(2.0 * special.stdtr(stats.n - 1, -abs(t))),
+        u_a=stats.u,
+        dof=float(stats.n - 1),
+        closed=float(np.mean(closed)) if len(closed) == len(per_day) else None,
         truth=true,
-        z=(found.mean - true) / u if true is not None and u > 0.0 else None,
+        z=(stats.mean - true) / u if true is not None and u > 0.0 else None,
         limit=limit,
-        verdict=uncertainty.verdict(found.mean, U, limit),
+        verdict=uncertainty.verdict(stats.mean, U, limit),
     )
 
 
 def _correlation(table: Array) -> list[list[float]]:
-    off = table - table.mean(axis=0)
-    size = np.sqrt(np.sum(off * off, axis=0))
+    deviation = table - table.mean(axis=0)
+    size = np.sqrt(np.sum(deviation * deviation, axis=0))
     safe = np.where(size > 0.0, size, 1.0)
-    out = np.clip(off.T @ off / np.outer(safe, safe), -1.0, 1.0)
+    out = np.clip(deviation.T @ deviation / np.outer(safe, safe), -1.0, 1.0)
     np.fill_diagonal(out, 1.0)
-    found: list[list[float]] = out.tolist()
-    return found
+    matrix: list[list[float]] = out.tolist()
+    return matrix
 
 
 def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: str) -> dict[str, Any]:
     """Like Table 3-1: a row for each day, then mean and standard deviation; under it the days' own u of type A."""
-    each = [statistics(column) for column in table.T.tolist()]
-    own = [float(np.sqrt(np.mean([(r.coefficients[j].u_a or 0.0) ** 2 for r in parts]))) for j in range(len(each))]
+    per_coefficient = [statistics(column) for column in table.T.tolist()]
+    u_own = [
+        float(np.sqrt(np.mean([(r.coefficients[j].u_a or 0.0) ** 2 for r in parts])))
+        for j in range(len(per_coefficient))
+    ]
     rows: list[list[Any]] = [[day, *row] for day, row in zip(days, table.tolist(), strict=True)]
-    rows += [["mean", *(s.mean for s in each)], ["σ (n − 1)", *(s.sigma for s in each)], [f"u within a {what}", *own]]
+    rows += [
+        ["mean", *(s.mean for s in per_coefficient)],
+        ["σ (n − 1)", *(s.sigma for s in per_coefficient)],
+        [f"u within a {what}", *u_own],
+    ]
     head = [f"{c.name} / ({c.unit})" for c in parts[0].coefficients]
     title = f"Estimates by {what}"
     return {"title": title, "caption": f"Estimates of each {what}, their mean and standard deviation",

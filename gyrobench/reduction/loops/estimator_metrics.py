@@ -91,8 +91,8 @@ def independent_squares(x: Array) -> float:
 
 def rms(x: Array) -> Value:
     """Root mean square; u = rms/sqrt(2 nu) of nu independent squares."""
-    found = math.sqrt(float(np.mean(x * x)))
-    return Value(found, found / math.sqrt(2.0 * independent_squares(x)))
+    value = math.sqrt(float(np.mean(x * x)))
+    return Value(value, value / math.sqrt(2.0 * independent_squares(x)))
 
 
 def decibels(a: Value, b: Value) -> Value:
@@ -177,8 +177,8 @@ def sine(time: Array, x: Array, frequency: float) -> Sine:
         return out
 
     whole = fit(slice(round(periods / frequency / step)))
-    each = periods // STRETCHES / frequency / step
-    parts = [fit(slice(round(k * each), round((k + 1) * each))) for k in range(STRETCHES)]
+    samples = periods // STRETCHES / frequency / step
+    parts = [fit(slice(round(k * samples), round((k + 1) * samples))) for k in range(STRETCHES)]
     return Sine(complex(whole[0], whole[1]), np.array([complex(p[0], p[1]) for p in parts]), x - basis @ whole)
 
 
@@ -188,11 +188,11 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> Value:
     u^2(mean square) = (A u(A))^2 + (2 rest u(rest))^2: the sine, always there, scatters by its amplitude A only.
     """
     s = sine(time, x, frequency)
-    found = math.sqrt(float(np.mean(x * x)))
-    left = rms(s.rest)
-    if found == 0.0:
+    value = math.sqrt(float(np.mean(x * x)))
+    rest = rms(s.rest)
+    if value == 0.0:
         return Value(0.0, 0.0)
-    return Value(found, math.hypot(abs(s.whole) * s.u, 2.0 * left.value * left.u) / (2.0 * found))
+    return Value(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
 
 
 def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:

@@ -46,26 +46,28 @@ class Signals:
 
     def problems(self) -> list[str]:
         """What makes these series unfit, as sentences."""
-        found = []
+        problems = []
         given = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         for name, x in given.items():
             if x.shape != self.time.shape:
-                found.append(f"{name} has {x.size} samples, time has {self.time.size}")
+                problems.append(f"{name} has {x.size} samples, time has {self.time.size}")
             elif not np.all(np.isfinite(x)):
-                found.append(f"{name} is not finite at {int(np.count_nonzero(~np.isfinite(x)))} samples")
-        if not found and not np.ptp(self.truth) > 0.0:
-            found.append("the truth is constant: an estimate of zero would rank first, so no estimator can be ranked")
-        if not found and not np.any(self.z != self.truth):
-            found.append("the readings equal the truth: there is no noise to reduce")
+                problems.append(f"{name} is not finite at {int(np.count_nonzero(~np.isfinite(x)))} samples")
+        if not problems and not np.ptp(self.truth) > 0.0:
+            problems.append(
+                "the truth is constant: an estimate of zero would rank first, so no estimator can be ranked"
+            )
+        if not problems and not np.any(self.z != self.truth):
+            problems.append("the readings equal the truth: there is no noise to reduce")
         if self.time.size < 400:
-            found.append(f"{self.time.size} samples: at least 400 are needed")
+            problems.append(f"{self.time.size} samples: at least 400 are needed")
         else:
             steps = np.diff(self.time)
             if np.ptp(steps) > 0.01 * float(np.median(steps)) or not steps[0] > 0.0:
-                found.append("the samples are not equally spaced in time (to 1 %); record at a fixed rate")
+                problems.append("the samples are not equally spaced in time (to 1 %); record at a fixed rate")
         if not math.isfinite(self.latency) or self.latency < 0.0:
-            found.append(f"latency = {self.latency:g} s: must be 0 or more")
-        return found
+            problems.append(f"latency = {self.latency:g} s: must be 0 or more")
+        return problems
 
 
 @dataclass
@@ -108,12 +110,12 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
         _errors(m, s, behind, known, frequency, unit)
         _distortion(m, s, behind, known, frequency)
         most = max(3.0 * s.latency, 50.0 * step)
-        found = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
+        delay = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
     except ValueError as error:
         raise ReductionError(str(error)) from None
-    said = "delay of the best fit to the truth; closed form: the latency stated by the estimator"
+    meaning = "delay of the best fit to the truth; closed form: the latency stated by the estimator"
     scale, in_unit = (1.0, "s") if step > 0.1 else (1e-3, "ms")
-    m.add("delay", said, in_unit, _times(found, 1.0 / scale), closed=s.latency / scale)
+    m.add("delay", meaning, in_unit, _times(delay, 1.0 / scale), closed=s.latency / scale)
     _consistency(m, s, R)
     phase = 360.0 * CROSSOVER * s.latency
     if phase > LOOP:

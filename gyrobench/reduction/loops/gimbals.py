@@ -51,8 +51,8 @@ class Flight:
         if rest is not None:
             fits = [np.polyfit(rest.t, rest[n], 1) for n in names]
             self.drift = np.array([f[0] for f in fits])
-            left = [rest[n] - np.polyval(f, rest.t) for n, f in zip(names, fits, strict=True)]
-            self.noise = math.sqrt(sum(float(np.var(x)) for x in left))
+            residuals = [rest[n] - np.polyval(f, rest.t) for n, f in zip(names, fits, strict=True)]
+            self.noise = math.sqrt(sum(float(np.var(x)) for x in residuals))
         self.axes = turned - np.outer(self.t - self.t[0], self.drift)
         self.error = np.linalg.norm(self.axes, axis=1)
 

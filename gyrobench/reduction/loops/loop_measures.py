@@ -87,22 +87,22 @@ def gates(record: Record, slot: str = "exciter") -> list[Gate]:
         if name not in channels:
             raise ReductionError(f"the record has no channel {name}: the system must record it")
     phase, gate, time = channels[f"{slot}.phase"], channels[f"{slot}.gate"], channels["time"]
-    found = []
+    complete = []
     for row in record.run.plan:
-        here = phase == row.phase
-        inside = np.flatnonzero(here & (gate > 0.5))
+        in_phase = phase == row.phase
+        inside = np.flatnonzero(in_phase & (gate > 0.5))
         if inside.size < 2:
             continue
         period = float(time[1] - time[0])
         if time[inside[-1]] - time[inside[0]] < row.dwell - 2.5 * period:
             continue  # the run stopped in this phase
-        first = int(np.argmax(here))
+        first = int(np.argmax(in_phase))
         middle = first + (int(inside[0]) - first) // 2
         span = slice(int(inside[0]), int(inside[-1]) + 1)
-        found.append(Gate(row, time[span], span, slice(middle, int(inside[0])), channels))
-    if not found:
+        complete.append(Gate(row, time[span], span, slice(middle, int(inside[0])), channels))
+    if not complete:
         raise ReductionError("no phase of the plan is complete in this record")
-    return found
+    return complete
 
 
 # ------------------------------------------------------------------------------------------- sines
@@ -267,15 +267,15 @@ def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
     rates = np.diff(angle[edges]) / np.diff(t[edges])
     mean = float((angle[-1] - angle[0]) / (t[-1] - t[0]))
     dt = float(t[1] - t[0])
-    found = residual_series.allan([(dt, np.diff(angle) / dt)])
+    allan = residual_series.allan([(dt, np.diff(angle) / dt)])
     walk = None
-    falls = [abs(s["slope"] + 0.5) < 0.1 for s in found.get("slopes", [])]
+    falls = [abs(s["slope"] + 0.5) < 0.1 for s in allan.get("slopes", [])]
     if True in falls:
         first = falls.index(True)
         last = falls.index(False, first) if False in falls[first:] else len(falls)
-        tau, dev, low, high = (found[n][last] for n in ("tau", "dev", "lo", "hi"))
+        tau, dev, low, high = (allan[n][last] for n in ("tau", "dev", "lo", "hi"))
         walk = (dev * math.sqrt(tau), (high - low) / (2.0 * residual_series.NORMAL) * math.sqrt(tau))
-    return Drift(mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), found, walk)
+    return Drift(mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), allan, walk)
 
 
 # ------------------------------------------------------------------------------------------- axes
@@ -286,11 +286,11 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
     """
     rows = []
     for k, name in enumerate(axes, 1):
-        own = points.get((k, k))
+        direct = points.get((k, k))
         cells: list[Any] = [name]
         for j in range(1, len(axes) + 1):
-            there = points.get((k, j))
-            cells.append(None if own is None or there is None or not own else 100.0 * abs(there / own))
+            coupled = points.get((k, j))
+            cells.append(None if direct is None or coupled is None or not direct else 100.0 * abs(coupled / direct))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
     return {"title": f"Cross-axis coupling, {what}", "caption": "", "columns": columns, "rows": rows}

@@ -1,11 +1,11 @@
 """From the measures of a loop to the Result that its report shows.
 
-found = LoopFindings(record)
-loop = found.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
-found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
-found.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
-found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
-return found.result(title=..., method=..., sources=[...], equation=..., conventions=[...], specification=...)
+builder = LoopFindings(record)
+loop = builder.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
+builder.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
+builder.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
+builder.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
+return builder.result(title=..., method=..., sources=[...], equation=..., conventions=[...], specification=...)
 """
 
 from __future__ import annotations
@@ -152,13 +152,13 @@ class LoopFindings:
             if model is None:
                 continue
             dense = model_response(model, span)[:, 0, 0]
-            found = m.margins(span, dense)
-            rows.append(found.row(label))
+            limits = m.margins(span, dense)
+            rows.append(limits.row(label))
             curves.append(_curve(label, span, dense))
-            if found.crossover is not None:
-                self._agreement(points, model_response(model, at)[:, 0, 0], found, (label, title), up_to)
+            if limits.crossover is not None:
+                self._agreement(points, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
             if kind == "discrete":
-                self._conditional(title, found)
+                self._conditional(title, limits)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
         self.tables.append(
             {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
@@ -179,9 +179,9 @@ class LoopFindings:
             self.warnings.append(f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for.")
 
     def _agreement(
-        self, points: Sequence[Point], model: Any, found: m.Margins, names: tuple[str, str], up_to: float
+        self, points: Sequence[Point], model: Any, limits: m.Margins, names: tuple[str, str], up_to: float
     ) -> None:
-        limit = up_to * float(found.crossover or 0.0)
+        limit = up_to * float(limits.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
         table = next((t for t in self.tables if t["title"] == "Linear models and measured loop"), None)
@@ -197,10 +197,10 @@ class LoopFindings:
             self.tables.append(table)
         table["rows"].append([names[0], limit, count, db, degrees, names[1]])
 
-    def _conditional(self, title: str, found: m.Margins) -> None:
-        if found.lower is not None:
-            text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {found.lower:.3g}"
-            upper = f" or rises to {found.upper:.3g}" if found.upper is not None else ""
+    def _conditional(self, title: str, limits: m.Margins) -> None:
+        if limits.lower is not None:
+            text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {limits.lower:.3g}"
+            upper = f" or rises to {limits.upper:.3g}" if limits.upper is not None else ""
             self.warnings.append(f"{text}{upper} times its value. Saturation of the motor reduces the gain.")
 
     def ratio(
@@ -224,12 +224,12 @@ class LoopFindings:
         span = m.grid(0.5 * points[0].f, 2.0 * points[-1].f, CURVE)
         curves = []
         for model, label in NAMES.items():
-            found = self.excited(model, kind, axis, output, span, plus)
-            if found is not None and reference.partition(".")[0] != self.slot:
+            values = self.excited(model, kind, axis, output, span, plus)
+            if values is not None and reference.partition(".")[0] != self.slot:
                 base = self.excited(model, kind, axis, reference, span)
-                found = None if base is None else found / base
-            if found is not None:
-                curves.append(_curve(label, span, found / scale))
+                values = None if base is None else values / base
+            if values is not None:
+                curves.append(_curve(label, span, values / scale))
         shown = [Point(p.f, p.value / scale, p.u, p.coherence) for p in points]
         self.responses.append(_bode(name, "ratio", caption or f"{name}, axis {axis}.", shown, curves, name, unit))
         return points
@@ -242,8 +242,8 @@ class LoopFindings:
         if model is None or output not in model.outputs:
             return None
         try:
-            found = m.excited(model, kind, axis, output, f)
-            return found + m.excited(model, kind, axis, plus, f) if plus else found
+            values = m.excited(model, kind, axis, output, f)
+            return values + m.excited(model, kind, axis, plus, f) if plus else values
         except KeyError:
             return None
 
@@ -258,27 +258,27 @@ class LoopFindings:
         several times as long, from whose noise the uncertainty of the change is taken; without, it is that of white
         noise, too small where the noise is slow.
         """
-        y, rest = gate[output], gate.rest(output)
+        y, baseline = gate[output], gate.rest(output)
         if plus:
-            y, rest = y + gate[plus], rest + gate.rest(plus)
+            y, baseline = y + gate[plus], baseline + gate.rest(plus)
         before = gate.channels["time"][gate.before]
-        y, rest = y - drift * (gate.t - gate.t[0]), rest - drift * (before - gate.t[0])
-        found = step(gate.t, y, rest)
+        y, baseline = y - drift * (gate.t - gate.t[0]), baseline - drift * (before - gate.t[0])
+        measures = step(gate.t, y, baseline)
         if quiet is not None:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
-            u = scatter(at_rest, rest.size, y.size, max(2, int(LAST * y.size)))
-            found = found if u is None else replace(found, u_change=u)
+            u = scatter(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
+            measures = measures if u is None else replace(measures, u_change=u)
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
         curves = []
         model = self.linear.closed.discrete
         simulated = None if model is None else _simulated(model, gate, output)
         if model is not None and simulated is not None and plus:
-            more = _simulated(model, gate, plus)
-            simulated = None if more is None else simulated + more
+            second = _simulated(model, gate, plus)
+            simulated = None if second is None else simulated + second
         if simulated is not None:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
-            curves.append({**curve, "y": ((found.initial + simulated[pick]) / scale).tolist()})
+            curves.append({**curve, "y": ((measures.initial + simulated[pick]) / scale).tolist()})
         what = y_name or output
         cause = f"{gate.amplitude:g} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
         self.responses.append(
@@ -297,7 +297,7 @@ class LoopFindings:
                 curves=curves,
             )
         )
-        return found
+        return measures
 
     # ------------------------------------------------------------------ drift
     def drift(
@@ -307,18 +307,25 @@ class LoopFindings:
 
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """
-        found = drift(gate.t, gate[output])
-        scaled: dict[str, Any] = {k: [x / DPH for x in found.allan[k]] for k in ("dev", "lo", "hi") if k in found.allan}
-        self.allan = {**found.allan, **scaled, "unit": "°/h"} if found.allan else {}
+        measures = drift(gate.t, gate[output])
+        scaled: dict[str, Any] = {
+            k: [x / DPH for x in measures.allan[k]] for k in ("dev", "lo", "hi") if k in measures.allan
+        }
+        self.allan = {**measures.allan, **scaled, "unit": "°/h"} if measures.allan else {}
         true = None if truth is None else truth / DPH
         self.measure(
-            f"drift{key}", "mean drift rate of the platform at rest", "°/h", found.rate / DPH, found.u / DPH, truth=true
+            f"drift{key}",
+            "mean drift rate of the platform at rest",
+            "°/h",
+            measures.rate / DPH,
+            measures.u / DPH,
+            truth=true,
         )
-        if found.walk is not None:
-            size, u = (math.degrees(w) * 60.0 for w in found.walk)
+        if measures.walk is not None:
+            size, u = (math.degrees(w) * 60.0 for w in measures.walk)
             true = math.degrees(walk) * 60.0 if walk else None
             self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
-        return found
+        return measures
 
     def result(
         self,

@@ -36,13 +36,13 @@ def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[f
     all_of_them = model_response(model, f)[:, model.outputs.index(output), :]
     s = 2j * np.pi * np.asarray(f, float)
     total = np.zeros(s.size, complex)
-    found = False
+    connected = False
     for power, name in enumerate(names):
         for j, wired in enumerate(model.inputs):
             if wired.partition(".")[2] == f"{name}[{axis}]":
                 total += s**power * all_of_them[:, j]
-                found = True
-    if not found:
+                connected = True
+    if not connected:
         raise KeyError(f"{kind} on axis {axis} is not connected in this system")
     return total
 
@@ -153,14 +153,14 @@ def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
         return {}
     f = grid(min(p.f for p in points), max(p.f for p in points))
     shown, other = margins(f, between(points, f)), margins(f, between(points, f, spline=True))
-    found: dict[str, tuple[float, float]] = {}
+    values: dict[str, tuple[float, float]] = {}
     if shown.crossovers:
         cross, phase = min(shown.crossovers, key=lambda c: abs(c[1]))
         u, fall, turn = _around(points, cross)
         twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
         u_f = u / abs(fall) if fall else 0.0
-        found["crossover"] = cross, math.hypot(cross * u_f, twin[0] - cross)
-        found["phase"] = phase, math.hypot(math.degrees(math.hypot(u, turn * u_f)), twin[1] - phase)
+        values["crossover"] = cross, math.hypot(cross * u_f, twin[0] - cross)
+        values["phase"] = phase, math.hypot(math.degrees(math.hypot(u, turn * u_f)), twin[1] - phase)
     for name, factor in (("upper", shown.upper), ("lower", shown.lower)):
         if factor is None:
             continue
@@ -168,9 +168,9 @@ def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
         u, fall, turn = _around(points, at)
         same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
         u_f = u / abs(turn) if turn else 0.0
-        found[name] = factor, math.hypot(factor * math.hypot(u, fall * u_f), same[1] - factor)
-        found[f"f_{name}"] = at, math.hypot(at * u_f, same[0] - at)
-    return found
+        values[name] = factor, math.hypot(factor * math.hypot(u, fall * u_f), same[1] - factor)
+        values[f"f_{name}"] = at, math.hypot(at * u_f, same[0] - at)
+    return values
 
 
 def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:

@@ -125,16 +125,16 @@ def agree(values: Sequence[Value]) -> Agreement:
     """Weighted mean and consistency of two values or more.  Raises ValueError for fewer, or for one without own u."""
     if len(values) < 2:
         raise ValueError(f"{len(values)} value: at least two are needed to compare")
-    bare = [v.label for v in values if not v.own > 0.0]
-    if bare:
-        raise ValueError(f"{', '.join(bare)}: no uncertainty of its own, nothing to weigh with")
+    without_u = [v.label for v in values if not v.own > 0.0]
+    if without_u:
+        raise ValueError(f"{', '.join(without_u)}: no uncertainty of its own, nothing to weigh with")
     x, C = np.array([v.estimate for v in values]), covariance(values)
     inverse = np.linalg.inv(C)
     total = float(np.sum(inverse))
     w = inverse.sum(axis=1) / total
     mean = float(w @ x)
-    off = x - mean
-    Q, m = float(off @ inverse @ off), len(values)
+    deviation = x - mean
+    Q, m = float(deviation @ inverse @ deviation), len(values)
     u_a2 = np.array([v.u_a**2 for v in values])
     nu = np.array([v.dof * (v.u**2 / v.u_a**2) ** 2 if v.u_a > 0.0 else math.inf for v in values])  # of the whole u
     few = np.where(np.isfinite(nu), 1.0 / nu, 0.0)
@@ -142,8 +142,8 @@ def agree(values: Sequence[Value]) -> Agreement:
     of_a = float(np.sum(w * w * u_a2)) * meier
     square = meier / total
     u_a = math.sqrt(of_a)
-    each = np.array([(a * wi * wi) ** 2 / v.dof for a, wi, v in zip(u_a2, w, values, strict=True)])
-    dof = float(np.sum(w * w * u_a2)) ** 2 / float(np.sum(each)) if np.sum(each) > 0.0 else math.inf
+    terms = np.array([(a * wi * wi) ** 2 / v.dof for a, wi, v in zip(u_a2, w, values, strict=True)])
+    dof = float(np.sum(w * w * u_a2)) ** 2 / float(np.sum(terms)) if np.sum(terms) > 0.0 else math.inf
     k = float(special.stdtrit(dof, 0.975)) if math.isfinite(dof) else NORMAL
     U = math.sqrt((k * u_a) ** 2 + NORMAL**2 * max(square - of_a, 0.0))
     return Agreement(
@@ -177,6 +177,6 @@ def outlier(values: Sequence[Value], level: float = LEVEL) -> tuple[str, float] 
     """
     if len(values) < 3:
         return None
-    left = [(v.label, agree([o for o in values if o is not v]).p) for v in values]
-    cured = [(label, p) for label, p in left if p >= level]
+    p_without = [(v.label, agree([o for o in values if o is not v]).p) for v in values]
+    cured = [(label, p) for label, p in p_without if p >= level]
     return cured[0] if len(cured) == 1 else None

@@ -66,15 +66,15 @@ def _shown(c: Coefficient) -> Compared:
 
 def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
     """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
-    each: list[tuple[Compared, str]] = []
+    reported: list[tuple[Compared, str]] = []
     for label, result in results.items():
         for c in result.coefficients:
             new = _shown(c)
-            if not any(_same(new.combination, q.combination) for q, _ in each):
-                each.append((new, label))
-    names = [q.name for q, _ in each]
-    found = [  # ω_d in one attitude, and in another
-        q if names.count(q.name) == 1 else replace(q, name=f"{q.name}, {label}") for q, label in each
+            if not any(_same(new.combination, q.combination) for q, _ in reported):
+                reported.append((new, label))
+    names = [q.name for q, _ in reported]
+    named = [  # ω_d in one attitude, and in another
+        q if names.count(q.name) == 1 else replace(q, name=f"{q.name}, {label}") for q, label in reported
     ]
     place = {n: k for k, n in enumerate((*drift.NAMES, *drift.NAMES_2DOF["x"], *drift.NAMES_2DOF["y"]))}
 
@@ -83,7 +83,7 @@ def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
         first = place.get(next(iter(q.combination)), len(place))
         return (0 if plain and first < len(place) else 1 if not plain else 2, first)
 
-    return sorted(found, key=rank)
+    return sorted(named, key=rank)
 
 
 def weights(quantity: Compared, result: DriftTestResult) -> Array | None:
@@ -109,10 +109,14 @@ def value(label: str, quantity: Compared, result: DriftTestResult, shared: Colle
     c = weights(quantity, result)
     if c is None:
         return None
-    each = result.coefficients
+    coefficients = result.coefficients
     used = np.flatnonzero(c)
-    u_a = np.array([e.u if e.u_a is None else e.u_a for e in each])
-    rho = np.array(result.correlation, dtype=float) if len(result.correlation) == len(each) else np.eye(len(each))
+    u_a = np.array([e.u if e.u_a is None else e.u_a for e in coefficients])
+    rho = (
+        np.array(result.correlation, dtype=float)
+        if len(result.correlation) == len(coefficients)
+        else np.eye(len(coefficients))
+    )
     v = c * u_a
     square = float(v @ rho @ v)
     u_b = 0.0
@@ -123,13 +127,13 @@ def value(label: str, quantity: Compared, result: DriftTestResult, shared: Colle
             common[b["source"]] = np.append(common.get(b["source"], np.zeros(0)), change)
         else:
             u_b = math.hypot(u_b, float(np.linalg.norm(change)))
-    known = [each[j].truth for j in used]
+    known = [coefficients[j].truth for j in used]
     truth = None
     if all(t is not None for t in known):
-        truth = sum(float(c[j]) * float(each[j].truth or 0.0) for j in used)
-    dof = min((each[j].dof or math.inf for j in used), default=math.inf)
-    name = each[used[0]].name if used.size == 1 else ""
-    estimate = float(c @ np.array([e.estimate for e in each]))
+        truth = sum(float(c[j]) * float(coefficients[j].truth or 0.0) for j in used)
+    dof = min((coefficients[j].dof or math.inf for j in used), default=math.inf)
+    name = coefficients[used[0]].name if used.size == 1 else ""
+    estimate = float(c @ np.array([e.estimate for e in coefficients]))
     return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
 
 

@@ -76,18 +76,20 @@ class Compare:
         """Which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
-        far = [f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0]
+        significant = [
+            f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0
+        ]
         if not self.disagree:
-            return f"consistent; E_n > 1: {', '.join(far)}" if far else "consistent"
-        off = consistency.outlier(self.values)
-        if off is not None:
-            others = consistency.agree([v for v in self.values if v.label != off[0]])
-            mine = next(v for v in self.values if v.label == off[0])
-            apart = mine.estimate - others.mean
-            size = f"{apart:+.2g} {self.quantity.unit}".replace("-", "−")
-            return f"{off[0]} deviates by {size}; the others are consistent (p = {off[1]:.2g})"
-        which = "; the deviating method cannot be identified" if len(self.values) < 3 or len(far) < 2 else ""
-        return f"inconsistent: {', '.join(f'E_n of {x}' for x in far) or 'no single pair'}{which}"
+            return f"consistent; E_n > 1: {', '.join(significant)}" if significant else "consistent"
+        outlier = consistency.outlier(self.values)
+        if outlier is not None:
+            others = consistency.agree([v for v in self.values if v.label != outlier[0]])
+            deviating = next(v for v in self.values if v.label == outlier[0])
+            deviation = deviating.estimate - others.mean
+            size = f"{deviation:+.2g} {self.quantity.unit}".replace("-", "−")
+            return f"{outlier[0]} deviates by {size}; the others are consistent (p = {outlier[1]:.2g})"
+        which = "; the deviating method cannot be identified" if len(self.values) < 3 or len(significant) < 2 else ""
+        return f"inconsistent: {', '.join(f'E_n of {x}' for x in significant) or 'no single pair'}{which}"
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[Compare]:
@@ -96,8 +98,8 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
     out = []
     for q in estimable_combinations.quantities(results):
-        seen = [estimable_combinations.value(label, q, r, shared) for label, r in results.items()]
-        values = tuple(v for v in seen if v is not None)
+        candidates = [estimable_combinations.value(label, q, r, shared) for label, r in results.items()]
+        values = tuple(v for v in candidates if v is not None)
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
         out.append(Compare(q, values, consistency.agree(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
@@ -115,7 +117,7 @@ def common(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> l
 
 def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
     """Why the results are not of one instrument, as sentences."""
-    found = []
+    sentences = []
     families: dict[str, list[str]] = {}
     for label, r in results.items():
         names = {n for c in r.coefficients for n in estimable_combinations.combination(c)}
@@ -123,24 +125,24 @@ def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
             if names & set(known):
                 families.setdefault(family, []).append(label)
     if len(families) > 1:
-        said = "; ".join(f"{', '.join(labels)}: of a {family}" for family, labels in families.items())
-        found.append(f"{said}; a suite compares tests of one gyro, so leave out the tests of one of the two")
+        text = "; ".join(f"{', '.join(labels)}: of a {family}" for family, labels in families.items())
+        sentences.append(f"{text}; a suite compares tests of one gyro, so leave out the tests of one of the two")
     kinds = {kind: [n for n, r in results.items() if r.simulated is kind] for kind in (True, False)}
     if all(kinds.values()):
-        found.append(f"{', '.join(kinds[True])}: simulated; {', '.join(kinds[False])}: measured; not of one gyro")
+        sentences.append(f"{', '.join(kinds[True])}: simulated; {', '.join(kinds[False])}: measured; not of one gyro")
     named: dict[str, list[str]] = {}
     for label, r in results.items():
         if r.instrument and not r.simulated:
             named.setdefault(r.instrument, []).append(label)
     if len(named) > 1:
-        said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in named.items())
-        found.append(f"tests of different instruments: {said}")
-    return found
+        text = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in named.items())
+        sentences.append(f"tests of different instruments: {text}")
+    return sentences
 
 
 def differences(results: Mapping[str, DriftTestResult], slots: Sequence[str] = ("gyro", "accelerometer")) -> list[str]:
     """Where the simulated instrument was not the same in all tests, as sentences."""
-    said: dict[str, dict[str, list[str]]] = {}
+    by_name: dict[str, dict[str, list[str]]] = {}
     for label, r in results.items():
         run = RunDocument.model_validate(r.provenance)
         for slot in slots:
@@ -153,8 +155,8 @@ def differences(results: Mapping[str, DriftTestResult], slots: Sequence[str] = (
                 if n.startswith(f"{slot}.") and not n.endswith((".seed", ".mount"))
             }
             for name, value in facts.items():
-                said.setdefault(name, {}).setdefault(value, []).append(label)
-    several = {n: values for n, values in said.items() if len(values) > 1}
+                by_name.setdefault(name, {}).setdefault(value, []).append(label)
+    several = {n: values for n, values in by_name.items() if len(values) > 1}
     return [
         f"Not the same in all tests: {n} = " + "; ".join(f"{v} in {', '.join(who)}" for v, who in values.items()) + "."
         for n, values in several.items()
@@ -173,8 +175,8 @@ def combine_methods(
     results = {label: m.result for label, m in members.items()}
     if not results:
         raise ReductionError("no test of the suite has a result")
-    if wrong := problems(results):
-        raise ReductionError(wrong)
+    if reasons := problems(results):
+        raise ReductionError(reasons)
     compared = compare(results, shared)
     coefficients = [_coefficient(c, specification or {}) for c in compared]
     first = next(iter(results.values()))
@@ -277,13 +279,13 @@ def _member(label: str, m: Member) -> dict[str, Any]:
 
 def _consistency(compared: Sequence[Compare]) -> dict[str, Any]:
     tested = [c for c in compared if c.p is not None]
-    bad = [c for c in tested if c.disagree]
+    inconsistent = [c for c in tested if c.disagree]
     pairs = [p for c in tested if c.found for p in c.found.pairs]
     return {
-        "consistency": "inconsistent" if bad else "consistent" if tested else "not tested",
+        "consistency": "inconsistent" if inconsistent else "consistent" if tested else "not tested",
         "p": min((c.p for c in tested if c.p is not None), default=None),
         "tested": len(tested),
-        "disagreeing": [c.quantity.name for c in bad],
+        "disagreeing": [c.quantity.name for c in inconsistent],
         "pairs_apart": sum(p.E_n > 1.0 for p in pairs),
     }
 
@@ -315,12 +317,12 @@ def _warnings(
             "The tests were made at different site values, stated with each test. Where gravity differs, the "
             "contribution of D_OO to the combinations differs too."
         )
-    own = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
-    if own:
-        out.append(f"Tests with warnings, stated with each test: {', '.join(own)}.")
-    lonely = [c.quantity.name for c in compared if len(c.values) == 1]
-    if lonely:
-        out.append(f"Determined by one method only and not confirmed by another: {', '.join(lonely)}.")
+    counts = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
+    if counts:
+        out.append(f"Tests with warnings, stated with each test: {', '.join(counts)}.")
+    single = [c.quantity.name for c in compared if len(c.values) == 1]
+    if single:
+        out.append(f"Determined by one method only and not confirmed by another: {', '.join(single)}.")
     negative = [c.quantity.name for c in compared if c.found is not None and min(c.found.weights) < 0.0]
     if negative:
         out.append(
