@@ -5,9 +5,12 @@ from __future__ import annotations
 import functools
 import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import fmpy
+import lark
 import pytest
 from toybench import FORMS, HEAD, PARTS, TARGETS, TOYS
 
@@ -23,6 +26,27 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("target", TARGETS)
     if "form" in metafunc.fixturenames:
         metafunc.parametrize("form", FORMS)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def parser_with_a_memory() -> Iterator[None]:
+    """FMPy's validation parses the name of every variable of an FMU, which takes seconds; most stand in three FMUs."""
+    parse = lark.Lark.parse
+
+    @functools.cache
+    def once(grammar: str, text: str, parser: SameParser) -> Any:
+        return parse(parser.lark, text)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lark.Lark, "parse", lambda self, text: once(self.source_grammar, text, SameParser(self)))
+        yield
+
+
+@dataclass(frozen=True)
+class SameParser:
+    """A parser that counts as equal to any other: its grammar is part of the key."""
+
+    lark: Any = field(compare=False)
 
 
 @pytest.fixture(scope="session")
