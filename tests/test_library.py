@@ -224,7 +224,7 @@ MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
     "same names": (lambda r: gb.compare(r, r, names=["a", "a"]), "names must differ"),
     "coefficient": (lambda r: r.result["D_Z"], "D_Z: no such coefficient .* did you mean"),
     "number": (lambda r: r.result.array("mean"), "mean: no number of a coefficient"),
-    "table": (lambda r: r.record.frame("signals"), "there are: windows, channels"),
+    "table": (lambda r: r.record.frame("signals"), "available: windows, channels"),
 }
 
 

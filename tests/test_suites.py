@@ -200,13 +200,17 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
     with monkeypatch.context() as patch:
         patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         code, _, err = gyrobench(*run)
-    assert code == 130 and "the suite goes on with the same command and --resume" in err
+    assert code == 130 and "the same command with --resume continues the suite" in err
     assert not Path("s/result.json").exists() and not Record.load(Path("s/tumble_single_axis")).complete
     code, _, err = gyrobench("report", "s")
-    assert code == 2 and "did not end" in err
+    assert code == 2 and "the suite is not complete" in err
     first = Path("s/fixed_position/run.json").stat().st_mtime_ns
     code, _, err = gyrobench(*run, "--resume")
-    assert code == 0 and "fixed_position (1 of 2): kept" in err and "tumble_single_axis (2 of 2): goes on" in err
+    assert (
+        code == 0
+        and "fixed_position (1 of 2): already complete; kept" in err
+        and "tumble_single_axis (2 of 2): resuming" in err
+    )
     assert Path("s/fixed_position/run.json").stat().st_mtime_ns == first
     whole, stopped = (Record.load(f / "tumble_single_axis").windows for f in (done, Path("s")))
     assert all(whole[n].tolist() == stopped[n].tolist() for n in whole)
@@ -217,7 +221,7 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
     """A current limit that saturates: the reduction of this one test refuses, the report is of the others."""
     three = words(*PLANS, sets=("fixed_position.rebalance.i_max=1e-9",))
     code, out, err = gyrobench("run", NAME, *three, "--out", "s")
-    assert code == 3 and "fixed_position failed; the report in s is of the others" in err
+    assert code == 3 and "fixed_position failed; the report in s covers the others" in err
     found = result(Path("s"))
     assert [m["label"] for m in found["suite"]["members"]] == ["tumble_single_axis", "servo_vertical_level"]
     assert found["suite"]["failed"][0]["label"] == "fixed_position"
@@ -226,7 +230,7 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
     assert Record.load(Path("s/fixed_position")).complete  # what it recorded is there
     assert "methods: " in out
     code, _, err = gyrobench("run", NAME, *three, "--out", "s", "--resume")  # nothing runs again
-    assert code == 3 and "fixed_position (2 of 3): is reduced again" in err and err.count(": kept as it is") == 2
+    assert code == 3 and "fixed_position (2 of 3): reducing again" in err and err.count(": already complete; kept") == 2
 
 
 # ------------------------------------------------------------------------------------------- refusals
@@ -244,7 +248,7 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
         (["export", NAME, "--to", "ssp"], "is a suite"),
         (["reduce", NAME, "--template"], "reduce each record by its own test"),
         (["reduce", NAME, "--data", "a"], "name two runs or more"),
-        (["reduce", NAME, "--data", "a", "--data", "b"], "a: no result.json there"),
+        (["reduce", NAME, "--data", "a", "--data", "b"], "a: no result.json"),
         (["reduce", NAME, "--data", "a", "--data", "b", "--set", "gyro.D_I=1"], "the tests have been run"),
         (["reduce", "fixed_position", "--data", "a", "--data", "b"], "one record at a time"),
     ],

@@ -39,7 +39,7 @@ REFUSED = [
     ),
     ([*POWER, "--set", "K_m=-5"], "K_m = -5: must be >= 0 N.m/rad\n"),
     ([*POWER, "--set", "profile=unsorted.csv"], "row 4: time = 0.5 s does not come after 1 s (row 3)"),
-    ([*POWER, "--set", "profile=gap.csv"], "row 3, column 'roll': '' is no finite number"),
+    ([*POWER, "--set", "profile=gap.csv"], "row 3, column 'roll': '' is not a finite number"),
     ([*POWER, "--set", "profile=bare.csv"], "column 'time': no unit; write 'time [s]'"),
     ([*POWER, "--set", "profile=metre.csv"], "column 'roll': wrong unit [m]: units that fit: rad"),
     ([*PLATFORM, "--set", "platform.J=0"], "platform does not start: parameter J = 0 kg.m2 must be > 0"),
@@ -120,10 +120,10 @@ def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
     reduce = ["reduce", "torquer_scale_factor", "--data", "t.csv"]
     head = "current [mA];rate_plus [deg/h];rate_minus [deg/h]\n"
     for data, message in (
-        (("# operator = M\xfcller\n" + head).encode("latin-1"), "row 1: no UTF-8 text; save the table as CSV (UTF-8)"),
-        ((head + "1;17\n").encode("utf-16"), "row 1: no UTF-8 text"),
-        ((head + "1,5;17;17\n").encode(), "'1,5' is no finite number; the decimal sign is a point"),
-        ((head + "1;17\n" * 30).encode(), "row 9: 2 cells, the header has 3\n  - and 22 rows more\n"),
+        (("# operator = M\xfcller\n" + head).encode("latin-1"), "row 1: not UTF-8 text; save the table as CSV (UTF-8)"),
+        ((head + "1;17\n").encode("utf-16"), "row 1: not UTF-8 text"),
+        ((head + "1,5;17;17\n").encode(), "'1,5' is not a finite number; the decimal sign is a point"),
+        ((head + "1;17\n" * 30).encode(), "row 9: 2 cells, the header has 3\n  - and 22 more rows\n"),
     ):
         Path("t.csv").write_bytes(data)
         code, out, err = gyrobench(*reduce)

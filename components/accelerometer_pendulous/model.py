@@ -72,7 +72,7 @@ class AccelerometerPendulous(Component):
     rate = State(0.0, "rad/s", "its rate")
     q = State(0.0, "rad.s", "integral of the angle")
 
-    excess = Discrete(0.0, "A", "current wished for beyond the limit, at the start of the internal step")
+    excess = Discrete(0.0, "A", "current command beyond the limit, at the start of the internal step")
     blocked = Discrete(0.0, "rad", "angle that is not integrated (limit reached, th pushes further), likewise")
 
     def start(self) -> None:
@@ -84,7 +84,7 @@ class AccelerometerPendulous(Component):
         self.limit()
 
     def command(self) -> Number:
-        """Return the current that the rebalance asks for, without its limit."""
+        """Return the current command of the rebalance, without its limit."""
         return self.K_p * self.angle + self.K_i * self.q
 
     def limit(self) -> None:

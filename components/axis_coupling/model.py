@@ -5,7 +5,7 @@ from gyrobench.component.math import cos, fabs
 
 
 class AxisCoupling(Component):
-    """What the two axes of a servo table need of each other: secant gain, common readiness, stop before gimbal lock.
+    """Coupling of the two axes of a servo table: secant gain, common readiness, stop before gimbal lock.
 
         u_outer = u / cos(angle)                    pickoff about gyro x, for the servo of the outer axis
         in_position = 1 while both axes are ready

@@ -7,7 +7,7 @@ ZERO = [0.0, 0.0, 0.0]
 
 
 class AxisWobble(Component):
-    """Wobble of the axis of a turntable: what the table's base feels.  [ch. 5.4; as in table_two_axis]
+    """Wobble of the axis of a turntable: rate and specific force of the table's base.  [ch. 5.4; as in table_two_axis]
 
         v = R_m(q2) R_j(q1) v_base,   q1 = amplitude cos(order angle + phase),  q2 = amplitude sin(order angle + phase)
 
@@ -15,7 +15,7 @@ class AxisWobble(Component):
     take up q1', q2'.  The part stands before the table: `f`, `omega` go to its f_local, omega_local, its `angle` comes
     back.  q1, q2 follow the angle at the end of a step, their rates are means over it, so that their integral is exact.
 
-    Not modelled: wobble that is no single harmonic, runout (shift of the axis), angular acceleration.
+    Not modelled: wobble that is not a single harmonic, runout (shift of the axis), angular acceleration.
     Source: TABLE-PRESETS (wobble 0.25 to 5 arcsec); Hu 1981, section 5.4.
     """
 

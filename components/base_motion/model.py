@@ -130,9 +130,9 @@ class BaseMotion(Component):
             return vector([vector(ZEROS), vector(ZEROS)])
         before = self.profile_t[index(k)] - self.profile_t[index(k - 1.0)]
         after = self.profile_t[index(k + 1.0)] - self.profile_t[index(k)]
-        left = (self.profile[index(k)] - self.profile[index(k - 1.0)]) / before
-        right = (self.profile[index(k + 1.0)] - self.profile[index(k)]) / after
-        return vector([(left * after + right * before) / (before + after), 2.0 * (right - left) / (before + after)])
+        s0 = (self.profile[index(k)] - self.profile[index(k - 1.0)]) / before
+        s1 = (self.profile[index(k + 1.0)] - self.profile[index(k)]) / after
+        return vector([(s0 * after + s1 * before) / (before + after), 2.0 * (s1 - s0) / (before + after)])
 
     def wave(self, amplitude: Number, rate: Number, phase: Number) -> Vector:
         """Return a sine at the present instant and its two derivatives."""
@@ -173,14 +173,14 @@ class BaseMotion(Component):
             else:  # quintic between two points, of their slopes and curvatures
                 d = self.profile_t[index(self.piece + 1.0)] - self.profile_t[index(self.piece)]
                 x = (self.t - self.profile_t[index(self.piece)]) / d
-                here = self.parabola(self.piece)
-                there = self.parabola(self.piece + 1.0)
+                start = self.parabola(self.piece)
+                end = self.parabola(self.piece + 1.0)
                 p0 = vector(self.profile[index(self.piece)])
-                p1 = here[0] * d
-                p2 = 0.5 * here[1] * d * d
+                p1 = start[0] * d
+                p2 = 0.5 * start[1] * d * d
                 rise = self.profile[index(self.piece + 1.0)] - p0 - p1 - p2
-                bend = there[0] * d - p1 - 2.0 * p2
-                kink = 0.5 * there[1] * d * d - p2
+                bend = end[0] * d - p1 - 2.0 * p2
+                kink = 0.5 * end[1] * d * d - p2
                 p3 = 10.0 * rise - 4.0 * bend + kink
                 p4 = -15.0 * rise + 7.0 * bend - 2.0 * kink
                 p5 = 6.0 * rise - 3.0 * bend + kink

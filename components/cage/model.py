@@ -10,7 +10,7 @@ class Cage(Component):
     """Electrical caging: the torquer holds the float near its zero while the gyro does not hold the table.
 
         i = K_p u limited to +-i_max        while mode is not 3 (servo)
-        i = 0                               in mode 3: the torquer is idle, as a servo test wants it
+        i = 0                               in mode 3: the torquer is idle, as a servo test requires
 
     With u = K_sg b and the precession -k i of the torquer, b' = (H / C) (omega_IA - omega_d - k i): the float follows
     with the rate (H / C) K_sg k K_p, 100 1/s with the default sizes, and stands off by (omega_IA - omega_d) over it.
@@ -33,6 +33,6 @@ class Cage(Component):
     saturated = Output("1", "1 while the current is limited")
 
     def outputs(self) -> None:
-        wish = 0.0 if self.mode == SERVO else self.K_p * self.u
-        self.i = clip(wish, -self.i_max, self.i_max)
-        self.saturated = 1.0 if self.i != wish else 0.0
+        unlimited = 0.0 if self.mode == SERVO else self.K_p * self.u
+        self.i = clip(unlimited, -self.i_max, self.i_max)
+        self.saturated = 1.0 if self.i != unlimited else 0.0

@@ -14,9 +14,9 @@ class ErectionController(Component):
         law 0, liquid switches: law = H rate sign(e) outside the dead zone, else 0
         law 1, linear:          law = H gain e, limited to +-H rate
 
-    A torque about the same axis as the tilt (cross = 0) turns the rotor round a cone and never brings it home.
+    A torque about the same axis as the tilt (cross = 0) moves the rotor around a cone and never erects it.
 
-    Cut-off: the switches follow the specific force and cannot tell acceleration from tilt.  The channel of e_x opens
+    Cut-off: the switches follow the specific force and cannot distinguish acceleration from tilt.  Channel e_x opens
     while |f_y| > a_cut, that of e_y while |f_x| > a_cut, both while |turn| > turn_cut; then only free drift is left.
     Fast start: until t = fast_time the rate is `fast` times as large and nothing is cut off.
 
@@ -64,9 +64,9 @@ class ErectionController(Component):
         self.refuse(
             size < 0.5 * 9.80665, "the specific force is below 0.5 g: there is no apparent vertical to erect to"
         )
-        far = fabs(self.e_x) > 60.0 * DEG or fabs(self.e_y) > 60.0 * DEG
+        tilted = fabs(self.e_x) > 60.0 * DEG or fabs(self.e_y) > 60.0 * DEG
         self.refuse(
-            far and self.t >= self.fast_time,
+            tilted and self.t >= self.fast_time,
             "the rotor leans more than 60 deg (e_x = {e_x}, e_y = {e_y} rad): give a fast start, fast_time > 0 s",
         )
 

@@ -21,7 +21,7 @@ class EstimatorKalmanRate(KalmanEstimator):
     and with valid = 0 only the first line: the reading is missing.  nis = y2/S; variance = P_11 of the estimate.
     q = 0.1 ... 0.5 suits BENCH-DYN-SINE: a rate of 1 Hz and 0.01 under noise of 1.643e-3 at 1 kHz (units of z).
 
-    Not modelled: a bias.  Rate and drift cannot be told apart from one gyro: a bias state needs a reference.
+    Not modelled: a bias.  Rate and drift are not separable with one gyro: a bias state needs a reference.
     Source: EST-KF-GEN, EST-KF-AR; Xia 2008, eq. 4.2.1-4.2.18; the model is our own.
     """
 

@@ -27,8 +27,8 @@ class EstimatorSageHusa(KalmanEstimator):
     H P H' with P after the update in form 1 makes R 9 % (R = 4 Q) to 59 % (R = Q) too large; K (y - H x-) subtracts
     the prediction twice and destroys a real signal.
 
-    Q is not adapted: Q and R cannot both be told from the innovations.  Where R is constant and known, the plain filter
-    is never worse.
+    Q is not adapted: Q and R are not both estimable from the innovations.  Where R is constant and known, the plain
+    filter is never worse.
 
     Not modelled: adaptation of Q, of a mean, more than one reading at a time.
     Source: EST-SAGE-HUSA; Xia 2008, eq. 4.2.19 (corrected).
@@ -149,10 +149,10 @@ class EstimatorSageHusa(KalmanEstimator):
                 self.power = self.power * self.b
                 d = (1.0 - self.b) / (1.0 - self.power)
                 residual = self.z - self.x[0]
-                seen = residual * residual + self.P[0][0]
+                R_sample = residual * residual + self.P[0][0]
                 if self.form == PRIOR:
-                    seen = self.y * self.y - before
-                self.R = (1.0 - d) * self.R + d * seen
+                    R_sample = self.y * self.y - before
+                self.R = (1.0 - d) * self.R + d * R_sample
                 held = maximum(self.R, self.R_min * self.R0)
                 if held > self.R:
                     self.clips = self.clips + 1.0

@@ -166,13 +166,13 @@ class Exciter(Component):
             if self.stage == OPEN:
                 x = f * (self.t - self.t_ref)
                 back = f * (self.dwell[index(self.now - 1.0)] - (self.t - self.t_ref))
-                way = 1.0
+                sense = 1.0
                 if back < 1.0:
                     x = back
-                    way = -1.0
+                    sense = -1.0
                 x = clip(x, 0.0, 1.0)
                 y = x - sin(2.0 * pi * x) / (2.0 * pi)
-                v = way * f * (1.0 - cos(2.0 * pi * x))
+                v = sense * f * (1.0 - cos(2.0 * pi * x))
                 a = 2.0 * pi * f * f * sin(2.0 * pi * x)
         size = self.amplitudes[index(self.now - 1.0)]
         if self.stage == DONE:

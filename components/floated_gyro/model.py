@@ -85,7 +85,7 @@ class FloatedGyro(SdfGyro):
         n = self.terms
         self.refuse(
             not (n == 3.0 or n == 4.0 or n == 5.0 or n == 8.0 or n == 9.0 or n == 10.0),
-            "terms = {terms} is no static model: it must be 3, 4, 5, 8, 9 or 10",
+            "terms = {terms} is not a static model: it must be 3, 4, 5, 8, 9 or 10",
         )
         self.refuse(n < 4.0 and self.D_IS != 0.0, "D_IS must be 0 with terms = {terms} (from 4 on)")
         self.refuse(n < 5.0 and self.D_II != 0.0, "D_II must be 0 with terms = {terms} (from 5 on)")

@@ -31,13 +31,13 @@ class Gyro2dof(Component):
     outside it must be 0.  x channel: 8 = 0, x, z, xx, zz, xy, yz, xz; 9 = 8 + y; 10 = 9 + yy.  y channel: the same with
     x and y exchanged.  Gauss-Markov and noise as in floated_gyro, each channel its own.
 
-    Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses at once).  p, q = inertial rates of the rotor axis:
+    Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses without lag).  p, q: inertial rates of rotor axis:
 
         J_x p' = -H q - C_x (p - omega_x) + T_x + M_x,     T_x = +H (omega_dy + k_x i_x (1 + ...))
         J_y q' = +H p - C_y (q - omega_y) + T_y + M_y,     T_y = -H (omega_dx + k_y i_y (1 + ...))
         psi_x' = p - omega_x + omega_z psi_y,              psi_y' = q - omega_y - omega_z psi_x
 
-    undamped frequency H / sqrt(J_x J_y).  p and q are inertial: an angular acceleration of the case is no input.
+    undamped frequency H / sqrt(J_x J_y).  p and q are inertial: an angular acceleration of the case is not an input.
     M_x, M_y are torques from outside on outer and inner gimbal (without nutation they precess: M_x / H, -M_y / H).
 
     Gimbals at full size, full = 1: a platform on the outer gimbal (power gyro, J_x with the load) [STAB-POWER-2DOF].
@@ -147,14 +147,14 @@ class Gyro2dof(Component):
         n = self.terms_x
         self.refuse(
             not (n == 8.0 or n == 9.0 or n == 10.0),
-            "terms_x = {terms_x} is no static model of a channel: it must be 8, 9 or 10",
+            "terms_x = {terms_x} is not a static model of a channel: it must be 8, 9 or 10",
         )
         self.refuse(n < 9.0 and self.Dx_y != 0.0, "Dx_y must be 0 with terms_x = {terms_x} (from 9 on)")
         self.refuse(n < 10.0 and self.Dx_yy != 0.0, "Dx_yy must be 0 with terms_x = {terms_x} (from 10 on)")
         n = self.terms_y
         self.refuse(
             not (n == 8.0 or n == 9.0 or n == 10.0),
-            "terms_y = {terms_y} is no static model of a channel: it must be 8, 9 or 10",
+            "terms_y = {terms_y} is not a static model of a channel: it must be 8, 9 or 10",
         )
         self.refuse(n < 9.0 and self.Dy_x != 0.0, "Dy_x must be 0 with terms_y = {terms_y} (from 9 on)")
         self.refuse(n < 10.0 and self.Dy_xx != 0.0, "Dy_xx must be 0 with terms_y = {terms_y} (from 10 on)")

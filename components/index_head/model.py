@@ -83,11 +83,11 @@ class IndexHead(AxisTable):
             "mode = {mode} must be 0 hold or 1 index: an indexing head does not turn at a rate",
         )
         if self.mode == 1.0 and self.part == 1.0:
-            wish = floor(self.target / self.pitch + 0.5)
+            position = floor(self.target / self.pitch + 0.5)
             if self.number == 0.0:
                 self.refuse(
-                    fabs(self.target - wish * self.pitch) > 1e-4,
-                    "target {target} rad is none of the {positions} positions of the head: it must be a multiple of "
+                    fabs(self.target - position * self.pitch) > 1e-4,
+                    "target {target} rad is not one of the {positions} positions of the head: it must be a multiple of "
                     "{pitch} rad",
                 )
             else:
@@ -96,12 +96,12 @@ class IndexHead(AxisTable):
                     "number = {number} must be 1 to {positions}, or 0 for the position at the target",
                 )
                 turns = floor((self.goal - (self.number - 1.0)) / self.positions + 0.5)
-                wish = self.number - 1.0 + turns * self.positions
-            if wish != self.goal:
+                position = self.number - 1.0 + turns * self.positions
+            if position != self.goal:
                 self.read_from = self.goal * self.pitch
-                self.goal = wish
+                self.goal = position
                 self.x_from = self.x
-                self.x_to = wish * self.pitch + self.error[index(self.place())] + self.noise.repeat
+                self.x_to = position * self.pitch + self.error[index(self.place())] + self.noise.repeat
                 self.short = sign(self.x_to - self.x_from) * self.creep
                 self.t_from = self.t_last
                 self.t_move = 1.5 * fabs(self.x_to - self.x_from) / self.index_rate
@@ -109,18 +109,18 @@ class IndexHead(AxisTable):
         self.arrived = 0.0
         if s < self.t_move:
             s = s / self.t_move
-            way = self.x_to - self.short - self.x_from
+            distance = self.x_to - self.short - self.x_from
             self.part = s * s * (3.0 - 2.0 * s)
-            self.x = self.x_from + way * self.part
-            self.v = way * 6.0 * s * (1.0 - s) / self.t_move
-            self.a = way * (6.0 - 12.0 * s) / (self.t_move * self.t_move)
+            self.x = self.x_from + distance * self.part
+            self.v = distance * 6.0 * s * (1.0 - s) / self.t_move
+            self.a = distance * (6.0 - 12.0 * s) / (self.t_move * self.t_move)
         else:
             self.part = 1.0
-            rest = self.short * exp((self.t_move - s) / self.settling)
-            self.x = self.x_to - rest
-            self.v = rest / self.settling
+            residual = self.short * exp((self.t_move - s) / self.settling)
+            self.x = self.x_to - residual
+            self.v = residual / self.settling
             self.a = -self.v / self.settling
-            self.arrived = 1.0 if fabs(rest) < self.tolerance else 0.0
+            self.arrived = 1.0 if fabs(residual) < self.tolerance else 0.0
         self.t_last = self.t
 
     def place(self) -> Number:

@@ -70,7 +70,7 @@ class Manoeuvre(Component):
         self.q[3] = ch * sp * sr + sh * cp * cr
 
     def open(self) -> Number:
-        """How much of the row acts."""
+        """Return the factor by which the row acts, 0 while the gate is closed."""
         on = 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
         f = self.frequency[index(clip(self.phase - 1.0, 0.0, 98.0))]
         return on * sin(2.0 * pi * f * (self.t - self.opened)) if f > 0.0 else on
@@ -79,14 +79,14 @@ class Manoeuvre(Component):
         k = clip(self.phase - 1.0, 0.0, 98.0)
         on = self.open()
         z = on * self.turn[index(k)]
-        own = on * self.yaw[index(k)]
+        yaw = on * self.yaw[index(k)]
         x = on * self.pitch[index(k)]
         y = on * self.roll[index(k)]
         # q' = (turn in ENU axes, from the left, and pitch, roll, yaw in vehicle axes, from the right) / 2
-        self.der.q[0] = 0.5 * (-(z + own) * self.q[3] - x * self.q[1] - y * self.q[2])
-        self.der.q[1] = 0.5 * ((own - z) * self.q[2] + x * self.q[0] - y * self.q[3])
-        self.der.q[2] = 0.5 * ((z - own) * self.q[1] + x * self.q[3] + y * self.q[0])
-        self.der.q[3] = 0.5 * ((z + own) * self.q[0] - x * self.q[2] + y * self.q[1])
+        self.der.q[0] = 0.5 * (-(z + yaw) * self.q[3] - x * self.q[1] - y * self.q[2])
+        self.der.q[1] = 0.5 * ((yaw - z) * self.q[2] + x * self.q[0] - y * self.q[3])
+        self.der.q[2] = 0.5 * ((z - yaw) * self.q[1] + x * self.q[3] + y * self.q[0])
+        self.der.q[3] = 0.5 * ((z + yaw) * self.q[0] - x * self.q[2] + y * self.q[1])
 
     @sampled(every=1)
     def tick(self) -> None:

@@ -40,7 +40,7 @@ class PlatformFourGimbal(RateServoGimbals):
         80.0 * pi / 180.0, "rad", "pitch below which a locked fourth gimbal is released", above=0.0, below=pi / 2.0
     )
     launch = Parameter(0, int, "1: starts with the fourth gimbal locked", min=0, max=1)
-    allow_vertical = Parameter(0, int, "1: any gain at pitch 90 deg, 0: refuses all but the sign", min=0, max=1)
+    allow_vertical = Parameter(0, int, "1: any gain allowed at pitch 90 deg, 0: only the sign", min=0, max=1)
     g2_stop = Parameter(60.0 * pi / 180.0, "rad", "stop of the inner roll gimbal", above=0.0, below=pi / 2.0)
     theta_4_0 = Parameter(0.0, "rad", "angle of the fourth gimbal at the start")
 

@@ -12,14 +12,14 @@ class PlatformSingleAxis(Component):
 
         p' = n k_t i + M_load + M_gyro + M_bearing + M_unbalance + n (n - 1) J_motor alpha_b1
         w  = (p - h_gyro) / (J + n2 J_motor)      theta' = S      attitude' = w
-        L i' = v - R i - k_e n S                  |v| <= v_max, |i| <= i_max;   L = 0: i at once
+        L i' = v - R i - k_e n S                  |v| <= v_max, |i| <= i_max;   L = 0: i without lag
 
     p is the momentum of platform and gyro, so that a gyro wired by h_gyro = H sin b couples without delay in p; a gyro
     wired by M_gyro acts as a torque.  +v turns the platform towards +x.  Unbalance -(u x f)_x, u = mass times offset.
 
     Bearing: viscous friction and an elastic contact that slips (Prandtl element): the contact torque is the spring
-    stiction / presliding times the way from an anchor, with damping 0.5; beyond stiction the anchor is dragged along
-    with the Coulomb torque `friction` until the motion turns round.  At rest nothing creeps; the torque is limited
+    stiction / presliding times the angle from an anchor, with damping 0.5; beyond stiction the anchor is dragged along
+    with the Coulomb torque `friction` until the motion reverses.  At rest nothing creeps; the torque is limited
     whatever the rate, and nothing in it is faster than sqrt(stiction / presliding / J).
 
     Not modelled: backlash and elasticity of the reducer, Stribeck curve, cogging, iron losses, end stops, motion of the
@@ -41,7 +41,7 @@ class PlatformSingleAxis(Component):
     k_t = Parameter(1.0, "N.m/A", "motor: torque constant", above=0.0)
     k_e = Parameter(1.0, "V.s/rad", "motor: back EMF constant", min=0.0)
     R = Parameter(2.0, "Ohm", "motor: resistance", above=0.0)
-    L = Parameter(4e-3, "Ohm.s", "motor: inductance (1 H = 1 Ohm.s); 0: current at once", min=0.0)
+    L = Parameter(4e-3, "Ohm.s", "motor: inductance (1 H = 1 Ohm.s); 0: current without lag", min=0.0)
     v_max = Parameter(48.0, "V", "largest voltage", above=0.0)
     i_max = Parameter(24.0, "A", "largest current", above=0.0)
     ratio = Parameter(1.0, "1", "reducer: turns of the motor for one of the platform, same sense", above=0.0)
@@ -114,8 +114,10 @@ class PlatformSingleAxis(Component):
     def bearing(self, slip: Number) -> Number:
         drag = self.viscous * slip
         if self.spring > 0.0:
-            way = self.angle - self.anchor
-            drag = drag + contact_torque(self.spring, self.rub, self.presliding, self.reach, way, slip, self.slipping)
+            deflection = self.angle - self.anchor
+            drag = drag + contact_torque(
+                self.spring, self.rub, self.presliding, self.reach, deflection, slip, self.slipping
+            )
         return -drag
 
     def unbalanced(self) -> Number:

@@ -35,7 +35,7 @@ class PlatformThreeAxis(Component):
     from the base, C_b^a = R3(azimuth) R1(pitch) R2(roll); rigid bodies with diagonal inertias about the common centre:
 
         M(q) q'' + b(q, q', omega_b, alpha_b) = k_t i + M_load + M_bearing + M_stop + (M_gyro and unbalance on the axes)
-        L i' = v - R i - k_e q'          |v| <= v_max, |i| <= i_max; an axis with L = 0: i at once
+        L i' = v - R i - k_e q'          |v| <= v_max, |i| <= i_max; an axis with L = 0: i without lag
 
     b by Newton-Euler: n = I alpha + omega x I omega of each body with q'' = 0, passed outwards; M by the same
     recursion, azimuth eliminated (q_a'' = t_a / I_az + sin(pitch) q_r''), then two equations.  Unbalance: n + u x f,
@@ -71,7 +71,7 @@ class PlatformThreeAxis(Component):
     k_e = Parameter(ONES, "V.s/rad", "motors: back EMF constants, A order", min=0.0)
     R = Parameter([2.0, 2.0, 2.0], "Ohm", "motors: resistances, A order", above=0.0)
     L = Parameter(
-        [4e-3, 4e-3, 4e-3], "Ohm.s", "motors: inductances, A order (1 H = 1 Ohm.s); 0: current at once", min=0.0
+        [4e-3, 4e-3, 4e-3], "Ohm.s", "motors: inductances, A order (1 H = 1 Ohm.s); 0: current without lag", min=0.0
     )
     v_max = Parameter([48.0, 48.0, 48.0], "V", "largest voltages, A order", above=0.0)
     i_max = Parameter([24.0, 24.0, 24.0], "A", "largest currents, A order", above=0.0)
@@ -112,9 +112,9 @@ class PlatformThreeAxis(Component):
     pitch = Discrete(0.0, "rad", "pitch, for messages")
 
     def start(self) -> None:
-        self.refuse(not rigid(self.I_r), "I_r is of no rigid body: no moment may exceed the sum of the others")
-        self.refuse(not rigid(self.I_f), "I_f is of no rigid body: no moment may exceed the sum of the others")
-        self.refuse(not rigid(self.I_a), "I_a is of no rigid body: no moment may exceed the sum of the others")
+        self.refuse(not rigid(self.I_r), "I_r is not of a rigid body: no moment may exceed the sum of the others")
+        self.refuse(not rigid(self.I_f), "I_f is not of a rigid body: no moment may exceed the sum of the others")
+        self.refuse(not rigid(self.I_a), "I_a is not of a rigid body: no moment may exceed the sum of the others")
         least = [0.0, 0.0, 0.0]
         inner = minimum(self.I_a[X], self.I_a[Y])
         least[PITCH] = self.I_f[X] + inner
@@ -155,9 +155,15 @@ class PlatformThreeAxis(Component):
             t[k] = self.k_t[k] * amps + self.M_load[k] - self.viscous[k] * self.dq[k]
             self.der.i[k] = motor_slope(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
             if self.rough == 1.0:
-                way = self.q[k] - self.anchor[k]
+                deflection = self.q[k] - self.anchor[k]
                 t[k] = t[k] - contact_torque(
-                    self.spring[k], self.rub[k], self.presliding, self.reach[k], way, self.dq[k], self.slipping[k]
+                    self.spring[k],
+                    self.rub[k],
+                    self.presliding,
+                    self.reach[k],
+                    deflection,
+                    self.dq[k],
+                    self.slipping[k],
                 )
         over = self.q[PITCH] - clip(self.q[PITCH], -self.pitch_stop, self.pitch_stop)
         if over != 0.0:

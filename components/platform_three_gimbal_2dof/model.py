@@ -35,7 +35,7 @@ class PlatformThreeGimbal2dof(RateServoGimbals):
     version = "1.0.0"
 
     mount = Parameter(0, int, "outer gimbal, 0: roll, 1: pitch", min=0, max=1)
-    allow_lock = Parameter(0, int, "1: goes on in gimbal lock, 0: refuses it", min=0, max=1)
+    allow_lock = Parameter(0, int, "1: continues in gimbal lock, 0: ends the run", min=0, max=1)
 
     omega = Output("rad/s", "inertial rate of the platform, platform axes", shape=(3,))
     alpha = Output("rad/s2", "its mean derivative over the step", shape=(3,))

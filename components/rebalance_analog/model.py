@@ -7,7 +7,7 @@ from gyrobench.component.math import clip, floor
 class RebalanceAnalog(Component):
     """Analogue torque rebalance of a floated gyro: PI with current limit.  [LOOP-REBALANCE, REBAL-ANALOG]
 
-        wish = K_p u + K_i q,   q' = u            i = wish limited to +-i_max
+        i = K_p u + K_i q limited to +-i_max,   q' = u
         q' = 0 while the limit is reached and u pushes further (conditional integration: no wind-up)
         i_read = i_flowed + noise, rounded to the resolution
 
@@ -52,9 +52,9 @@ class RebalanceAnalog(Component):
         self.flowed = self.present
 
     def flow(self) -> None:
-        wish = self.K_p * self.u + self.K_i * self.q
+        unlimited = self.K_p * self.u + self.K_i * self.q
         self.der.q = self.u
-        if (wish > self.i_max and self.u > 0.0) or (wish < -self.i_max and self.u < 0.0):
+        if (unlimited > self.i_max and self.u > 0.0) or (unlimited < -self.i_max and self.u < 0.0):
             self.der.q = 0.0
 
     @sampled(every=1)
@@ -63,10 +63,10 @@ class RebalanceAnalog(Component):
         self.present = clip(self.K_p * self.u + self.K_i * self.q, -self.i_max, self.i_max)
 
     def outputs(self) -> None:
-        wish = self.K_p * self.u + self.K_i * self.q
-        self.i = clip(wish, -self.i_max, self.i_max)
+        unlimited = self.K_p * self.u + self.K_i * self.q
+        self.i = clip(unlimited, -self.i_max, self.i_max)
         read = self.flowed + self.noise.meter
         if self.resolution > 0.0:
             read = self.resolution * floor(read / self.resolution + 0.5)
         self.i_read = read
-        self.saturated = 1.0 if self.i != wish else 0.0
+        self.saturated = 1.0 if self.i != unlimited else 0.0

@@ -22,7 +22,7 @@ class Sequencer(Component):
                 2 (rate phases; windows by angle) until |angle - angle_open| >= travel + window / 100
         close   GUARD further samples with the gate open
 
-    so that a sampler which sees gate or angle a sample late or early, or an encoder with a coarse quantum,
+    so that a sampler which receives gate or angle a sample late or early, or an encoder with a coarse quantum,
     still finds its last window complete: it counts windows from its own first open sample.  Times are
     differences of sample times t0 + k h, rounded to the nearest sample; nothing is accumulated.  A table that
     leaves its position while settling starts the settling anew.
@@ -140,8 +140,8 @@ class Sequencer(Component):
             self.waited = 0.0
         elif self.stage == OPEN:
             if self.modes[index(self.now - 1.0)] == 2.0:
-                far = self.travel[index(self.now - 1.0)] + 0.01 * self.windows[index(self.now - 1.0)]
-                if fabs(self.angle - self.angle_ref) >= far:
+                end = self.travel[index(self.now - 1.0)] + 0.01 * self.windows[index(self.now - 1.0)]
+                if fabs(self.angle - self.angle_ref) >= end:
                     self.stage = CLOSE
             elif self.t - self.t_ref > self.dwell[index(self.now - 1.0)] - half:
                 turned = fabs(self.angle - self.angle_ref) >= self.travel[index(self.now - 1.0)]

@@ -30,7 +30,7 @@ class ServoThreeLoop(Component):
     K_u = Parameter(1.0, "V.s/rad", "gyro signal per rate", above=0.0)
     K_w = Parameter(125.66370614359172, "A.s/rad", "rate loop: proportional gain (10 Hz with 2 kg.m2)", above=0.0)
     K_wi = Parameter(1579.1367041742974, "A/rad", "rate loop: integral gain (corner at 2 Hz)", min=0.0)
-    i_max = Parameter(24.0, "A", "largest current wished", above=0.0)
+    i_max = Parameter(24.0, "A", "largest current commanded", above=0.0)
     K_c = Parameter(12.566370614359172, "V/A", "current loop: proportional gain (500 Hz with 4 mH)", above=0.0)
     K_ci = Parameter(6283.185307179586, "V/(A.s)", "current loop: integral gain (cancels 4 mH / 2 Ohm)", min=0.0)
     v_max = Parameter(48.0, "V", "largest voltage", above=0.0)
@@ -47,7 +47,7 @@ class ServoThreeLoop(Component):
 
     v = Output("V", "voltage of the torque motor")
     e = Output("V", "the signal inside the loop, u + test")
-    i_wish = Output("A", "current wished")
+    i_wish = Output("A", "current commanded")
     saturated = Output("1", "1 while current or voltage is limited")
 
     q = State(0.0, "A", "integral of the rate loop")
@@ -65,11 +65,11 @@ class ServoThreeLoop(Component):
 
     def flow(self) -> None:
         off = self.off()
-        wish = -(self.K_w * off + self.q)
+        unlimited = -(self.K_w * off + self.q)
         self.der.q = self.K_wi * off
-        if (wish > self.i_max and off < 0.0) or (wish < -self.i_max and off > 0.0):
+        if (unlimited > self.i_max and off < 0.0) or (unlimited < -self.i_max and off > 0.0):
             self.der.q = 0.0
-        less = clip(wish, -self.i_max, self.i_max) - self.i_motor
+        less = clip(unlimited, -self.i_max, self.i_max) - self.i_motor
         volts = self.K_c * less + self.p
         self.der.p = self.K_ci * less
         if (volts > self.v_max and less > 0.0) or (volts < -self.v_max and less < 0.0):
@@ -84,7 +84,7 @@ class ServoThreeLoop(Component):
                 or many * self.h > self.track_period * 1.000001
                 or many * self.h < self.track_period * 0.999999
             )
-            self.refuse(odd, "track_period = {track_period} s is no multiple of the internal step")
+            self.refuse(odd, "track_period = {track_period} s is not a multiple of the internal step")
             self.count = self.count + 1.0
             if self.count >= many:
                 self.count = 0.0
@@ -92,9 +92,9 @@ class ServoThreeLoop(Component):
 
     def outputs(self) -> None:
         self.e = self.u + self.test
-        wish = -(self.K_w * self.off() + self.q)
-        amps = clip(wish, -self.i_max, self.i_max)
+        unlimited = -(self.K_w * self.off() + self.q)
+        amps = clip(unlimited, -self.i_max, self.i_max)
         volts = self.K_c * (amps - self.i_motor) + self.p
         self.i_wish = amps
         self.v = clip(volts, -self.v_max, self.v_max)
-        self.saturated = 1.0 if amps != wish or self.v != volts else 0.0
+        self.saturated = 1.0 if amps != unlimited or self.v != volts else 0.0

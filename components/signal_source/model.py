@@ -5,7 +5,7 @@ from gyrobench.component.math import exp, index, pi, sin, sqrt
 
 
 class SignalSource(Component):
-    """A gyro signal whose truth is known: a sine, random drift and reading noise.  [DRIFT-RANDOM-CLASSES]
+    """A gyro signal whose true value is known: a sine, random drift and reading noise.  [DRIFT-RANDOM-CLASSES]
 
         signal_k = offset + amplitude sin(2 pi frequency t_k + phase)
         x_k = phi_1 x_{k-1} + ... + phi_p x_{k-p} + w_k                              autoregressive

@@ -59,16 +59,16 @@ class StabilizerLeadLag(Component):
         self.der.lag = (self.error() - self.lag) / self.T1
         self.der.lead = (self.after_lag() - self.lead) / self.T2
         y = self.after_lead()
-        wish = -self.K * (y + self.sum)
+        unlimited = -self.K * (y + self.sum)
         self.der.sum = self.integral * y
-        if (wish > self.v_max and y < 0.0) or (wish < -self.v_max and y > 0.0):
+        if (unlimited > self.v_max and y < 0.0) or (unlimited < -self.v_max and y > 0.0):
             self.der.sum = 0.0
         if self.integral == 0.0:
             self.der.sum = -self.sum  # stays 0, and leaves no pole at 0 in the linearization
 
     def outputs(self) -> None:
         self.e = self.u + self.test
-        wish = -self.K * (self.after_lead() + self.sum)
-        self.v = clip(wish, -self.v_max, self.v_max)
-        self.saturated = 1.0 if self.v != wish else 0.0
+        unlimited = -self.K * (self.after_lead() + self.sum)
+        self.v = clip(unlimited, -self.v_max, self.v_max)
+        self.saturated = 1.0 if self.v != unlimited else 0.0
         self.unordered = 0.0 if self.tau1 < self.T1 and self.tau2 < self.tau1 and self.tau2 > self.T2 else 1.0

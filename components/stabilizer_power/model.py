@@ -11,8 +11,8 @@ class StabilizerPower(Component):
         v = -k_i e,       limited to +-v_max              amplifier
         M = ratio k_m v + M_load                          motor behind its reducer, on the stabilised axis
 
-    In the linear range M = -K_m b + M_load with K_m = ratio k_u k_i k_m (N.m/rad).  k_u is told so that the loop can be
-    judged here: with the gyro's H, J_x, J_y, C_x, C_y told too (H_g > 0), a K_m beyond the Routh limit
+    In the linear range M = -K_m b + M_load with K_m = ratio k_u k_i k_m (N.m/rad).  k_u is given for a check of the
+    loop: with the gyro's H, J_x, J_y, C_x, C_y given too (H_g > 0), a K_m beyond the Routh limit
 
         K_m < (C_x / J_x + C_y / J_y) (H + C_x C_y / H)
 
@@ -31,7 +31,7 @@ class StabilizerPower(Component):
     k_m = Parameter(0.01, "N.m/V", "motor: torque per voltage", above=0.0)
     ratio = Parameter(100.0, "1", "reducer: torque on the axis per torque of the motor", above=0.0)
     v_max = Parameter(27.0, "V", "largest voltage of the amplifier", above=0.0)
-    H_g = Parameter(0.0, "N.m.s", "gyro: spin angular momentum; 0: the loop is not judged", min=0.0)
+    H_g = Parameter(0.0, "N.m.s", "gyro: spin angular momentum; 0: the loop is not checked", min=0.0)
     J_x = Parameter(0.5, "kg.m2", "gyro: inertia about the stabilised axis, with the load", above=0.0)
     J_y = Parameter(0.02, "kg.m2", "gyro: inertia about the precession axis", above=0.0)
     C_x = Parameter(0.0, "N.m.s/rad", "gyro: damping about the stabilised axis", min=0.0)
@@ -63,7 +63,7 @@ class StabilizerPower(Component):
 
     def outputs(self) -> None:
         self.e = self.polarity * self.u + self.test
-        wish = -self.k_i * self.e
-        self.v = clip(wish, -self.v_max, self.v_max)
+        unlimited = -self.k_i * self.e
+        self.v = clip(unlimited, -self.v_max, self.v_max)
         self.M = self.ratio * self.k_m * self.v + self.M_load
-        self.saturated = 1.0 if self.v != wish else 0.0
+        self.saturated = 1.0 if self.v != unlimited else 0.0

@@ -27,7 +27,7 @@ class TableRate(AxisTable):
 
         f     = face Rz B f_local
         omega = face (w + (0, 0, rate))
-        alpha = face (w_y rate, -w_x rate, acc)       the whole derivative of omega, so d(omega)/dt = alpha
+        alpha = face (w_y rate, -w_x rate, acc)       the total derivative of omega, so d(omega)/dt = alpha
 
     tilt[1], tilt[2] turn the base about its first and then its new second axis, B = R2 R1 base.
 
@@ -41,7 +41,7 @@ class TableRate(AxisTable):
     angle0 = Parameter(0.0, "rad", "angle at the start")
     acceleration = Parameter(0.1, "rad/s2", "acceleration of every move", above=0.0)
     index_rate = Parameter(0.1, "rad/s", "rate of an index move", above=0.0)
-    rate_max = Parameter(10.0, "rad/s", "largest rate that may be asked for", above=0.0)
+    rate_max = Parameter(10.0, "rad/s", "largest rate that may be commanded", above=0.0)
     ripple = Parameter(0.0, "1", "rate ripple, relative amplitude r", min=-0.1, max=0.1)
     ripple_cycles = Parameter(36, int, "ripple cycles per turn n", min=1, max=100000)
     encoder_amplitude = Parameter([0.0, 0.0], "rad", "encoder error of orders 1 and 2")

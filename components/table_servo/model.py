@@ -35,7 +35,7 @@ class TableServo(AxisTable):
     angle0 = Parameter(0.0, "rad", "angle at the start")
     acceleration = Parameter(0.1, "rad/s2", "acceleration of every kinematic move", above=0.0)
     index_rate = Parameter(0.1, "rad/s", "rate of an index move", above=0.0)
-    rate_max = Parameter(10.0, "rad/s", "largest rate that may be asked for", above=0.0)
+    rate_max = Parameter(10.0, "rad/s", "largest rate that may be commanded", above=0.0)
 
     J = Parameter(2.56, "kg.m2", "inertia of table and load about the axis", above=0.0)
     viscous = Parameter(0.0, "N.m.s/rad", "viscous friction and back EMF, of the rate against the base", min=0.0)
@@ -61,7 +61,7 @@ class TableServo(AxisTable):
     C_g = Parameter(0.2, "N.m.s/rad", "gyro: float damping; 0: undamped", min=0.0)
     K_g = Parameter(10.0, "V/rad", "gyro: pickoff gain", above=0.0)
 
-    capture = Parameter(1, int, "1: capture first, 0: close the fine loop at once", min=0, max=1)
+    capture = Parameter(1, int, "1: capture first, 0: close the fine loop immediately", min=0, max=1)
     capture_rate = Parameter(8.0 * pi, "rad/s", "natural frequency while capturing (4 Hz)", above=0.0)
     capture_damping = Parameter(1.2, "1", "damping ratio while capturing, by the tachometer", above=0.0)
     capture_speed = Parameter(pi / 90.0, "rad/s", "speed limit while capturing (2 deg/s)", above=0.0)

@@ -36,7 +36,7 @@ class TableTwoAxis(Component):
     angle0 = Parameter([0.0, 0.0], "rad", "outer and inner angle at the start")
     acceleration = Parameter([0.1, 0.1], "rad/s2", "acceleration of every move", above=0.0)
     index_rate = Parameter([0.1, 0.1], "rad/s", "rate of an index move", above=0.0)
-    rate_max = Parameter([10.0, 10.0], "rad/s", "largest rate that may be asked for", above=0.0)
+    rate_max = Parameter([10.0, 10.0], "rad/s", "largest rate that may be commanded", above=0.0)
     limits_y = Parameter([-1e9, 1e9], "rad", "lowest and highest inner angle")
     squareness = Parameter(0.0, "rad", "inner axis turned about Z out of the right angle", min=-0.1, max=0.1)
     wobble = Parameter([0.0, 0.0], "rad", "wobble amplitude of the outer and the inner axis", min=0.0, max=0.1)

@@ -21,7 +21,7 @@ class VerticalGyro(Component):
         g4' = k_ring G g2, |g4'| <= ring_rate;    dg2/dg4 = -cos g3, hence G = sign(cos g3) (reversal = 0: G = 1)
 
     Torques T_x, T_y and drift act along x_i, y_i.  e_x, e_y are the rotations about x_i, y_i that carry the apparent
-    vertical (the direction of f) into n, as level switches on the inner element feel them:
+    vertical (the direction of f) into n, as level switches on the inner element measure them:
 
         e_x = atan2(f_yi, f_zi),  e_y = -atan2(f_xi, f_zi)                    turn = omega along n
 

@@ -1,4 +1,4 @@
-"""What a command line names: values, parts and mapping files of slots, times."""
+"""Values of command line arguments: settings, parts and mapping files of slots, times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bench holds, read without importing it, so that ``gyrobench list`` answers at once; and new benches."""
+"""Contents of a bench, read without importing them, so that ``gyrobench list`` is fast; and new benches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gyrobench.bench import ROOMS, Bench, BenchError, suggest_names
 
 def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
     """Return (docstring, literal class attributes) of the class that a file is about: its last one with a docstring."""
-    found: tuple[str, dict[str, Any]] = ("", {})
+    last: tuple[str, dict[str, Any]] = ("", {})
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ClassDef) and node.bases and (doc := ast.get_docstring(node)):
             attributes: dict[str, Any] = {}
@@ -24,8 +24,8 @@ def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
                         attributes[s.targets[0].id] = ast.literal_eval(s.value)
                     except ValueError:
                         continue
-            found = doc, attributes
-    return found
+            last = doc, attributes
+    return last
 
 
 def _entry(name: str, file: Path) -> dict[str, Any]:
@@ -71,7 +71,7 @@ Records and reports go to `reports/out/<system>/<id>/`, built FMUs to `fmus/`.
 
 
 def init_bench(folder: Path, copies: list[str]) -> list[str]:
-    """Make the rooms of a new bench and copy parts and systems into it; return what was made, a line each.
+    """Create the folders of a new bench and copy parts and systems into it; return what was made, a line each.
 
     Raises BenchError if the folder exists and is not empty, or there is no such part or system.
     """
@@ -86,12 +86,12 @@ def init_bench(folder: Path, copies: list[str]) -> list[str]:
         (folder / room).mkdir(parents=True, exist_ok=True)
     for room in ("systems", "components", "reports/specs"):
         (folder / room).mkdir(exist_ok=True)
-        (folder / room / ".gitkeep").touch()  # git keeps no empty folder, and these make the bench
+        (folder / room / ".gitkeep").touch()  # git does not keep empty folders, and these make the bench
     (folder / "README.md").write_text(README.format(name=folder.resolve().name), encoding="utf-8")
     (folder / ".gitignore").write_text("fmus/\nreports/out/\n", encoding="utf-8")
     lines = [f"{folder}: a new bench; cd {folder} and gyrobench list"]
-    wanted = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
-    for room, name in wanted:  # a part and a system may have the same name: then both
+    copied = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
+    for room, name in copied:  # a part and a system may have the same name: then both
         source = (parts if room == "components" else systems).get(name)
         if source is None:
             continue

@@ -1,4 +1,4 @@
-"""The command line: options and arguments of each command.  What takes time to import is imported where it is used."""
+"""The command line: options and arguments of each command.  Slow imports are made where they are used."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ echo = typer.echo
 
 
 def exit_on_fail(verdict: str, strict: bool) -> None:
-    """End the command with exit code 1 where a verdict fails and that was asked for."""
+    """End the command with exit code 1 where a verdict fails and --strict is set."""
     if strict and verdict == "fail":
         raise typer.Exit(1)
 
@@ -65,7 +65,7 @@ def print_version(wanted: bool) -> None:
 @app.callback()
 def root(
     show_version: Annotated[
-        bool, typer.Option("--version", callback=print_version, is_eager=True, help="Version.")
+        bool, typer.Option("--version", callback=print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """FMI co-simulation bench for inertial instruments: test methods as systems of FMUs, ending in a report.
@@ -84,7 +84,7 @@ def root(
 
 @app.command("list")
 def list_command(as_json: Json = False) -> None:
-    """List parts, systems, sockets, specifications.
+    """List parts, systems, sockets and acceptance specifications.
 
     \b
     Example: gyrobench list
@@ -114,7 +114,7 @@ def show(
 ) -> None:
     """Show wiring, plan and options of a system.
 
-    Slots, wires, execution order, cuts and delays, plan, options; nothing runs.
+    Print slots, wires, execution order, cut loops and their delays, plan, options; nothing is run.
 
     \b
     Example: gyrobench show tumble_single_axis --picture wiring.svg
@@ -133,11 +133,12 @@ def show(
 @app.command()
 def build(
     parts: Annotated[
-        list[str] | None, typer.Argument(metavar="PART", help="Names of parts.", autocompletion=complete_part)
+        list[str] | None, typer.Argument(metavar="PART", help="Parts to build.", autocompletion=complete_part)
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Every part of the bench.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="Build every part of the bench.")] = False,
     target: Annotated[
-        Target, typer.Option(help="native: C, needs nothing where it runs; python: needs Python and numpy there.")
+        Target,
+        typer.Option(help="native: compiled C, self-contained; python: needs Python and numpy on the target machine."),
     ] = Target.native,
     fmi: Annotated[int, typer.Option(metavar="2|3", help="FMI version.", min=2, max=3)] = 2,
     platform: Annotated[
@@ -157,12 +158,12 @@ def build(
     bench = Bench.find()
     names = list(dict.fromkeys([*(parts or []), *(bench.parts() if every else ())]))
     if not names:
-        raise UsageError(f"name a part, or say --all; parts: {', '.join(bench.parts())}")
+        raise UsageError(f"no part named; name one or more, or set --all; parts: {', '.join(bench.parts())}")
     for name in names:
         bench.part_folder(name)
-    wrong = [p for p in platform or [] if p not in PLATFORMS]
-    if wrong:
-        raise UsageError(f"--platform {wrong[0]}: one of {', '.join(PLATFORMS)}")
+    unknown = [p for p in platform or [] if p not in PLATFORMS]
+    if unknown:
+        raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
     for name in names:
         path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
         echo(display_path(path))
@@ -175,14 +176,19 @@ def run(
     part: Part = None,
     mapping: Map = None,
     seed: Seed = 1,
-    engine: Annotated[Engine | None, typer.Option(help="Default: native where there is a C compiler.")] = None,
+    engine: Annotated[Engine | None, typer.Option(help="Default: native where a C compiler is available.")] = None,
     step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
     check_step: Annotated[
-        bool, typer.Option("--check-step", help="Halve the step once, noise off, and report the change.")
+        bool,
+        typer.Option(
+            "--check-step", help="Repeat the run with half the step, noise off, and report the change of the results."
+        ),
     ] = False,
     isolate: Annotated[
         list[str] | None,
-        typer.Option("--isolate", metavar="SLOT", help="Run this slot in a process of its own.  Repeatable."),
+        typer.Option(
+            "--isolate", metavar="SLOT", help="Run the FMU of this slot in a process of its own.  Repeatable."
+        ),
     ] = None,
     spec: Spec = None,
     strict: Strict = False,
@@ -194,7 +200,7 @@ def run(
     resume: Resume = False,
     as_json: Json = False,
 ) -> None:
-    """Run a system: record, reduction, report.
+    """Run a system: simulate, save the record, reduce it, write the report.
 
     \b
     Examples:
@@ -233,7 +239,7 @@ def reduce(
     data: Data = None,
     values: Set = None,
     template: Annotated[
-        bool, typer.Option("--template", help="Print an empty record: columns, units and what to state.")
+        bool, typer.Option("--template", help="Print an empty record: its columns, their units, the values to state.")
     ] = False,
     spec: Spec = None,
     strict: Strict = False,
@@ -242,7 +248,7 @@ def reduce(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Reduce measured data to the same report.
+    """Reduce measured data of the same test and write the same report.
 
     \b
     Examples:
@@ -273,7 +279,7 @@ def report(
     strict: Strict = False,
     as_json: Json = False,
 ) -> None:
-    """Reduce the record of a run again and write its report.
+    """Reduce the record of a run again and rewrite its report.
 
     \b
     Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
@@ -290,7 +296,7 @@ def compare(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Lay the reports of several runs side by side.
+    """Compare the results of several runs side by side.
 
     \b
     Example: gyrobench compare reports/out/tumble_single_axis/1a2b3c4d vendor --out comparison
@@ -332,9 +338,9 @@ def export(
     seed: Seed = 1,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")] = None,
 ) -> None:
-    """Write a system for other tools.
+    """Export a system for other tools.
 
-    The plan of the test and all values are in it.
+    The file contains the plan of the test and all parameter values.
 
     \b
     Example: gyrobench export tumble_single_axis --to ssp --set windows=36
@@ -348,7 +354,7 @@ def export(
 
 @app.command()
 def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An FMU, or the name of a part.")]) -> None:
-    """Check an FMU: standard, units, reference run.
+    """Validate an FMU: FMI standard, units, reference run.
 
     \b
     Example: gyrobench validate fmus/site.fmu
@@ -365,18 +371,18 @@ def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An F
 
 @app.command()
 def init(
-    name: Annotated[Path, typer.Argument(metavar="NAME", help="Folder to make.")],
+    name: Annotated[Path, typer.Argument(metavar="NAME", help="Folder to create.")],
     copy: Annotated[
         list[str] | None,
         typer.Option(
             "--copy",
             metavar="PART|SYSTEM",
-            help="Copy this part or system to change it.  Repeatable.",
+            help="Copy this part or system into the new bench.  Repeatable.",
             autocompletion=complete_copy,
         ),
     ] = None,
 ) -> None:
-    """Create a bench on top of the standard one.
+    """Create a bench; what it does not define comes from the standard bench.
 
     \b
     Example: gyrobench init mybench --copy floated_gyro
@@ -388,7 +394,7 @@ def init(
 
 
 def main() -> None:
-    """Run a command; an error ends in one message and an exit code, and with GYROBENCH_TRACEBACK=1 in a traceback."""
+    """Run a command; an error ends in one message and an exit code, with a traceback if GYROBENCH_TRACEBACK=1."""
     try:
         app(prog_name="gyrobench", standalone_mode=True)
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Words that the shell completes: names of the bench, and what a system can be set to."""
+"""Shell completion: names of the bench, settings and slots of a system."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _named_before() -> System | Suite | None:
     known = Bench.find().systems()
     name = next((word for word in line.split() if word in known), None)
     if name is not None:
-        with contextlib.suppress(Exception):  # why it does not load is said by the command itself
+        with contextlib.suppress(Exception):  # the command itself reports why it does not load
             from gyrobench.workflow.inputs import load_test
 
             return load_test(name)

@@ -1,4 +1,4 @@
-"""What the commands print: notes, descriptions of systems, files."""
+"""Output of the commands: notes, descriptions of systems, files."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def print_notes(notes: Iterable[str]) -> None:
     """Print notes on standard error; one that several slots share is printed once."""
     slots: dict[str, list[str]] = {}
     for text in notes:
-        slot, colon, rest = text.partition(": ")
-        slots.setdefault(rest if colon else text, []).append(slot if colon else "")
-    for rest, names in slots.items():
-        print_note("note: " + ", ".join(filter(None, names)) + (": " if names[0] else "") + rest)
+        slot, colon, fact = text.partition(": ")
+        slots.setdefault(fact if colon else text, []).append(slot if colon else "")
+    for fact, names in slots.items():
+        print_note("note: " + ", ".join(filter(None, names)) + (": " if names[0] else "") + fact)
 
 
 def print_report_files(paths: Mapping[str, Path], text: str | None) -> None:
@@ -50,12 +50,14 @@ def format_system(description: Mapping[str, Any]) -> str:
     )
     lines += ["", "wires"]
     for w in description["wires"]:
-        marks = ["   (value of the step before)"] * w["cut"] + ["   (not offered by the part)"] * (not w["connected"])
+        marks = ["   (value of the previous step)"] * w["cut"] + ["   (not provided by the part)"] * (
+            not w["connected"]
+        )
         lines.append("  " + w["wire"] + "".join(marks))
     lines += ["", "loops are cut at"] * bool(description["cuts"]) + [f"  {c}" for c in description["cuts"]]
     if description["plan"]:
-        ways = "" if "shape" in description["plan"][0] else " without the ways between the phases"
-        lines += ["", f"plan: {description['duration']:,.0f} s{ways}"]
+        transitions = "" if "shape" in description["plan"][0] else " without the transitions between the phases"
+        lines += ["", f"plan: {description['duration']:,.0f} s{transitions}"]
         rows = [_phase(p) for p in description["plan"]]
         last = "dwell" if "shape" in description["plan"][0] else "window"
         lines += align_columns([["", "phase", "mode", "", "settle", last], *rows], {1, 2, 3}, "  ")

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the words that some of them take."""
+"""Arguments and options that several commands share, and the values that some of them accept."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ System = Annotated[
     str,
     typer.Argument(metavar="SYSTEM", help="Name of a system, see gyrobench list.", autocompletion=complete_system),
 ]
-Json = Annotated[bool, typer.Option("--json", help="JSON on standard output, and nothing else there.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on standard output.")]
 Set = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  Repeatable.",
+        help="Set an option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  Repeatable.",
         autocompletion=complete_setting,
     ),
 ]
@@ -29,7 +29,7 @@ Part = Annotated[
     typer.Option(
         "--part",
         metavar="SLOT=FMU|PART",
-        help="Another part, or an FMU file, in a slot.",
+        help="Put another part, or an FMU file, into a slot.  Repeatable.",
         autocompletion=complete_slot,
     ),
 ]
@@ -38,29 +38,27 @@ Map = Annotated[
     typer.Option(
         "--map",
         metavar="SLOT=FILE",
-        help="Names and units of a foreign FMU (.toml).",
+        help="Mapping file (.toml): names and units of a third-party FMU.  Repeatable.",
         autocompletion=complete_slot,
     ),
 ]
-Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all noise.", min=0)]
+Seed = Annotated[int, typer.Option(metavar="N", help="Seed of the noise.", min=0)]
 Spec = Annotated[
     str | None,
     typer.Option(
         "--spec",
         metavar="NAME|FILE",
-        help="Acceptance specification to judge by.",
+        help="Acceptance specification for the verdict.",
         autocompletion=complete_specification,
     ),
 ]
-NoReport = Annotated[
-    bool, typer.Option("--no-report", help="Record and result.json only: no HTML, no PDF, for many runs.")
-]
-Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 when the verdict is fail.")]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Write record and result.json only, no HTML and PDF.")]
+Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 if the verdict is fail.")]
 Data = Annotated[
-    list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; of a suite its runs.  Repeatable.")
+    list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; for a suite, its runs.  Repeatable.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace another run in --out.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Continue this run where it was interrupted.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace another run in the folder --out.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue this run from where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 
 

@@ -1,4 +1,4 @@
-"""What the commands that end in a report print: table, verdict, files; and their verdict."""
+"""Output of the commands that end in a report: table, verdict, files."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def reduce(
         from gyrobench.workflow.suite_report import reduce_runs
 
         if not data:
-            raise UsageError(f"name the runs: gyrobench reduce {test.name} --data RUN --data RUN")
+            raise UsageError(f"no runs named; gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
         return _print_outcome(reduce_runs(test, data, spec, out, force, formats), as_json)
     from gyrobench.workflow.measured_run import reduce_measured
 
     if not data:
-        raise UsageError(f"name the record: gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
+        raise UsageError(f"no record named; gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
     if len(data) > 1:
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
     return _print_outcome(reduce_measured(test, data[0], values, spec, out, force, formats=formats), as_json)

@@ -81,13 +81,13 @@ class Component:
         cls._functions = own_equations(cls)
         for kind in EQUATIONS:  # called by name, an equation is that of all bases and blocks
             setattr(cls, kind, vars(Component)[kind])
-        found, cls.placed, by_class = flatten(cls, Component)
+        declared, cls.placed, by_class = flatten(cls, Component)
         cls.pieces = pieces(cls, Component, by_class)
-        if any(isinstance(d, Noise) for d in found.values()):
-            found.setdefault("seed", Parameter(1, int, "seed of the noise of this instance", min=0))
-        if "step" not in found and (cls.pieces["sampled"] or any(isinstance(d, State) for d in found.values())):
-            found["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
-        for n, d in found.items():
+        if any(isinstance(d, Noise) for d in declared.values()):
+            declared.setdefault("seed", Parameter(1, int, "seed of the noise of this instance", min=0))
+        if "step" not in declared and (cls.pieces["sampled"] or any(isinstance(d, State) for d in declared.values())):
+            declared["step"] = Parameter(1e-3, "s", "largest internal step", above=0.0)
+        for n, d in declared.items():
             if hasattr(Component, n) or n in RESERVED:
                 raise ComponentError(f"{cls.__name__}.{n}: every component has a {n!r} already, take another name")
             d.name = n
@@ -95,10 +95,10 @@ class Component:
                 setattr(cls, n, ArraySlot(n))
         if any(p.block.nonlinear for p in _all_placed(cls.placed)):
             cls.nonlinear = True
-        cls.declarations = found
-        cls.layout = make_layout(found)
+        cls.declarations = declared
+        cls.layout = make_layout(declared)
         cls.states = [s for s in cls.layout if s.section == "state"]
-        cls.noises = [d for d in found.values() if isinstance(d, Noise)]
+        cls.noises = [d for d in declared.values() if isinstance(d, Noise)]
         cls._by_name = {s.name: s for s in cls.layout}
         cls._inputs = _by_variable(s for s in cls.layout if s.section == "input")
         cls._watched = _by_variable(
@@ -176,25 +176,25 @@ class Component:
         self._dirty = True
 
     def set(self, name: str, x: float) -> None:
-        """Sets a scalar by its FMI name, SI."""
+        """Set a scalar by its FMI name, SI."""
         self._put(self._find(name), x)
 
     def get(self, name: str) -> float:
-        """A scalar by its FMI name; outputs follow the present inputs."""
+        """Return a scalar by its FMI name; outputs follow the present inputs."""
         s = self._find(name)
         if s.section == "output":
             self._refresh()
         return self._at(s)
 
     def read(self, references: Iterable[int]) -> list[float]:
-        """Values by value reference, as an FMU's get calls want them."""
-        found = [self._referenced(r) for r in references]
-        if any(s.section == "output" for s in found):
+        """Return values by value reference, as an FMU's get calls do."""
+        scalars = [self._referenced(r) for r in references]
+        if any(s.section == "output" for s in scalars):
             self._refresh()
-        return [self._at(s) for s in found]
+        return [self._at(s) for s in scalars]
 
     def write(self, references: Iterable[int], values: Iterable[float]) -> None:
-        """Sets values by value reference.  A parameter is fixed once initialization has ended."""
+        """Set values by value reference.  A parameter is fixed once initialization has ended."""
         for r, x in zip(references, values, strict=True):
             s = self._referenced(r)
             if self._running and s.section == "parameter":
@@ -215,7 +215,7 @@ class Component:
         return s
 
     def reset(self) -> None:
-        """Back to before initialization, every value at its start."""
+        """Return to the state before initialization, every value at its start."""
         self.der = Derivatives()
         self.noise = SimpleNamespace(**{n.name: 0.0 for n in self.noises})
         for d in self.declarations.values():
@@ -230,7 +230,7 @@ class Component:
         self._phi_h = 0.0
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that decides the future, as plain numbers (exact through JSON)."""
+        """Return the complete state as plain numbers (exact through JSON)."""
         return {
             "part": f"{type(self).__name__} {self.version}",
             "v": [self._at(s) for s in self.layout],
@@ -257,14 +257,14 @@ class Component:
 
     # ------------------------------------------------------------------ running
     def initialize(self, t0: float = 0.0) -> None:
-        """Checks parameters and inputs, runs ``start`` and ``outputs``.  Raises ComponentError."""
+        """Check parameters and inputs, run ``start`` and ``outputs``.  Raises ComponentError."""
         self.t = t0
         for s in self.layout:
             if s.section in ("parameter", "input", "state"):
                 x = self._at(s)
-                wrong = s.decl.bound_broken(x)
-                if wrong:
-                    raise ComponentError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {wrong}")
+                bound = s.decl.bound_broken(x)
+                if bound:
+                    raise ComponentError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {bound}")
         self._evaluate_start()
         self._require_finite(self._watched, self.t)
         self._running = True
@@ -286,7 +286,7 @@ class Component:
                 self._evaluate_start()
 
     def do_step(self, t: float, step: float) -> None:
-        """Advances from t to t + step with the inputs held.  Raises ComponentError."""
+        """Advance from t to t + step with the inputs held.  Raises ComponentError."""
         if not self._running:
             raise ComponentError(f"{self.instance}: a step before initialization has succeeded")
         if not (math.isfinite(t) and math.isfinite(step) and step > 0.0):
@@ -339,11 +339,11 @@ class Component:
         return [float(_dig(getattr(d, s.path[0]), s.path[1:])) for s in self.states]
 
     def jacobian(self) -> list[list[float]]:
-        """df/dx at the present point, by forward-mode differentiation of ``flow``."""
+        """Return df/dx at the present point, by forward-mode differentiation of ``flow``."""
         return [list(r) for r in zip(*(self.tangent({s.name: 1.0})[0] for s in self.states), strict=True)]
 
     def tangent(self, seeds: dict[str, float]) -> tuple[list[float], list[float]]:
-        """Derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
+        """Return the derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__dict__)
         twin.der = Derivatives()
@@ -400,10 +400,10 @@ class Component:
 
 
 def _by_variable(scalars: Iterable[Scalar]) -> dict[str, list[Scalar]]:
-    found: dict[str, list[Scalar]] = {}
+    by_variable: dict[str, list[Scalar]] = {}
     for s in scalars:
-        found.setdefault(s.path[0], []).append(s)
-    return found
+        by_variable.setdefault(s.path[0], []).append(s)
+    return by_variable
 
 
 def _dig(x: Any, path: tuple[Any, ...]) -> Any:

@@ -111,8 +111,8 @@ class View:
             return getattr(part, name)
         if name in ("der", "noise"):
             return _Names(getattr(part, name), placed.names)
-        found = getattr(type(placed.block), name)
-        return found.__get__(self) if callable(found) else found
+        attribute = getattr(type(placed.block), name)
+        return attribute.__get__(self) if callable(attribute) else attribute
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._placed.names:
@@ -195,26 +195,26 @@ def items_of(cls: type, base: type) -> dict[str, tuple[type, Any]]:
     Raises ComponentError where a declaration would be lost: two bases that declare one name, a method or a constant
     that hides a declaration, a declaration of another kind or shape in a subclass, one that stands in a list.
     """
-    found: dict[str, tuple[type, Any]] = {}
+    items: dict[str, tuple[type, Any]] = {}
     for klass in lineage(cls, base):
-        own = own_items(klass)
+        declared_here = own_items(klass)
         for name, item in vars(klass).items():
             if hasattr(base, name):
                 continue
-            if name in found and name not in own and not isinstance(item, ArraySlot):
-                where = found[name][0].__name__
+            if name in items and name not in declared_here and not isinstance(item, ArraySlot):
+                where = items[name][0].__name__
                 raise ComponentError(
                     f"{klass.__name__}.{name} hides a declaration of {where}: take another name, or declare it again "
-                    f"({name} = {type(found[name][1]).__name__}(...)) to change its start or bounds"
+                    f"({name} = {type(items[name][1]).__name__}(...)) to change its start or bounds"
                 )
             inside = list(item.values()) if isinstance(item, dict) else item
             if isinstance(inside, list | tuple) and any(isinstance(x, Declaration | Block) for x in inside):
                 raise ComponentError(f"{klass.__name__}.{name}: a declaration inside a list is lost: give it a name")
-        for name, item in own.items():
-            if name in found:
-                _redeclared(klass, name, item, *found[name])
-            found[name] = (klass, item)
-    return found
+        for name, item in declared_here.items():
+            if name in items:
+                _redeclared(klass, name, item, *items[name])
+            items[name] = (klass, item)
+    return items
 
 
 def _redeclared(klass: type, name: str, item: Any, before: type, old: Any) -> None:
@@ -298,9 +298,9 @@ def _restarted(d: Declaration, start: Any, where: str) -> Declaration:
 
 def pieces(cls: type, base: type, by_class: dict[type, list[Placed]]) -> dict[str, list[Piece]]:
     """Return the equations by kind (EQUATIONS and "sampled"), in the order in which they run."""
-    found: dict[str, list[Piece]] = {kind: [] for kind in (*EQUATIONS, "sampled")}
+    by_kind: dict[str, list[Piece]] = {kind: [] for kind in (*EQUATIONS, "sampled")}
 
-    def take(klass: type, placed: Placed | None) -> None:
+    def collect(klass: type, placed: Placed | None) -> None:
         for name, f in own_equations(klass).items():
             every = getattr(f, "_every", 0)
             if "super" in f.__code__.co_names:
@@ -308,16 +308,16 @@ def pieces(cls: type, base: type, by_class: dict[type, list[Placed]]) -> dict[st
                     f"{klass.__name__}.{name}: the equations of the bases run by themselves, before this: leave out "
                     f"super().{name}()"
                 )
-            found["sampled" if every else name].append(Piece(f, klass, placed, every))
+            by_kind["sampled" if every else name].append(Piece(f, klass, placed, every))
 
     def block(p: Placed) -> None:
         for inner in p.blocks.values():
             block(inner)
         for klass in lineage(type(p.block), Block):
-            take(klass, p)
+            collect(klass, p)
 
     for klass in lineage(cls, base):
         for p in by_class.get(klass, []):
             block(p)
-        take(klass, None)
-    return found
+        collect(klass, None)
+    return by_kind

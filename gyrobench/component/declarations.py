@@ -63,7 +63,7 @@ class Declaration:
         def __set__(self, part: object, value: Any) -> None: ...
 
     def bound_broken(self, x: float) -> str | None:
-        """The bound that x breaks, in words; NaN breaks every bound."""
+        """Return the bound that x violates, in words; NaN breaks every bound."""
         if not math.isfinite(x):
             return "finite"
         for limit, word, ok in (
@@ -133,7 +133,7 @@ class Scalar:
 
     @property
     def is_memory(self) -> bool:
-        """An element of a large discrete array: what is stored there is not looked at until it comes out again."""
+        """An element of a large discrete array: its content is not checked until it is read."""
         return self.section == "discrete" and math.prod(self.decl.shape) > MEMORY
 
 

@@ -156,7 +156,7 @@ def tanh(x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """The largest whole number not above x, as a float."""
+    """Return the largest whole number not above x, as a float."""
     return Dual(float(math.floor(x.v))) if isinstance(x, Dual) else float(math.floor(x))
 
 
@@ -165,7 +165,7 @@ def fabs(x: Number) -> Number:
 
 
 def where(condition: Any, a: Number, b: Number) -> Number:
-    """``a`` where the condition holds, else ``b``.  Both are evaluated: guard a division with ``if``."""
+    """Return ``a`` where the condition holds, else ``b``.  Both are evaluated: guard a division with ``if``."""
     return a if condition else b
 
 
@@ -178,7 +178,7 @@ def maximum(a: Number, b: Number) -> Number:
 
 
 def clip(x: Number, lo: Number, hi: Number) -> Number:
-    """x limited to [lo, hi].  A NaN goes through as NaN: it must be seen, not swallowed."""
+    """Return x limited to [lo, hi].  A NaN goes through as NaN: it must be seen, not swallowed."""
     return where(x < lo, lo, where(x > hi, hi, x))
 
 
@@ -187,7 +187,7 @@ def sign(x: Number) -> Number:
 
 
 def index(x: Number) -> int:
-    """A float that holds a whole number, as an array index.  Raises IndexError below 0."""
+    """Return a float that holds a whole number, as an array index.  Raises IndexError below 0."""
     n = int(value(x))
     if n < 0:
         raise IndexError(f"an index is {n}")

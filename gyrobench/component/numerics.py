@@ -17,7 +17,7 @@ def _mix(z: int) -> int:
 
 
 def normal(seed: int, port: int, count: int) -> float:
-    """A standard normal number that depends on its three arguments alone.
+    """Return a standard normal number that depends on its three arguments alone.
 
     Counter-based: the SplitMix64 output function over (key + count * gamma), where the key is itself a
     hash of seed and port; then the inverse normal distribution function (Wichura's AS 241).
@@ -40,7 +40,7 @@ def _product(a: list[list[float]], b: list[list[float]]) -> list[list[float]]:
 
 
 def phi1(z: list[list[float]]) -> list[list[float]]:
-    """phi1(z) = sum z^k / (k+1)!  by Taylor on z / 2^s and doubling phi1(2z) = phi1(z) (I + z phi1(z) / 2)."""
+    """Return phi1(z) = sum z^k / (k+1)!  by Taylor on z / 2^s and doubling phi1(2z) = phi1(z) (I + z phi1(z) / 2)."""
     n = len(z)
     norm = max(sum(abs(a) for a in row) for row in z)
     if not norm < 1e300:

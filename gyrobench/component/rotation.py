@@ -10,7 +10,7 @@ IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class Rotation(Block):
-    """A parameter that must be a rotation matrix (rows: body axes in the outer frame), refused otherwise at the start.
+    """A parameter that must be a rotation matrix (rows: body axes in the outer frame), checked at the start.
 
     mount = Rotation("rows: gyro axes I, O, S in case axes")      ->  v_gyro = self.mount @ v_case
     """

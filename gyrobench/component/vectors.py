@@ -60,7 +60,7 @@ class Vector(list[Any]):
 
 
 def is_finite(x: Any) -> bool:
-    """Say whether a number, or each element of an array, is finite."""
+    """Return whether a number, or each element of an array, is finite."""
     if not isinstance(x, list):
         return math.isfinite(x)
     return all(map(is_finite if x and isinstance(x[0], list) else math.isfinite, x))

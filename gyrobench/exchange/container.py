@@ -1,4 +1,4 @@
-"""A system as one container FMU, through fmu-manipulation-toolbox (sequential: our execution order)."""
+"""A system as one container FMU, through fmu-manipulation-toolbox (sequential: execution order of the bench)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def export_container(
     seed: int = 1,
     bench: Path | None = None,
 ) -> list[str]:
-    """Writes a container FMU (FMI 2.0 co-simulation) and returns notes for the user.
+    """Write a container FMU (FMI 2.0 co-simulation); return notes for the user.
 
     Its variables "slot.output" are those that a record needs: outputs, or locals where they are wired inside too.
-    Its step is the system's, the values are built in.  The FMUs run in our execution order within a step, each with
-    the newest values; initial outputs are not carried round cut loops (the toolbox says so in its log).
+    Its step is the system's, the values are built in.  Within a step the FMUs run in the execution order of the bench,
+    each with the newest values; initial outputs are not propagated around cut loops (the toolbox logs this).
     Raises ExportError without the toolbox, or when a connection has a factor (a container only copies), and what a
     run would raise before it runs.
     """

@@ -15,15 +15,15 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def record_from_series(system: System, series: Mapping[str, Array], run: RunDocument | None = None) -> Record:
-    """The windows of a run that another tool did.
+    """Return the record of a run that another tool did.
 
     series: "slot.output" -> samples at every communication step, for the watched output and all columns of
-    ``system.windows``.  A window is complete where the watched output changes, as in our own runs.  Raises KeyError
-    naming the series that are missing.
+    ``system.windows``.  A window is complete where the watched output changes, as in runs of the bench.  Raises
+    KeyError naming the series that are missing.
     """
     assert system.windows is not None, f"{system.name} has no windows"
-    wanted = [system.windows.watch, *system.windows.columns.values()]
-    missing = [n for n in wanted if n not in series]
+    names = [system.windows.watch, *system.windows.columns.values()]
+    missing = [n for n in names if n not in series]
     if missing:
         raise KeyError(f"series missing: {', '.join(missing)}")
     count = np.asarray(series[system.windows.watch], dtype=float)

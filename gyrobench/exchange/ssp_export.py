@@ -8,8 +8,8 @@
 What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 
 - libcosim applies the SSV bound to a component (it does not look at bindings of the system), takes the step size from
-  its caller, and couples all parts in parallel (Jacobi): every connection carries the value of the last step, ours
-  only the cut ones.
+  its caller, and couples all parts in parallel (Jacobi): every connection carries the value of the last step, in
+  the bench only the cut ones.
 - FMPy's ``simulate_ssp`` couples in parallel too, starts from zero inputs, and applies parameter values only when they
   are handed over: ``simulate_ssp(f, parameter_set=read_ssv(f, "resources/parameters.ssv"), step_size=..., ...)``.
   It ignores linear transformations.
@@ -40,7 +40,7 @@ STAMP = (1980, 1, 1, 0, 0, 0)
 
 
 class ExportError(GyrobenchError):
-    """A system that cannot be written in the form that is asked for; the text says why."""
+    """A system that cannot be written in the requested form; the text states why."""
 
 
 def prepare(
@@ -51,18 +51,18 @@ def prepare(
     seed: int,
     bench: Path | None,
 ) -> tuple[Assembly, Starts, list[str]]:
-    """The assembly, the start values by slot, and notes.  Raises what a run would raise before it runs."""
+    """Return the assembly, the start values by slot, and notes.  Raises what a run would raise before it runs."""
     chosen = system.with_values(values or {})
     chosen.refuse()
     notes: list[str] = []
     paths, _ = resolve_parts(chosen, parts or {}, "native", bench, notes)
     assembly = assemble(chosen, paths, maps)
-    starts, _, more = resolve(assembly, chosen, seed, defaults(assembly))
-    return assembly, starts, [*notes, *assembly.notes, *more]
+    starts, _, parameter_notes = resolve(assembly, chosen, seed, defaults(assembly))
+    return assembly, starts, [*notes, *assembly.notes, *parameter_notes]
 
 
 def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
-    """Outputs that a record needs: windows, done and channels, as "slot.output" -> (slot, variable)."""
+    """Return the outputs that a record needs: windows, done and channels, as "slot.output" -> (slot, variable)."""
     system = assembly.system
     names = [*(system.windows.columns.values() if system.windows else ()), *system.channels]
     names += [system.windows.watch] if system.windows else []
@@ -72,7 +72,7 @@ def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
 
 
 def stop_time(system: System) -> float:
-    """A time by which the plan has certainly ended: its duration, 5 % and a minute for each phase more."""
+    """Return a time by which the plan has ended: its duration plus 5 % plus a minute for each phase."""
     plan = system.plan()
     return system.stop if system.stop is not None else 1.05 * plan.duration() + 60.0 * len(plan.phases)
 
@@ -86,7 +86,7 @@ def export_ssp(
     seed: int = 1,
     bench: Path | None = None,
 ) -> list[str]:
-    """Writes the archive and returns notes for the user.
+    """Write the archive; return notes for the user.
 
     Raises what a run would raise before it runs (misfit, wires, algebraic loop, values).
     """
@@ -170,7 +170,7 @@ def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
 
 
 def _ports(assembly: Assembly, slot: str) -> Iterable[tuple[str, Bound]]:
-    """Connected inputs, connected and recorded outputs; an input that is not connected keeps its start value."""
+    """Return connected inputs, connected and recorded outputs; an input that is not connected keeps its start value."""
     inputs = {c.input.variable: c.input for c in assembly.connections if c.target == slot}
     outputs = {c.output.variable: c.output for c in assembly.connections if c.source == slot}
     outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == slot}
@@ -187,10 +187,10 @@ def _units(root: ET.Element, assembly: Assembly, used: set[str]) -> None:
             factor = float(base.factor)
         else:
             try:
-                found = units.base_unit(name)
+                base_unit = units.base_unit(name)
             except units.UnitError:
-                found = None
-            exponents, factor = found if found is not None else ({}, 1.0)
+                base_unit = None
+            exponents, factor = base_unit if base_unit is not None else ({}, 1.0)
         attributes = {s: str(e) for s, e in exponents.items() if e}
         if factor != 1.0:
             attributes["factor"] = repr(factor)

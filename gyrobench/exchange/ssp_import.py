@@ -1,4 +1,4 @@
-"""Reads an SSP 1.0 archive as a system: its FMUs, connections and parameter values, ours or a foreign one.
+"""Import of an SSP 1.0 archive, of the bench or a third party, as a system: FMUs, connections, parameter values.
 
 Read are components (FMI 2.0 co-simulation) of one flat system, connectors by the FMUs' own descriptions, connections
 with linear transformations, parameter sets (inline or as SSV files) bound to the system or to a component, and the
@@ -27,42 +27,42 @@ ANY = Socket("FMU", "any FMU: its own inputs and outputs", ())
 
 
 def _unpack(path: Path) -> Path:
-    """The unzipped archive in the user's cache, keyed by content."""
+    """Return the folder of the unzipped archive in the user's cache, keyed by content."""
     key = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
     folder = Bench.find().cache / f"ssp-{key}"
     if not folder.is_dir():
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as name:
-            fresh = Path(name) / "open"
+            unpacked = Path(name) / "open"
             with zipfile.ZipFile(path) as archive:
                 for member in archive.namelist():
-                    if not (fresh / member).resolve().is_relative_to(fresh.resolve()):
+                    if not (unpacked / member).resolve().is_relative_to(unpacked.resolve()):
                         raise InvalidConfigurationError(path.name, [f"'{member}' leaves the archive"])
-                archive.extractall(fresh)
+                archive.extractall(unpacked)
             if not folder.is_dir():
-                os.replace(fresh, folder)
+                os.replace(unpacked, folder)
     return folder
 
 
 def _parameter_set(element: ET.Element) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
     for p in element.findall("ssv:Parameters/ssv:Parameter", NS):
         value = next(iter(p), None)
         if value is None:
             continue
         kind, text, name = value.tag.rpartition("}")[2], value.get("value", ""), p.get("name", "")
         if kind == "Real":
-            found[name] = float(text)
+            parameters[name] = float(text)
         elif kind in ("Integer", "Enumeration"):
-            found[name] = int(text)
+            parameters[name] = int(text)
         else:
-            found[name] = text in ("true", "1") if kind == "Boolean" else text
-    return found
+            parameters[name] = text in ("true", "1") if kind == "Boolean" else text
+    return parameters
 
 
 def _bound_values(element: ET.Element, folder: Path) -> dict[str, Any]:
-    """The parameter values bound to a system or a component."""
-    found: dict[str, Any] = {}
+    """Return the parameter values bound to a system or a component."""
+    values: dict[str, Any] = {}
     for binding in element.findall("ssd:ParameterBindings/ssd:ParameterBinding", NS):
         prefix = binding.get("prefix", "")
         sets = binding.findall("ssd:ParameterValues/ssv:ParameterSet", NS)
@@ -70,12 +70,12 @@ def _bound_values(element: ET.Element, folder: Path) -> dict[str, Any]:
         if source is not None:
             sets = [ET.parse(folder / source).getroot()]
         for s in sets:
-            found.update({prefix + n: v for n, v in _parameter_set(s).items()})
-    return found
+            values.update({prefix + n: v for n, v in _parameter_set(s).items()})
+    return values
 
 
 def read_ssp(path: Path, step: float) -> System:
-    """The archive as a system that can be run, shown and exported again; its channels are all connected outputs.
+    """Return the archive as a system that can be run, shown and exported again; its channels are all connected outputs.
 
     step: communication step, s.  Raises InvalidConfigurationError for what is not read, and for a file that is not an
     SSP archive.

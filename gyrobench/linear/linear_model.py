@@ -1,21 +1,21 @@
-"""The linear model of a system with loops: its parts' own Jacobians, put together along its wires.
+"""The linear model of a system with loops: its parts' own Jacobians, connected along its wires.
 
 A system names its loops by the input where each is opened, ``loops = {"pitch": "stabilizer.u"}``.  Every part but the
 exciter is linearized at the operating point, which is the start of the run with the outputs propagated along the
 wires; excitations come in from outside.  Two models are made:
 
-``continuous``  the wires carry every value at once: what control theory analyses.
-``discrete``    the co-simulation itself: one macro step runs the parts in their order, each exactly discretized with
-                its inputs held; a cut wire carries the value of the step before.  The communication step and every
-                inserted delay are in it, to rounding for parts that are integrated exactly.
+``continuous``  the wires carry every value without delay: the model of control theory.
+``discrete``    the co-simulation itself: one communication step runs the parts in their order, each exactly discretized
+                with its inputs held; a cut wire carries the value of the previous step.  The communication step and
+                every inserted delay are in it, to rounding for parts that are integrated exactly.
 
-Opened at an input, the loop is L = -(what comes back there) / (what is put in there), other loops closed.
+Opened at an input, the loop is L = -(returned signal) / (injected signal), other loops closed.
 
 A sampled method that passes an input on has no continuous model; the discrete one takes the part's own step, where one
 step is like the next (gyrobench.linear.sampled_model).
 
-Not modelled: limits; sampled methods whose steps differ (a moving average) and foreign FMUs leave the system without a
-linear model, which is said.
+Not modelled: limits.  Sampled methods whose steps differ (a moving average) and third-party FMUs leave the system
+without a linear model; a warning says so.
 """
 
 from __future__ import annotations
@@ -61,23 +61,23 @@ class Block:
     d: Array
 
     def held(self, step: float) -> tuple[Array, Array]:
-        """exp(A h) and the integral of it times B: the exact step with the inputs held."""
+        """Return exp(A h) and its integral times B: the exact step with the inputs held."""
         from scipy.linalg import expm
 
         n, m = self.b.shape
-        both = np.zeros((n + m, n + m))
-        both[:n, :n], both[:n, n:] = self.a, self.b
-        full = expm(both * step)
-        return full[:n, :n], full[:n, n:]
+        augmented = np.zeros((n + m, n + m))
+        augmented[:n, :n], augmented[:n, n:] = self.a, self.b
+        transition = expm(augmented * step)
+        return transition[:n, :n], transition[:n, n:]
 
 
 def operating_point(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]]
 ) -> dict[str, Component]:
-    """The parts as plain classes with these parameters ("slot.name", SI, arrays nested), started and propagated.
+    """Return the parts as plain classes with these parameters ("slot.name", SI, arrays nested), started and propagated.
 
-    part_of: slot -> class; raises LinearizationError for a slot that holds no part of this bench.  Raises
-    ComponentError when a part refuses.
+    part_of: slot -> class; raises LinearizationError for a slot without a part of this bench.  Raises
+    ComponentError where a part does not start.
     """
     parts = {}
     for slot in assembly.order.order:
@@ -124,11 +124,11 @@ class Linear:
         self.sampled: dict[str, Step] = {}
         for s in self.order:
             try:
-                found = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+                model = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
             except ValueError as error:
                 raise LinearizationError(f"{s} works in samples, and {error}") from error
-            if found is not None:
-                self.sampled[s] = found
+            if model is not None:
+                self.sampled[s] = model
         self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
         self.outputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].outputs]
         self.states = [f"{s}.{v}" for s in self.order for v in self.blocks[s].states]
@@ -154,7 +154,7 @@ class Linear:
         return Block(slot, incoming, outgoing, [s.name for s in part.states], *jacobians(part, incoming, outgoing))
 
     def _late(self, c: Connection, name: str) -> bool:
-        """True when this connection takes the output ``name`` from the step before."""
+        """Return whether this connection takes the output ``name`` from the previous step."""
         if f"{c.source}.{c.output.variable}" != name:
             return False
         return self.order.index(c.source) >= self.order.index(c.target)
@@ -162,22 +162,22 @@ class Linear:
     def _row(self, break_at: str) -> int:
         if break_at not in self.inputs:
             raise LinearizationError(
-                f"the loop is opened at {break_at}, which is no wired input; {', '.join(self.inputs)}"
+                f"break point {break_at}: not a connected input; connected inputs: {', '.join(self.inputs)}"
             )
         return self.inputs.index(break_at)
 
     # ------------------------------------------------------------------ models
     def continuous(self, break_at: str | None = None) -> LinearModel:
-        """A, B, C, D: from the excitations to the channels, or of the loop L opened at an input ("slot.variable")."""
+        """Return A, B, C, D from excitations to channels, or of the loop L opened at an input ("slot.variable")."""
         from scipy.linalg import block_diag
 
         blocks = [self.blocks[s] for s in self.order]
         a, b, c, d = (block_diag(*(getattr(p, m) for p in blocks)) for m in "abcd")
         k, w = self.k.copy(), self.w
-        back = np.zeros((0, len(self.outputs)))
+        return_row = np.zeros((0, len(self.outputs)))
         if break_at is not None:
             row = self._row(break_at)
-            back = k[row : row + 1].copy()
+            return_row = k[row : row + 1].copy()
             k[row] = 0.0
             w = np.zeros((len(self.inputs), 1))
             w[row] = 1.0
@@ -185,12 +185,12 @@ class Linear:
         uk, uw = solve @ k @ c, solve @ w
         cy, dy = c + d @ uk, d @ uw
         if break_at is not None:
-            return _model(a + b @ uk, b @ uw, -back @ cy, -back @ dy, [break_at], ["L"], self.states, 0.0)
+            return _model(a + b @ uk, b @ uw, -return_row @ cy, -return_row @ dy, [break_at], ["L"], self.states, 0.0)
         rows = [self.outputs.index(n) for n in self.shown]
         return _model(a + b @ uk, b @ uw, cy[rows], dy[rows], self.outside, self.shown, self.states, 0.0)
 
     def discrete(self, break_at: str | None = None) -> LinearModel:
-        """The same for the macro step of the co-simulation; states: those of the parts and the values over cuts."""
+        """Return the same for the communication step; states: those of the parts and the values of cut wires."""
         names_of = {s: self.sampled[s].names if s in self.sampled else self.blocks[s].states for s in self.order}
         all_states = [f"{s}.{v}" for s in self.order for v in names_of[s]]
         nx, nc = len(all_states), len(self.cut)
@@ -200,9 +200,9 @@ class Linear:
         y = np.zeros((len(self.outputs), width))
         for j, name in enumerate(self.cut):
             y[self.outputs.index(name), nx + j] = 1.0
-        put = np.zeros((n_in, width))
-        put[:, nx + nc :] = np.eye(n_in)
-        came = np.zeros((1, width))
+        injected = np.zeros((n_in, width))
+        injected[:, nx + nc :] = np.eye(n_in)
+        returned = np.zeros((1, width))
         broken = -1 if break_at is None else self._row(break_at)
         first_x = first_u = first_y = 0
         for slot in self.order:
@@ -210,18 +210,18 @@ class Linear:
             u_at = slice(first_u, first_u + len(p.inputs))
             x_at = slice(first_x, first_x + len(names_of[slot]))
             y_at = slice(first_y, first_y + len(p.outputs))
-            u = self.k[u_at] @ y + (self.w[u_at] @ put if break_at is None else 0.0)
+            u = self.k[u_at] @ y + (self.w[u_at] @ injected if break_at is None else 0.0)
             if u_at.start <= broken < u_at.stop:
-                came = u[broken - u_at.start : broken - u_at.start + 1].copy()
-                u[broken - u_at.start] = put[0]
-            own = self.sampled.get(slot)
-            ad, bd = (own.a, own.b) if own else p.held(self.step)
-            c, d = (own.c, own.d) if own else (p.c, p.d)
+                returned = u[broken - u_at.start : broken - u_at.start + 1].copy()
+                u[broken - u_at.start] = injected[0]
+            model = self.sampled.get(slot)
+            ad, bd = (model.a, model.b) if model else p.held(self.step)
+            c, d = (model.c, model.d) if model else (p.c, p.d)
             x[x_at] = ad @ x[x_at] + bd @ u
             y[y_at] = c @ x[x_at] + d @ u
             first_u, first_x, first_y = u_at.stop, x_at.stop, y_at.stop
         after = np.vstack([x, y[[self.outputs.index(n) for n in self.cut]]])
-        shown = -came if break_at is not None else y[[self.outputs.index(n) for n in self.shown]]
+        shown = -returned if break_at is not None else y[[self.outputs.index(n) for n in self.shown]]
         n = nx + nc
         names = ([break_at], ["L"]) if break_at is not None else (self.outside, self.shown)
         states = [*all_states, *(f"{c} (step before)" for c in self.cut)]
@@ -238,7 +238,7 @@ def _model(
 
 
 def poles(model: LinearModel) -> list[complex]:
-    """Poles in the s plane, rad/s; of a discrete model ln(z) / step, without those at z = 0 (pure delays)."""
+    """Return the poles in the s plane, rad/s; of a discrete model ln(z) / step, without z = 0 (pure delays)."""
     eigenvalues = np.linalg.eigvals(np.asarray(model.A, float)) if model.A else np.zeros(0)
     if not model.step:
         return [complex(p) for p in eigenvalues]
@@ -246,7 +246,7 @@ def poles(model: LinearModel) -> list[complex]:
 
 
 def unstable(model: LinearModel) -> list[complex]:
-    """Poles in the right half plane, the fastest growing first; those nearer to 0 than 0.01 rad/s do not count.
+    """Return the poles in the right half plane, the fastest growing first, but those nearer to 0 than 0.01 rad/s.
 
     Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
     at z = 1, by the third root of 1e-16.
@@ -273,7 +273,7 @@ def loops(
         for name, at in assembly.system.loops.items():
             loops_[name] = OpenLoop.model_validate({"break": at, **{kind: model(at) for kind, model in kinds.items()}})
         models = LinearModels(closed=LinearPair(**{kind: model() for kind, model in kinds.items()}), loops=loops_)
-    except ComponentError as error:  # the run will say it too
+    except ComponentError as error:  # the run reports it too
         return LinearModels(missing=str(error)), []
     except LinearizationError as error:
         return LinearModels(missing=str(error)), [f"no margins from linearized parts: {error}"]
@@ -287,7 +287,7 @@ def loops(
 
 
 def _written(p: complex) -> str:
-    """A pole for people: -9.1 1/s, or 2.3 ± 89j rad/s with its frequency."""
+    """Return a pole as text: -9.1 1/s, or 2.3 ± 89j rad/s with its frequency."""
     if abs(p.imag) < 1e-9 * abs(p):
         return f"{p.real:+.4g} 1/s"
     return f"{p.real:+.4g} ± {p.imag:.4g}j rad/s ({p.imag / (2.0 * np.pi):.4g} Hz)"

@@ -9,7 +9,7 @@ from gyrobench.component import Component, ComponentError
 
 
 def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Any, Any, Any, Any]:
-    """A, B, C, D of the part at its present point, numpy arrays; see :func:`state_space`."""
+    """Return A, B, C, D of the part at its present point, numpy arrays; see :func:`state_space`."""
     import numpy as np
 
     for names, section in ((inputs, "input"), (outputs, "output")):
@@ -33,7 +33,7 @@ def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) ->
 
 
 def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) -> Any:
-    """The part's linearization at its present point, as a continuous ``control.StateSpace``.
+    """Return the linearization of the part at its present point, as a continuous ``control.StateSpace``.
 
         dx' = A dx + B du        dy = C dx + D du
 
@@ -42,7 +42,7 @@ def state_space(part: Component, inputs: Sequence[str], outputs: Sequence[str]) 
     differentiation of ``flow`` and ``outputs``: exact at a smooth point; where a limit or a quantizer is active,
     those of the branch taken.  Set inputs, and step or set states, to move the point.
 
-    Raises ComponentError for a name that is no input, or no output, of the part.
+    Raises ComponentError for a name that is not an input, or not an output, of the part.
 
     Not modelled: sampled methods and the held inputs of a communication step.
     """

@@ -19,7 +19,7 @@ from gyrobench.component import Component, ComponentError
 Array = NDArray[np.float64]
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
-MOST = 60  # discrete values: more are a memory, whose step is not the same one step later
+MAX_DISCRETE = 60  # discrete values: more are a memory, whose step is not the same one step later
 
 
 @dataclass
@@ -34,7 +34,7 @@ class Step:
 
 
 def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
-    """The step of ``part`` at its present point; None where no sampled method passes an input on to an output.
+    """Return the linear step of ``part`` at its present point; None where no sampled method links input and output.
 
     Raises ValueError (the text says why) for a part whose step is not the same one step later.
     """
@@ -43,16 +43,16 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         return None
     twin = type(part)(part.instance)
     twin.set_state(part.get_state())
-    heard = _heard(twin, inputs, discrete, step)
-    if not heard.any():
+    reached = _reached(twin, inputs, discrete, step)
+    if not reached.any():
         return None
-    if len(discrete) > MOST:
+    if len(discrete) > MAX_DISCRETE:
         raise ValueError(f"keeps {len(discrete)} values in memory")
     first = _differences(twin, inputs, outputs, step, discrete)
     n = len(part.states)
     for _ in discrete:  # what is handed on from value to value
-        heard = heard | np.any(first.a[n:, n:][:, heard], axis=1)
-    if not (np.any(first.a[:n, n:][:, heard]) or np.any(first.c[:, n:][:, heard])):
+        reached = reached | np.any(first.a[n:, n:][:, reached], axis=1)
+    if not (np.any(first.a[:n, n:][:, reached]) or np.any(first.c[:, n:][:, reached])):
         return None  # none that the inputs reach goes further; constants of the part do not count
     try:
         for k in range(SETTLED):
@@ -69,9 +69,9 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     return last
 
 
-def _heard(part: Component, inputs: list[str], discrete: list[str], step: float) -> NDArray[np.bool_]:
-    """Which discrete values after two steps depend on the inputs, or on the states before."""
-    seen = []
+def _reached(part: Component, inputs: list[str], discrete: list[str], step: float) -> NDArray[np.bool_]:
+    """Return which discrete values depend after two steps on the inputs, or on the previous states."""
+    values = []
     for size in (0.0, DELTA):
         twin = type(part)(part.instance)
         twin.set_state(part.get_state())
@@ -79,8 +79,8 @@ def _heard(part: Component, inputs: list[str], discrete: list[str], step: float)
             twin.set(n, twin.get(n) + size)
         for k in range(2):
             twin.do_step(k * step, step)
-        seen.append(np.array([twin.get(n) for n in discrete]))
-    return np.asarray(seen[0] != seen[1])
+        values.append(np.array([twin.get(n) for n in discrete]))
+    return np.asarray(values[0] != values[1])
 
 
 def _differences(part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]) -> Step:
@@ -88,7 +88,7 @@ def _differences(part: Component, inputs: list[str], outputs: list[str], step: f
     kept: Any = part.get_state()
 
     def column(name: str, after: Callable[[], list[float]], move: bool) -> Array:
-        found = []
+        shifted = []
         for sign in (1.0, -1.0):
             part.set_state(kept)
             x = part.get(name)
@@ -96,9 +96,9 @@ def _differences(part: Component, inputs: list[str], outputs: list[str], step: f
             part.set(name, x + sign * size)
             if move:
                 part.do_step(part.t, step)
-            found.append(np.array(after()))
+            shifted.append(np.array(after()))
         part.set_state(kept)
-        return np.asarray((found[0] - found[1]) / (2.0 * size))
+        return np.asarray((shifted[0] - shifted[1]) / (2.0 * size))
 
     def state() -> list[float]:
         return [part.get(n) for n in names]

@@ -1,4 +1,4 @@
-"""Scalars and arrays of the equations as C text: what an expression is worth, element by element."""
+"""Scalars and arrays of the equations as C text, element by element."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class Place:
 
     @property
     def whole(self) -> bool:
-        """True where the elements stand one after the other from the first: no slice."""
+        """Whether the elements are contiguous from the first on: no slice."""
         return all(isinstance(t, str) for t in self.taken)
 
     def at(self, *indices: str) -> str:
         """Return the text of one element."""
-        rest = iter(indices)
+        remaining = iter(indices)
         text = self.base
         for t in self.taken:
-            text += f"[{t}]" if isinstance(t, str) else f"[{_shifted(next(rest), t[0])}]"
-        return text + "".join(f"[{i}]" for i in rest)
+            text += f"[{t}]" if isinstance(t, str) else f"[{_shifted(next(remaining), t[0])}]"
+        return text + "".join(f"[{i}]" for i in remaining)
 
     def indexed(self, index: str | Span) -> Place:
         """Return the piece at an index, or a slice, of the first dimension that is left."""
@@ -86,5 +86,5 @@ def dimensions(shape: Shape) -> str:
 
 
 def words(shape: Shape) -> str:
-    """Return a shape as a person reads it."""
+    """Return a shape as text."""
     return "a number" if not shape else f"an array ({' x '.join(map(str, shape))})"

@@ -32,7 +32,7 @@ class CompilerError(GyrobenchError):
 
 
 def this_platform() -> str:
-    """The FMI 2 platform name of the running interpreter."""
+    """Return the FMI 2 platform name of the running interpreter."""
     machine = sysconfig.get_platform().lower()
     arm = "aarch64" in machine or "arm64" in machine
     if sys.platform == "win32":
@@ -44,7 +44,7 @@ def this_platform() -> str:
 
 @functools.cache
 def system_compiler() -> tuple[str, ...] | None:
-    """``CC``, cc, gcc or clang, whichever is found first; None where there is none."""
+    """Return ``CC``, cc, gcc or clang, the first available one; None where there is none."""
     for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
         path = shutil.which(name) if name else None
         if path:
@@ -53,7 +53,7 @@ def system_compiler() -> tuple[str, ...] | None:
 
 
 def command(platform: str) -> tuple[str, ...] | None:
-    """The compiler and its target options for ``platform``; None where there is none."""
+    """Return the compiler and its target options for ``platform``; None where there is none."""
     if platform == this_platform() and system_compiler():
         return system_compiler()
     if importlib.util.find_spec("ziglang"):
@@ -63,7 +63,7 @@ def command(platform: str) -> tuple[str, ...] | None:
 
 @functools.cache
 def identity(platform: str) -> str:
-    """What a cached binary depends on besides its source: compiler, version, flags."""
+    """Return what a cached binary depends on besides its source: compiler, version, flags."""
     cc = command(platform)
     if cc is None:
         return "none"
@@ -72,7 +72,7 @@ def identity(platform: str) -> str:
 
 
 def compile_library(source: Path, output: Path, includes: tuple[Path, ...], platform: str) -> None:
-    """Compiles one C file to a shared library.  Raises CompilerError with the compiler's words."""
+    """Compile one C file to a shared library.  Raises CompilerError with the compiler's message."""
     cc = command(platform)
     if cc is None:
         raise CompilerError(

@@ -1,4 +1,4 @@
-"""What the outputs of a part depend on, without delay: read from the syntax trees, along all that is called."""
+"""Direct dependencies of the outputs of a part, read from the syntax trees, along all calls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Reach: TypeAlias = dict[str, set[str]]  # variable -> the inputs it follows
 
 
 def called(e: ast.AST, code: Code, source: Source) -> Code | None:
-    """Return the procedure or function that an expression calls; None where it calls none of the part's."""
+    """Return the procedure or function that an expression calls; None where it does not call one of the part's."""
     if not isinstance(e, ast.Call):
         return None
     if isinstance(e.func, ast.Name):
@@ -30,7 +30,7 @@ def called(e: ast.AST, code: Code, source: Source) -> Code | None:
 
 
 class Dependencies:
-    """Which inputs (declared names) the variables written by one kind of equation follow."""
+    """The inputs (declared names) that the variables written by one kind of equation depend on."""
 
     def __init__(self, source: Source, kind: str) -> None:
         self.source = source
@@ -50,19 +50,19 @@ class Dependencies:
             name = flat_name(e, code)
             if name is not None:
                 return self.reach.get(name, set()) | ({name} & self.inputs)
-        found: set[str] = set()
+        inputs: set[str] = set()
         callee = called(e, code, self.source)
         if callee is not None:
             assert isinstance(e, ast.Call)
             args = [self.read(a, code, locals_) for a in e.args]
             inner = dict(zip(callee.arguments, args, strict=False))
-            return found.union(*args, self.run(callee.node.body, callee, inner, set()))
+            return inputs.union(*args, self.run(callee.node.body, callee, inner, set()))
         for child in ast.iter_child_nodes(e):
-            found |= self.read(child, code, locals_)
-        return found
+            inputs |= self.read(child, code, locals_)
+        return inputs
 
     def run(self, statements: Iterable[ast.stmt], code: Code, locals_: Reach, under: set[str]) -> set[str]:
-        """Follow statements; return what the values they return follow.  under: what decides whether they run."""
+        """Follow statements; return what their returned values depend on.  under: what decides whether they run."""
         under, given = set(under), set()
         for s in statements:
             if isinstance(s, ast.Assign | ast.AugAssign | ast.AnnAssign) and s.value is not None:
@@ -107,15 +107,15 @@ def flat_name(e: ast.AST, code: Code) -> str | None:
 
 def reached(code: Code, source: Source) -> Iterator[Code]:
     """Yield a piece of code and all that it calls."""
-    seen: list[Code] = [code]
-    for c in seen:
+    codes: list[Code] = [code]
+    for c in codes:
         yield c
         for n in c.nodes():
             callee = called(n, c, source)
             if callee is not None and all(
-                callee.function is not s.function or callee.placed is not s.placed for s in seen
+                callee.function is not s.function or callee.placed is not s.placed for s in codes
             ):
-                seen.append(callee)
+                codes.append(callee)
 
 
 def read_names(code: Code, source: Source) -> set[str]:

@@ -22,7 +22,7 @@ TYPES = {float: "Real", int: "Integer", bool: "Boolean"}
 
 
 def summary(cls: type[Component]) -> str:
-    """The first line of the docstring, without its source marks."""
+    """Return the first line of the docstring, without its source marks."""
     return (cls.__doc__ or cls.__name__).strip().splitlines()[0].split("  [")[0].rstrip(".")
 
 
@@ -33,7 +33,7 @@ def number(x: float, kind: type) -> str:
 
 
 def unit_name(s: Scalar) -> str:
-    """The unit of a scalar; that of a state derivative is the state's per second."""
+    """Return the unit of a scalar; that of a state derivative is the state's per second."""
     return f"{s.decl.unit}/s" if s.section == "derivative" else s.decl.unit
 
 
@@ -75,7 +75,7 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
 
 
 def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -> None:
-    """The definitions of all units in use, spelled out in base units."""
+    """Return the definitions of all units in use, spelled out in base units."""
     used = sorted({unit_name(s) for s in cls.layout if s.decl.type is float} | set(extra))
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name in used:
@@ -90,7 +90,7 @@ def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -
 
 
 def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
-    """The XML text.  ``target`` is "native" or "python": what each can do differs."""
+    """Return the XML text.  ``target`` is "native" or "python": what each can do differs."""
     source = Source(cls)
     root = ET.Element(
         "fmiModelDescription",
@@ -136,7 +136,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
 
 
 def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
-    """Outputs with the inputs and states they follow without delay; derivatives; initial unknowns."""
+    """Return the outputs with the inputs and states they follow without delay; derivatives; initial unknowns."""
     depends = {
         "output": dependencies(source, "outputs"),
         "derivative": {},

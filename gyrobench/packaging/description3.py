@@ -17,13 +17,13 @@ TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 
 
 def time_name(cls: type[Component]) -> str:
-    """The name of the independent variable: "time", unless the part has a variable of that name."""
+    """Return the name of the independent variable: "time", unless the part has a variable of that name."""
     taken = {s.name for s in cls.layout}
     return next(n for n in ("time", "simulation_time", "independent_time") if n not in taken)
 
 
 def build_description(identifier: str) -> str:
-    """sources/buildDescription.xml: how to compile the sources."""
+    """Return sources/buildDescription.xml: how to compile the sources."""
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     one = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     files = ET.SubElement(one, "SourceFileSet", {"language": "C11"})
@@ -69,7 +69,7 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
 
 
 def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
-    """The XML text of the native FMI 3.0 FMU."""
+    """Return the XML text of the native FMI 3.0 FMU."""
     root = ET.Element(
         "fmiModelDescription",
         {

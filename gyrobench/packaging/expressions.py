@@ -44,7 +44,7 @@ class Expressions:
         self.loops: dict[str, Range] = {}
         self.arguments = dict(zip(code.arguments, shapes, strict=True))
         self.assigned = set(self.arguments)  # locals that surely have a value here
-        self.pre: list[str] = []  # statements that come before the one in hand
+        self.pre: list[str] = []  # statements that come before the current one
         self.temporaries = 0
         self.touched: set[str] = set()  # flat names that are written, here or in what is called
 
@@ -53,7 +53,7 @@ class Expressions:
 
     # ------------------------------------------------------------------------------ places
     def index(self, e: ast.expr) -> tuple[str, Range]:
-        """A whole number, counted from 0: loop variables, literals, + - *, and index(expr)."""
+        """Return an index, counted from 0, and its range: loop variables, literals, + - *, and index(expr)."""
         if isinstance(e, ast.Constant) and isinstance(e.value, int):
             return str(e.value), (e.value, e.value)
         if isinstance(e, ast.Name) and e.id in self.loops:
@@ -93,10 +93,10 @@ class Expressions:
             raise self.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
         if isinstance(e, ast.Attribute) and not self.transposes(e):
             return self.attribute(e)
-        found = self.value(e)
-        if not found.shape:
+        value = self.value(e)
+        if not value.shape:
             raise self.refuse(e, f"{ast.unparse(e)} is a number: it has no elements")
-        return self.kept(found)
+        return self.kept(value)
 
     def element(self, e: ast.Subscript) -> Place:
         of = self.place(e.value)
@@ -144,12 +144,12 @@ class Expressions:
             return Place(f"der.{member(name)}", "self", f"der.{name}", d.shape)
         if source == "self.noise" and any(n.name == name for n in self.translation.source.cls.noises):
             return Place(f"noise.{member(name)}", "self", f"noise.{name}")
-        if source.startswith("self.") and (found := self.of_block(e, source)) is not None:
-            return found
+        if source.startswith("self.") and (place := self.of_block(e, source)) is not None:
+            return place
         raise self.refuse(e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise")
 
     def of_block(self, e: ast.Attribute, source: str) -> Place | None:
-        """``self.block.x``: a declaration of a block."""
+        """Return ``self.block.x``, a declaration of a block; None where there is no such block."""
         blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
         placed = blocks.get(source.removeprefix("self."))
         if placed is None:
@@ -162,16 +162,16 @@ class Expressions:
     # ------------------------------------------------------------------------------ expressions
     def expression(self, e: ast.expr) -> str:
         """Return the text of a number."""
-        found = self.value(e)
-        if found.shape:
-            raise self.refuse(e, f"{ast.unparse(e)} is {words(found.shape)}: take one element of it")
-        return found.text
+        value = self.value(e)
+        if value.shape:
+            raise self.refuse(e, f"{ast.unparse(e)} is {words(value.shape)}: take one element of it")
+        return value.text
 
     def value(self, e: ast.expr) -> Value:
         d = self.dual
         if isinstance(e, ast.Constant):
             if isinstance(e.value, bool) or not isinstance(e.value, int | float):
-                raise self.refuse(e, f"{e.value!r} is no number: equations are of numbers only")
+                raise self.refuse(e, f"{e.value!r} is not a number: equations contain numbers only")
             if abs(e.value) > 1.7e308:
                 raise self.refuse(e, f"{e.value!r} is not finite")
             return self.number(f"d_con({float(e.value)!r})" if d else repr(float(e.value)), plain=True)
@@ -244,7 +244,7 @@ class Expressions:
     def check_arithmetic(self, e: ast.BinOp, a: Value, b: Value) -> None:
         for side in (e.left, e.right):
             if isinstance(side, ast.Name) and side.id in self.bare:
-                raise self.refuse(side, f"{side.id} is a list: write {side.id} = vector([...]), which knows arithmetic")
+                raise self.refuse(side, f"{side.id} is a list: write {side.id} = vector([...]), which has arithmetic")
         text, shapes = ast.unparse(e), f"{words(a.shape)} and {words(b.shape)}"
         if isinstance(e.op, ast.Add | ast.Sub) and a.shape != b.shape:
             raise self.refuse(e, f"{text}: {shapes} are not added")
@@ -254,16 +254,16 @@ class Expressions:
             raise self.refuse(e, f"{text}: only a number divides")
 
     def operand(self, e: ast.expr) -> Value:
-        """An array of which elements are read several times: kept in a temporary if it is computed."""
+        """Return an array whose elements are read several times: a temporary where it is computed."""
         if isinstance(e, ast.Name) and e.id in self.bare:
-            raise self.refuse(e, f"{e.id} is a list: write {e.id} = vector([...]), which knows arithmetic")
-        found = self.value(e)
-        if not found.shape:
+            raise self.refuse(e, f"{e.id} is a list: write {e.id} = vector([...]), which has arithmetic")
+        value = self.value(e)
+        if not value.shape:
             raise self.refuse(e, f"{ast.unparse(e)} is a number: a vector or a matrix is needed here")
-        return found if found.plain else self.of_place(self.kept(found))
+        return value if value.plain else self.of_place(self.kept(value))
 
     def product(self, e: ast.expr, a: Value, b: Value) -> Value:
-        """a @ b, summed from left to right."""
+        """Return a @ b, summed from left to right."""
         if a.shape[-1] != b.shape[0]:
             raise self.refuse(e, f"{ast.unparse(e)}: {words(a.shape)} and {words(b.shape)} do not fit")
         shape = a.shape[:-1] + b.shape[1:]
@@ -345,13 +345,13 @@ class Expressions:
         if of == "self":
             code = source.method(e.func.attr, self.code)
             if code is None:
-                raise self.refuse(e, f"self.{e.func.attr} is no procedure of this part")
+                raise self.refuse(e, f"self.{e.func.attr} is not a procedure of this part")
             return code
         blocks = self.code.placed.blocks if self.code.placed else source.cls.placed
         if of.removeprefix("self.") in blocks:
             code = source.block_method(of.removeprefix("self."), e.func.attr, self.code)
             if code is None:
-                raise self.refuse(e, f"{of}.{e.func.attr} is no procedure of this block")
+                raise self.refuse(e, f"{of}.{e.func.attr} is not a procedure of this block")
             return code
         return None
 
@@ -389,12 +389,12 @@ class Expressions:
             if isinstance(e.args[0], ast.Name) and (constant := self.code.array(e.args[0].id)) is not None:
                 return self.literal(constant)
             if not isinstance(e.args[0], ast.List):
-                found = self.value(e.args[0])
-                if not found.shape:
+                value = self.value(e.args[0])
+                if not value.shape:
                     raise self.refuse(
                         e, f"{ast.unparse(e.args[0])} is a number: write vector([...]), or an array to copy"
                     )
-                return Value(found.shape, found.element, False, found.aligned, "", found.reads)
+                return Value(value.shape, value.element, False, value.aligned, "", value.reads)
             return self.literal(e.args[0])
         a, b = (self.operand(x) for x in e.args)
         if name == "dot":
@@ -413,7 +413,7 @@ class Expressions:
         return Value((3,), element, False, False, "", _reads((a, b)))
 
     def literal(self, e: ast.List) -> Value:
-        """[a, b, c], or a list of such lists or vectors."""
+        """Return the value of [a, b, c], or of a list of such lists or vectors."""
         rows = [self.literal(r) if isinstance(r, ast.List) else self.value(r) for r in e.elts]
         if len({r.shape for r in rows}) != 1:
             raise self.refuse(e, "an array is a list of numbers, or of lists of equal length")
@@ -432,7 +432,7 @@ class Expressions:
         return Place(name, "local", name, shape)
 
     def settled(self, p: Place) -> Place:
-        """A row whose index is known when it runs: the index is computed once for all its elements."""
+        """Return a place whose run-time indices are computed once for all its elements."""
         if not p.shape or not any(isinstance(t, str) and t.startswith("at(") for t in p.taken):
             return p
         taken: list[str | Span] = []
@@ -445,13 +445,13 @@ class Expressions:
         return Place(p.base, p.kind, p.name, p.dims, tuple(taken))
 
     def kept(self, v: Value) -> Place:
-        """Compute an array before the statement in hand, into a temporary."""
+        """Compute an array before the current statement, into a temporary."""
         at = self.temporary(v.shape)
         self.pre += [f"{at.at(*i)} = {v.element(*i)};" for i in cells(v.shape)]
         return at
 
     def named(self, v: Value) -> Value:
-        """Compute a number before the statement in hand, so that all elements share it."""
+        """Compute a number before the current statement, so that all elements share it."""
         at = self.temporary(())
         self.pre.append(f"{at.base} = {v.text};")
         return self.of_place(at)
@@ -462,10 +462,10 @@ class Expressions:
             word = " && " if isinstance(e.op, ast.And) else " || "
             first = self.condition(e.values[0])
             before = len(self.pre)
-            rest = [self.condition(v) for v in e.values[1:]]
+            further = [self.condition(v) for v in e.values[1:]]
             if len(self.pre) > before:
                 raise self.refuse(e, "an array is computed behind and/or: assign it to a local before")
-            return "(" + word.join([first, *rest]) + ")"
+            return "(" + word.join([first, *further]) + ")"
         if isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.Not):
             return f"!({self.condition(e.operand)})"
         if isinstance(e, ast.Compare):
@@ -488,7 +488,7 @@ def _reads(of: tuple[Value, ...]) -> frozenset[str]:
 
 
 def logical(e: ast.expr) -> bool:
-    """Whether an expression is true or false in Python (`a and b` of numbers is one of the numbers)."""
+    """Return whether an expression is true or false in Python (`a and b` of numbers is one of the numbers)."""
     if isinstance(e, ast.BoolOp):
         return all(logical(v) for v in e.values)
     return isinstance(e, ast.Compare) or (isinstance(e, ast.UnaryOp) and isinstance(e.op, ast.Not))

@@ -32,7 +32,7 @@ def _guid(digest: str) -> str:
 
 
 def _tool_text() -> str:
-    """All files whose text decides what a build writes."""
+    """Return all files whose text determines what a build writes."""
     here = Path(__file__).parent
     after = ("__init__", "instance", "reference", "validate")  # these run what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
@@ -71,7 +71,7 @@ def _native_entries(
 
 
 def _folder_of(platform: str, fmi: int) -> str:
-    """FMI 2 calls it linux64, FMI 3 x86_64-linux."""
+    """Return the name of a platform in an FMI version: linux64 in FMI 2, x86_64-linux in FMI 3."""
     three = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
     return three.get(platform, platform) if fmi == 3 else platform
 

@@ -1,7 +1,7 @@
 """One instance of a part, driven by FMI names, whatever it is: the plain class or an FMU under FMPy.
 
 Tests, reference runs and validation use it.  Values are SI floats; an Integer or Boolean is given and returned
-as a float too.  Every failure raises :class:`InstanceError`, whose text is what the part said.
+as a float too.  Every failure raises :class:`InstanceError`, whose text is what the part logged.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class InstanceError(GyrobenchError):
 
 
 class Instance(Protocol):
-    """From instantiation on: set parameters and inputs, initialize, then set / step / get."""
+    """An instantiated part: set parameters and inputs, initialize, then set, step and get."""
 
     def set(self, values: dict[str, float]) -> None: ...
     def get(self, names: Sequence[str]) -> list[float]: ...
@@ -45,7 +45,7 @@ class Instance(Protocol):
 
 
 class Plain:
-    """The class itself."""
+    """An instance of the plain class."""
 
     messages: ClassVar[list[str]] = []
 
@@ -177,7 +177,7 @@ class Fmu:
             return function(*args, **kwargs)
         except FMICallException as e:
             raise InstanceError(name, e.status, self.messages) from None
-        except Exception as e:  # FMPy's own words when instantiation gives no instance
+        except Exception as e:  # FMPy's own message when instantiation fails
             if name != "instantiate":
                 raise
             raise InstanceError(name, None, self.messages or [str(e)]) from None
@@ -196,12 +196,12 @@ class Fmu:
             self._call("set", getattr(self.fmu, f"set{kind}"), references, given)
 
     def get(self, names: Sequence[str]) -> list[float]:
-        found: dict[str, float] = {}
+        values_of: dict[str, float] = {}
         for kind, group in self._groups(names).items():
             references = [self.variables[n].valueReference for n in group]
             values = self._call("get", getattr(self.fmu, f"get{kind}"), references)
-            found.update(zip(group, map(float, values), strict=True))
-        return [found[n] for n in names]
+            values_of.update(zip(group, map(float, values), strict=True))
+        return [values_of[n] for n in names]
 
     def initialize(self, t0: float = 0.0) -> None:
         if self.three:
@@ -215,7 +215,7 @@ class Fmu:
         self._call("step", self.fmu.doStep, t, h)
 
     def derivative(self, unknown: Sequence[str], known: dict[str, float]) -> list[float]:
-        """Directional derivative of the unknowns along ``known``."""
+        """Return the directional derivative of the unknowns along ``known``."""
         z = [self.variables[n].valueReference for n in unknown]
         v = [self.variables[n].valueReference for n in known]
         return list(self._call("derivative", self.fmu.getDirectionalDerivative, z, v, list(known.values())))
@@ -238,7 +238,7 @@ class Fmu:
         self._call("reset", self.fmu.reset)
 
     def free(self) -> None:
-        """Frees the instance, and the unzipped folder if it was made for it."""
+        """Free the instance, and remove the unzipped folder if it was made for it."""
         self.fmu.freeInstance()
         _logs.pop(self.identity, None)
         if self._own:
@@ -249,7 +249,7 @@ TARGETS = ("plain", "python", "native", "native-fmi3")
 
 
 def make(part: str | type[Component], target: str, name: str = "part", bench: Path | None = None) -> Instance:
-    """A fresh instance of a part for one of :data:`TARGETS`; FMUs are built (or taken from the cache)."""
+    """Return a new instance of a part for one of :data:`TARGETS`; FMUs are built (or taken from the cache)."""
     if target == "plain":
         return Plain(load_part(part, bench) if isinstance(part, str) else part, name)
     if target not in TARGETS:

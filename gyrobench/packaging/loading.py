@@ -56,9 +56,9 @@ def content_imports(folder: Path, part: Path | None = None) -> Iterator[dict[str
     package.__path__ = [str(r) for r in roots]
     sys.modules[ROOM] = package
     if part is not None:
-        own = ModuleType(f"{ROOM}.{part.name}")
-        own.__path__ = [str(r / part.name) for r in roots if r / part.name != part]
-        sys.modules[own.__name__] = own
+        package_of_part = ModuleType(f"{ROOM}.{part.name}")
+        package_of_part.__path__ = [str(r / part.name) for r in roots if r / part.name != part]
+        sys.modules[package_of_part.__name__] = package_of_part
     files: dict[str, Path] = {}
     try:
         yield files
@@ -80,14 +80,14 @@ def load_part(name: str, bench: Path | None = None) -> type[Component]:
     key = "gyrobench_part_" + hashlib.sha256(f"{home.folder}:{path.resolve()}".encode()).hexdigest()[:16]
     with content_imports(home.folder, path.parent) as files:
         module = import_file(path, key)
-    own = [
+    classes = [
         c
         for c in vars(module).values()
         if inspect.isclass(c) and issubclass(c, Component) and c.__module__ == module.__name__
     ]
-    if len(own) != 1:
-        raise BuildError(f"{path}: one Component class is expected, found {len(own)}")
-    cls: type[Component] = own[0]
+    if len(classes) != 1:
+        raise BuildError(f"{path}: one Component class is expected, found {len(classes)}")
+    cls: type[Component] = classes[0]
     cls.sources = {"model": str(path), **{n: str(f) for n, f in files.items()}}
     _loaded[f"{home.folder}:{path.resolve()}"] = cls, {f: _digest(f) for f in (path, *files.values())}
     return cls
@@ -95,8 +95,8 @@ def load_part(name: str, bench: Path | None = None) -> type[Component]:
 
 def sources(cls: type[Component]) -> dict[str, Path]:
     """Return the files that a part consists of by module name, its own as "model" first."""
-    found: dict[str, str] = vars(cls).get("sources", {})
-    return {n: Path(f) for n, f in found.items()} or {"model": Path(inspect.getfile(cls))}
+    files: dict[str, str] = vars(cls).get("sources", {})
+    return {n: Path(f) for n, f in files.items()} or {"model": Path(inspect.getfile(cls))}
 
 
 def _digest(path: Path) -> str:

@@ -16,7 +16,7 @@ PER = {"start": 0, "step": 1, "second": 2}
 
 
 def _struct(cls: type[Component]) -> str:
-    """``Vars``: the declarations in the order of the value references."""
+    """Return ``Vars``, the declarations in the order of the value references."""
     lines: list[str] = []
     done: set[tuple[str, str]] = set()
     inner: list[str] = []
@@ -46,7 +46,7 @@ def _table(head: str, rows: list[str], empty: str) -> str:
 
 
 def first_of(cls: type[Component], section: str) -> int:
-    """The first value reference of a section, or where it would stand."""
+    """Return the first value reference of a section, or where it would stand."""
     order = ("parameter", "input", "output", "state", "derivative", "discrete")
     return sum(1 for s in cls.layout if order.index(s.section) < order.index(section))
 
@@ -57,18 +57,18 @@ def _bounds(s: Scalar) -> list[str]:
 
 
 def _runs(references: list[int]) -> list[tuple[int, int]]:
-    """Rising numbers as runs of consecutive ones: (first, how many)."""
-    found: list[tuple[int, int]] = []
+    """Return rising numbers as runs of consecutive ones: (first, count)."""
+    runs: list[tuple[int, int]] = []
     for r in references:
-        if found and sum(found[-1]) == r:
-            found[-1] = found[-1][0], found[-1][1] + 1
+        if runs and sum(runs[-1]) == r:
+            runs[-1] = runs[-1][0], runs[-1][1] + 1
         else:
-            found.append((r, 1))
-    return found
+            runs.append((r, 1))
+    return runs
 
 
 def c_source(cls: type[Component], guid: str) -> str:
-    """model.c of a part.  Raises SubsetError where an equation leaves the subset."""
+    """Return model.c of a part.  Raises SubsetError where an equation leaves the subset."""
     source = Source(cls)
     layout = cls.layout
     counts = {s: sum(1 for x in layout if x.section == s) for s in {x.section for x in layout}}
@@ -130,14 +130,14 @@ def c_source(cls: type[Component], guid: str) -> str:
 
 
 def header_folder() -> Path:
-    """The FMI headers that the installed FMPy brings."""
+    """Return the folder of the FMI headers of the installed FMPy."""
     spec = importlib.util.find_spec("fmpy")
     assert spec is not None and spec.origin is not None
     return Path(spec.origin).parent / "c-code"
 
 
 def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
-    """Everything a C compiler needs, by file name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
+    """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
     headers = [f"fmi{fmi}Functions.h", f"fmi{fmi}FunctionTypes.h"]
     headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
     return {

@@ -32,8 +32,8 @@ from {unique}.component import ComponentError
 from {unique}.model import {cls} as Part
 
 
-def told(call):
-    """The refusal of a call, or the traceback of a fault, goes to the FMI log, even if logging is off.
+def logged(call):
+    """Write the refusal of a call, or the traceback of a fault, to the FMI log, even if logging is off.
 
     pythonfmu 0.7.0 answers an exception with fmi2Fatal and drops its references to instance, class and log,
     but uses them again when the instance is reset or freed: each is given one reference more.
@@ -65,45 +65,45 @@ class {cls}(Fmi2Slave):
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
         self.t0 = start_time
 
-    @told
+    @logged
     def exit_initialization_mode(self):
         self.part.initialize(self.t0)
 
-    @told
+    @logged
     def do_step(self, current_time, step_size):
         self.part.do_step(current_time, step_size)
         return True  # False would be fmi2Discard, which a master may take for the planned end of the run
 
-    @told
+    @logged
     def get_real(self, vrs):
         return self.part.read(vrs)
 
-    @told
+    @logged
     def get_integer(self, vrs):
         return [round(x) for x in self.part.read(vrs)]
 
-    @told
+    @logged
     def get_boolean(self, vrs):
         return [x != 0.0 for x in self.part.read(vrs)]
 
-    @told
+    @logged
     def set_real(self, vrs, values):
         self.part.write(vrs, values)
 
     set_integer = set_boolean = set_real
 
-    @told
+    @logged
     def get_string(self, vrs):
         raise ComponentError(f"{{self.instance_name}}: this FMU has no string variables")
 
     def set_string(self, vrs, values):
         self.get_string(vrs)
 
-    @told
+    @logged
     def _get_fmu_state(self):
         return self.part.get_state()
 
-    @told
+    @logged
     def _set_fmu_state(self, state):
         self.part.set_state(state)
 '''

@@ -48,7 +48,7 @@ class Reference:
 
 
 def read_reference(path: Path) -> Reference:
-    """Reads a file.  Raises ValueError, with the path, where it is no reference file."""
+    """Return the content of a file.  Raises ValueError, with the path, where it is not a reference file."""
     comments: list[list[str]] = []
     lines: list[str] = []
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -58,13 +58,13 @@ def read_reference(path: Path) -> Reference:
             lines.append(line)
     rows = list(csv.reader(lines))
     try:
-        (part, version), *rest = comments
-        step = next(float(c[1]) for c in rest if c[0] == "step")
-        parameters = {c[1]: float(c[2]) for c in rest if c[0] == "parameter"}
-        count = next(int(c[1]) for c in rest if c[0] == "inputs")
+        (part, version), *settings = comments
+        step = next(float(c[1]) for c in settings if c[0] == "step")
+        parameters = {c[1]: float(c[2]) for c in settings if c[0] == "parameter"}
+        count = next(int(c[1]) for c in settings if c[0] == "inputs")
         columns = {n: [float(r[k]) for r in rows[1:]] for k, n in enumerate(rows[0])}
     except (ValueError, StopIteration, IndexError) as e:
-        raise ValueError(f"{path} is no reference file: {e}") from e
+        raise ValueError(f"{path} is not a reference file: {e}") from e
     names = list(columns)[1:]
     return Reference(
         part,
@@ -78,7 +78,7 @@ def read_reference(path: Path) -> Reference:
 
 
 def signal(s: Scalar, place: int, duration: float) -> Signal:
-    """The generated signal of one input: a sine, a ramp and a step about its start value."""
+    """Return the generated signal of one input: a sine, a ramp and a step about its start value."""
     size = AMPLITUDES.get(s.decl.unit, 1.0) if s.decl.type is float else 0.0
     cycles = 3.0 + 1.7 * place
     jump = (0.2 + 0.6 * ((0.37 * place) % 1.0)) * duration
@@ -91,7 +91,7 @@ def signal(s: Scalar, place: int, duration: float) -> Signal:
 
 
 def run(instance: Instance, reference: Reference, outputs: Sequence[str]) -> list[list[float]]:
-    """Runs an instance over the inputs of a reference; one list of outputs a row."""
+    """Run an instance over the inputs of a reference; return its outputs, a list for each row."""
     instance.set(reference.parameters)
     rows: list[list[float]] = []
     for k, t in enumerate(reference.time):
@@ -114,7 +114,7 @@ def write_reference(
     signals: Mapping[str, Signal | Sequence[float]] | None = None,
     bench: Path | None = None,
 ) -> Path:
-    """Writes (again) the reference run of a part, made by its plain class.
+    """Write (again) the reference run of a part, made by its plain class; return the path.
 
     Parameters, step and inputs are those given, else those of the file that is there, else the defaults, 1 ms
     and generated signals.  ``signals`` gives inputs by FMI name, as functions of time or one value a row.
@@ -154,23 +154,23 @@ def write_reference(
 
 
 def compare(reference: Reference, instance: Instance, label: str) -> list[str]:
-    """Repeats a reference run with an instance; returns what differs, in words (empty: bit for bit)."""
+    """Repeat a reference run with an instance; return the differences, in words (empty: equal bit for bit)."""
     outputs = list(reference.outputs)
     table = run(instance, reference, outputs)
     problems: list[str] = []
     for j, name in enumerate(outputs):
-        wrong = [k for k, row in enumerate(table) if row[j] != reference.outputs[name][k]]
-        if wrong:
-            k = wrong[0]
+        unequal = [k for k, row in enumerate(table) if row[j] != reference.outputs[name][k]]
+        if unequal:
+            k = unequal[0]
             problems.append(
                 f"{label}: {name} at t = {reference.time[k]:.9g} s is {table[k][j]!r}, not "
-                f"{reference.outputs[name][k]!r} ({len(wrong)} of {len(table)} rows differ)"
+                f"{reference.outputs[name][k]!r} ({len(unequal)} of {len(table)} rows differ)"
             )
     return problems
 
 
 def outdated(reference: Reference, names: Mapping[str, Sequence[str]]) -> list[str]:
-    """Says so if a file has other inputs or outputs than the part has now (``names``: section -> FMI names)."""
+    """Return a message if a file has other inputs or outputs than the part now (``names``: section -> FMI names)."""
     if list(names["input"]) == list(reference.inputs) and list(names["output"]) == list(reference.outputs):
         return []
     return [f"reference.csv has other inputs or outputs than {reference.part}: write it again"]
@@ -179,7 +179,7 @@ def outdated(reference: Reference, names: Mapping[str, Sequence[str]]) -> list[s
 def run_reference(
     path: Path, target: str = "plain", *, part: str | type[Component] | None = None, bench: Path | None = None
 ) -> list[str]:
-    """Repeats a reference run in one of the targets; returns what differs, in words (empty: bit for bit).
+    """Repeat a reference run in one of the targets; return the differences, in words (empty: equal bit for bit).
 
     ``target``: plain, python, native or native-fmi3.  The part is that of the folder the file stands in.
     """

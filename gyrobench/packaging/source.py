@@ -110,7 +110,7 @@ def read_code(function: Any, owner: type | None, placed: Placed | None) -> Code:
 
 
 class Source:
-    """What a part computes: the code of its equations, and the code that they call."""
+    """The code of a part: its equations, and the procedures and functions that they call."""
 
     def __init__(self, cls: type[Component]) -> None:
         self.cls = cls
@@ -128,14 +128,14 @@ class Source:
         return code
 
     def uncalled(self) -> list[Code]:
-        """Return the procedures of the part and of its blocks, called or not; refuse those that could not be."""
-        found: list[Code] = []
-        left = list(self.cls.placed.values())
+        """Return the procedures of the part and of its blocks, called or not.  Raises SubsetError."""
+        procedures: list[Code] = []
+        pending = list(self.cls.placed.values())
         classes: list[tuple[type, Placed | None]] = [(self.cls, None)]
-        while left:
-            inner = left.pop()
+        while pending:
+            inner = pending.pop()
             classes.append((type(inner.block), inner))
-            left += inner.blocks.values()
+            pending += inner.blocks.values()
         for owner, p in classes:
             for klass in owner.__mro__:
                 if klass in (object, Component, Block):
@@ -146,8 +146,8 @@ class Source:
                         _plain_arguments(code)
                         if gives_value(code.node) and not returns(code.node.body):
                             raise code.refuse(code.node, f"{name}() returns a number on every path, or on none")
-                        found.append(code)
-        return found
+                        procedures.append(code)
+        return procedures
 
     def method(self, name: str, code: Code) -> Code | None:
         """Return the procedure that ``self.name(...)`` calls in ``code``; None where there is none of that name."""
@@ -170,9 +170,9 @@ class Source:
         f = code.function.__globals__.get(name)
         if not isinstance(f, FunctionType) or f is getattr(language, name, None):
             return None
-        found = read_code(f, None, None)
-        _plain_arguments(found)
-        return found
+        callee = read_code(f, None, None)
+        _plain_arguments(callee)
+        return callee
 
 
 def procedure_name(name: str, f: Any) -> bool:

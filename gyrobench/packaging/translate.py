@@ -2,7 +2,7 @@
 
 The syntax tree of a part's methods becomes C line by line, twice: once for numbers, once for dual
 numbers (the forward-mode derivative).  Nothing is simplified or reordered, so that both targets compute
-the same bits.  What is outside the subset is refused with file, line and what to write instead.
+the same bits.  What is outside the subset is an error with file, line and what to write instead.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Method(Expressions):
         super().__init__(translation, code, dual, shapes)
         self.kind = kind
         self.name = code.node.name
-        self.gives = kind == PROCEDURE and gives_value(code.node)
+        self.returns_value = kind == PROCEDURE and gives_value(code.node)
         self.result: Shape | None = None
         self.refuses = False
         self.views: set[str] = set()  # locals that are an input or a parameter under another name
@@ -57,7 +57,7 @@ class Method(Expressions):
         return [line for s in statements for line in self.whole_statement(s, depth)]
 
     def whole_statement(self, s: ast.stmt, depth: int) -> list[str]:
-        """A statement behind what must be computed before it."""
+        """Return a statement, preceded by what must be computed before it."""
         outside, self.pre = self.pre, []
         lines = self.statement(s, depth)
         lines = ["    " * depth + x for x in self.pre] + lines
@@ -86,19 +86,19 @@ class Method(Expressions):
         if isinstance(s, ast.For):
             return self.loop(s, depth)
         if isinstance(s, ast.Return):
-            return self.give_back(s, pad)
+            return self.return_value(s, pad)
         if isinstance(s, ast.While):
             raise self.refuse(s, "no while: write `for k in range(n)` with a fixed n, and `if` inside")
         raise self.refuse(s, f"`{ast.unparse(s).splitlines()[0]}` is outside the subset of equations")
 
     def procedure_call(self, e: ast.Call, pad: str) -> list[str]:
-        """A procedure on a line of its own: it writes, and may refuse."""
+        """Return the call of a procedure on a line of its own: it writes, and may refuse."""
         code = None if e.keywords else self.callee(e)
         if code is None:
             raise self.refuse(e, f"`{ast.unparse(e)}` is outside the subset of equations")
         if gives_value(code.node):
             raise self.refuse(e, f"{ast.unparse(e.func)} returns a value: assign it")
-        if self.gives:
+        if self.returns_value:
             raise self.refuse(e, f"{self.name} returns a value and so writes nothing: {code.node.name} may write")
         procedure, args = self.invoke(e, code)
         for name in sorted(procedure.touched):
@@ -131,7 +131,7 @@ class Method(Expressions):
             *self.body(s.body, depth + 1),
             f"{pad}}}",
         ]
-        if lo is None or end is None or end <= lo:  # perhaps not one turn
+        if lo is None or end is None or end <= lo:  # possibly no iteration
             self.assigned = before
         del self.loops[k]
         return lines
@@ -149,21 +149,21 @@ class Method(Expressions):
             self.assigned = then & self.assigned
         return [*lines, f"{pad}}}"]
 
-    def give_back(self, s: ast.Return, pad: str) -> list[str]:
+    def return_value(self, s: ast.Return, pad: str) -> list[str]:
         if s.value is None:
             return [f"{pad}return;"]
-        if not self.gives:
+        if not self.returns_value:
             raise self.refuse(s, f"{self.name} returns nothing")
         self.no_view(s.value, "returned")
-        found = self.value(s.value)
-        if self.result is not None and found.shape != self.result:
-            raise self.refuse(s, f"{self.name} returns {words(self.result)} above and {words(found.shape)} here")
-        self.result = found.shape
-        if not found.shape:
-            return [f"{pad}return {found.text};"]
-        if not found.aligned:
-            found = self.of_place(self.kept(found))
-        return [*(f"{pad}out_{''.join(f'[{k}]' for k in i)} = {found.element(*i)};" for i in cells(found.shape)),
+        result = self.value(s.value)
+        if self.result is not None and result.shape != self.result:
+            raise self.refuse(s, f"{self.name} returns {words(self.result)} above and {words(result.shape)} here")
+        self.result = result.shape
+        if not result.shape:
+            return [f"{pad}return {result.text};"]
+        if not result.aligned:
+            result = self.of_place(self.kept(result))
+        return [*(f"{pad}out_{''.join(f'[{k}]' for k in i)} = {result.element(*i)};" for i in cells(result.shape)),
                 f"{pad}return;"]  # fmt: skip
 
     # ------------------------------------------------------------------------------- assignments
@@ -191,29 +191,29 @@ class Method(Expressions):
         if name in self.loops:
             raise self.refuse(target, f"the loop variable {name!r} is not assigned to")
         if isinstance(value, ast.List):
-            found = self.literal(value)
+            assigned = self.literal(value)
             self.bare.add(name)
         else:
             if isinstance(value, ast.Call) and (direct := self.direct(name, value, pad)) is not None:
                 return direct
-            seen = self.no_view(value, "assigned to a local")
-            self.views = self.views | {name} if seen else self.views - {name}
-            found = self.value(value)
-            if found.shape:
+            is_view = self.no_view(value, "assigned to a local")
+            self.views = self.views | {name} if is_view else self.views - {name}
+            assigned = self.value(value)
+            if assigned.shape:
                 self.bare.discard(name)
-        known = self.arguments.get(name, self.locals.get(name, found.shape))
-        if known != found.shape or (found.shape and name in self.arguments):
+        known = self.arguments.get(name, self.locals.get(name, assigned.shape))
+        if known != assigned.shape or (assigned.shape and name in self.arguments):
             raise self.refuse(target, f"{name!r} is something else already, {words(known)}")
         if name not in self.arguments:
-            self.locals.setdefault(name, found.shape)
-        to = Place(local(name), "local", name, found.shape)
-        if found.shape and not found.aligned and f"local.{name}" in found.reads:
-            found = self.of_place(self.kept(found))
+            self.locals.setdefault(name, assigned.shape)
+        to = Place(local(name), "local", name, assigned.shape)
+        if assigned.shape and not assigned.aligned and f"local.{name}" in assigned.reads:
+            assigned = self.of_place(self.kept(assigned))
         self.assigned.add(name)
-        return self.store(to, found, pad)
+        return self.store(to, assigned, pad)
 
     def direct(self, name: str, e: ast.Call, pad: str) -> list[str] | None:
-        """``w = procedure(...)`` of an array: the procedure writes into the local itself."""
+        """Return ``w = procedure(...)`` where the procedure writes into the local itself; None where it does not."""
         code = None if e.keywords else self.callee(e)
         read = {n.id for n in ast.walk(e) if isinstance(n, ast.Name)}
         if code is None or not gives_value(code.node) or name in read or name in self.arguments:
@@ -235,7 +235,7 @@ class Method(Expressions):
     def no_view(self, value: ast.expr, what: str, even_inputs: bool = False) -> bool:
         """Refuse an array that is handed on as it is: the same one in Python, a copy in C.
 
-        True for an input or a parameter, which does not change: a local that only reads it is the same in both.
+        Return True for an input or a parameter, which does not change: a local that only reads it is the same in both.
         """
         if isinstance(value, ast.Name | ast.Attribute | ast.Subscript) and not self.transposes(value):
             before = len(self.pre), self.temporaries
@@ -251,13 +251,13 @@ class Method(Expressions):
         return False
 
     def fitting(self, target: ast.expr, value: ast.expr, to: Place) -> Value:
-        found = self.literal(value) if isinstance(value, ast.List) else self.value(value)
-        if found.shape != to.shape:
+        assigned = self.literal(value) if isinstance(value, ast.List) else self.value(value)
+        if assigned.shape != to.shape:
             text = ast.unparse(target)
-            raise self.refuse(target, f"{text} is {words(to.shape)}, what is assigned to it {words(found.shape)}")
-        if not found.aligned and f"{to.kind}.{to.name}" in found.reads:
-            found = self.of_place(self.kept(found))
-        return found
+            raise self.refuse(target, f"{text} is {words(to.shape)}, what is assigned to it {words(assigned.shape)}")
+        if not assigned.aligned and f"{to.kind}.{to.name}" in assigned.reads:
+            assigned = self.of_place(self.kept(assigned))
+        return assigned
 
     def store(self, to: Place, value: Value, pad: str) -> list[str]:
         lines: list[str] = []
@@ -273,7 +273,7 @@ class Method(Expressions):
         return lines
 
     def may_write(self, name: str) -> bool:
-        if name.startswith("noise.") or (self.kind == PROCEDURE and self.gives):
+        if name.startswith("noise.") or (self.kind == PROCEDURE and self.returns_value):
             return False
         if name.startswith("der."):
             return self.kind in ("flow", PROCEDURE)
@@ -283,14 +283,14 @@ class Method(Expressions):
 
     def refuse_write(self, node: ast.AST, name: str, source: str) -> SubsetError:
         text = f"{self.name}() does not write {source}"
-        if self.kind == PROCEDURE and self.gives:
+        if self.kind == PROCEDURE and self.returns_value:
             return self.refuse(node, f"{text}: a procedure that returns a value writes nothing")
         if isinstance(self.declared.get(name), Parameter | Input):
             return self.refuse(node, f"{text}: parameters and inputs are only read; use a local or a Discrete")
         return self.refuse(node, f"{text}: it writes {HINTS.get(self.kind, 'discretes and states')} only")
 
     def refusal(self, call: ast.Call, pad: str) -> list[str]:
-        if self.gives or self.code.owner is None:
+        if self.returns_value or self.code.owner is None:
             raise self.refuse(call, "a procedure that returns a value does not refuse: do it where it is called")
         if len(call.args) != 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
             raise self.refuse(call, 'write self.refuse(condition, "message with {H}")')
@@ -301,7 +301,7 @@ class Method(Expressions):
         names = [self.code.flat(n) for n in re.findall(r"\{(\w+)\}", message)]
         for n in names:
             if n not in self.declared or self.declared[n].shape:
-                raise self.refuse(call, f"{{{n}}} is no scalar of this part")
+                raise self.refuse(call, f"{{{n}}} is not a scalar of this part")
         text = re.sub(r"\{\w+\}", "%g", message.replace("%", "%%")).replace("\\", "\\\\").replace('"', '\\"')
         values = "".join(f"plain(self->{member(n)}), " for n in names)
         return [
@@ -319,7 +319,7 @@ class Method(Expressions):
         lines = self.body(self.code.node.body, 1)
         args = "".join(f", {number} {local(a)}{dimensions(s)}" for a, s in self.arguments.items())
         args += f", {number} out_{dimensions(self.result)}" if self.result else ""
-        kind = number if self.gives and not self.result else "void"
+        kind = number if self.returns_value and not self.result else "void"
         head = f"static inline {kind} {name}(Part *part{seed}{args})"
         zero = "{0.0, 0.0}" if self.dual else "0.0"
         declared = [
@@ -340,7 +340,7 @@ def _c_name(name: str) -> str:
 
 
 class Translation:
-    """All that a part computes, as C: ``text`` holds the functions, ``heads`` those that are declared before."""
+    """The equations of a part as C: ``text`` holds the functions, ``heads`` those that are declared before."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -359,7 +359,7 @@ class Translation:
                 self.procedure(code, (), False, code.node, code)
 
     def equation(self, kind: str, dual: bool) -> None:
-        """One kind of equation: the pieces, and where there are several, what calls them in turn."""
+        """Translate one kind of equation: its pieces and, for several, a function that calls them in turn."""
         suffix = "_d" if dual else ""
         pieces = self.source.equations[kind]
         seed = ", Vars *seed" if dual else ""
@@ -414,9 +414,9 @@ class Translation:
         self.under_way.pop()
         self.heads.append(head + ";")
         self.functions.append(text)
-        found = Procedure(name, method.result if method.gives else None, method.touched, method.refuses)
-        self.procedures[key] = found
-        return found
+        procedure = Procedure(name, method.result if method.returns_value else None, method.touched, method.refuses)
+        self.procedures[key] = procedure
+        return procedure
 
     @property
     def text(self) -> str:

@@ -15,11 +15,11 @@ from gyrobench.units import UnitError, unit
 
 
 def validate(what: str | Path, bench: Path | None = None) -> list[str]:
-    """What is wrong with an FMU file, or with a part (by name) in all its targets; empty if nothing is.
+    """Return the problems of an FMU file, or of a part (by name) in all its targets; empty where there are none.
 
     An FMU is checked against the FMI standard (schema, structure, starts, units of the description), for units
     that gyrobench does not know, and for a binary that runs here.  One that was built from a part of the bench
-    repeats the part's reference run bit for bit.  A foreign FMU is not run.
+    repeats the part's reference run bit for bit.  A third-party FMU is not run.
 
     Raises BenchError where ``what`` is neither a file nor a part.
     """
@@ -68,14 +68,14 @@ def _file(path: Path, home: Bench) -> list[str]:
         problems = [str(p) for p in validate_fmu(str(path))]
         description = read_model_description(str(path), validate=False)
     except Exception as error:  # of the archive, of the XML, or FMPy's own
-        return [f"not an FMU that can be read: {error}"]
+        return [f"not a readable FMU: {error}"]
     problems += _units(description)
     if description.coSimulation is None:
         return [*problems, "no co-simulation: the bench runs co-simulation FMUs only"]
-    here = this_platform()
+    platform = this_platform()
     available = supported_platforms(str(path))
-    if here not in available and {"linux64": "x86_64-linux"}.get(here, here) not in available:
-        problems.append(f"no binary for {here}; it has {', '.join(available) or 'none'}")
+    if platform not in available and {"linux64": "x86_64-linux"}.get(platform, platform) not in available:
+        problems.append(f"no binary for {platform}; it has {', '.join(available) or 'none'}")
     elif description.generationTool == "gyrobench" and not problems:
         problems += _reference_run(path, description, home)
     return problems

@@ -27,21 +27,21 @@ _COLUMNS = (
 
 
 def read_profile(file: Path, slot: str = "motion") -> dict[str, Any]:
-    """The parameters of the base_motion in ``slot`` that play the recording, its time beginning with 0.
+    """Return the parameters of the base_motion in ``slot`` that play the recording, its time beginning with 0.
 
     An angle whose column is missing stays 0.  Raises DataError for unsorted times, gaps (an interval of more than 3
     median intervals: an interpolation over it would be invented), fewer than 3 and more than 400 points, no angle at
-    all, and all that :func:`gyrobench.record.csv_reader.read_measured` refuses; OSError for a file that is not there.
+    all, and as :func:`gyrobench.record.csv_reader.read_measured`; OSError for a missing file.
     """
     columns, _ = read_measured(file, _COLUMNS, "time")
     t = columns["time"]
     angles = [columns.get(name) for name in ("pitch", "roll", "heading")]
     problems = []
     if all(a is None for a in angles):
-        problems.append("none of the columns pitch, roll, heading: at least one is needed")
+        problems.append("no column pitch, roll or heading: at least one is needed")
     if not 3 <= t.size <= POINTS:
-        advice = f"thin it to every {-(-t.size // POINTS)}th row" if t.size > POINTS else "a recording is wanted"
-        problems.append(f"{t.size} points: 3 to {POINTS} are possible; {advice}")
+        advice = f"thin it to every {-(-t.size // POINTS)}th row" if t.size > POINTS else "a recording is expected"
+        problems.append(f"{t.size} points: 3 to {POINTS} are allowed; {advice}")
     intervals = np.diff(t)
     for k in np.flatnonzero(intervals > GAP * np.median(intervals))[:8] if t.size >= 3 else ():
         problems.append(

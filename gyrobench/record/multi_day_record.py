@@ -1,4 +1,4 @@
-"""Several runs of one system as one record, a day each: repeats whose turn-on constants were drawn anew.
+"""Several runs of one system as one record, a day each: repetitions with a new turn-on bias each.
 
 A CSV file with the one column ``run`` names their folders (from where the file is, or from the working folder):
 
@@ -19,11 +19,11 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import Day, RecordError
 
 DAY = 86400.0  # s
-FREE = ("seed", "date", "operator", "note")  # may differ from day to day
+MAY_DIFFER = ("seed", "date", "operator", "note")  # may differ from day to day
 
 
 def combine(records: Sequence[Record], names: Sequence[str], source: Path | str = "runs") -> Record:
-    """One record; its plan rows carry ``day``, its phases count on, its days start a whole day apart or more.
+    """Return one record: its plan rows carry ``day``, phase numbers continue, days start one or more days apart.
 
     Raises DataError for records of different systems, options or true parameters, or incomplete ones.
     """
@@ -47,7 +47,7 @@ def combine(records: Sequence[Record], names: Sequence[str], source: Path | str 
     common = [n for n in blocks[0] if all(n in b for b in blocks)]
     windows = {n: np.concatenate([b[n] for b in blocks]) for n in common}
     days = [
-        Day(run=name, **{k: getattr(r.run, k) for k in FREE if k in r.run.model_fields_set})
+        Day(run=name, **{k: getattr(r.run, k) for k in MAY_DIFFER if k in r.run.model_fields_set})
         for r, name in zip(records, names, strict=True)
     ]
     return Record(windows, {}, first.run.model_copy(update={"plan": plan, "days": days}))
@@ -57,19 +57,19 @@ def _differences(first: Record, other: Record) -> list[str]:
     a, b = first.run, other.run
     if a.system != b.system:
         return [f"is a run of {b.system}, the first is one of {a.system}"]
-    found = [] if other.complete else ["the run is not complete"]
+    problems = [] if other.complete else ["the run is not complete"]
     for kind, x, y in (("options", a.options, b.options), ("parameters", a.parameters, b.parameters)):
         names = [n for n in sorted(x.keys() | y.keys()) if x.get(n) != y.get(n) and not n.endswith(".seed")]
         if names:
             shown = ", ".join(f"{n} = {y.get(n)} (first: {x.get(n)})" for n in names[:4])
-            found.append(f"other {kind}: {shown}" + (f" and {len(names) - 4} more" if len(names) > 4 else ""))
-    return found
+            problems.append(f"other {kind}: {shown}" + (f" and {len(names) - 4} more" if len(names) > 4 else ""))
+    return problems
 
 
 def read_runs(file: Path, system: str) -> Record | None:
-    """The runs that ``file`` lists as one record; None when it is no list of runs.
+    """Return the runs that ``file`` lists as one record; None when it is not a list of runs.
 
-    Raises DataError for folders that are no runs of ``system``, a run named twice, or fewer than two.
+    Raises DataError for folders that are not runs of ``system``, a run named twice, or fewer than two.
     """
     lines = [t.strip() for t in read_lines(file)]
     lines = [t for t in lines if t and not t.startswith("#")]

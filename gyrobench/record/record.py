@@ -6,7 +6,7 @@
                      SHA-256 of the tables: :mod:`gyrobench.record.run_document`
 
 Without pyarrow the tables are CSV files of the same names; numbers are written so that they read back bit for bit.
-Every file is written under a temporary name and renamed, run.json last: a folder with run.json is whole.
+Every file is written under a temporary name and renamed, run.json last: a folder with run.json is complete.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _have_parquet() -> bool:
 
 
 def write_table(stem: Path, columns: dict[str, Array]) -> Path:
-    """Writes ``stem``.parquet, or ``stem``.csv without pyarrow; the other form is removed.  Returns the path."""
+    """Write ``stem``.parquet, or ``stem``.csv without pyarrow; remove the other form; return the path."""
     parquet, text = stem.with_suffix(".parquet"), stem.with_suffix(".csv")
     if _have_parquet():
         import pyarrow as pa
@@ -70,7 +70,7 @@ def remove_table(stem: Path) -> None:
 
 
 def read_table(stem: Path) -> dict[str, Array] | None:
-    """The columns of ``stem``.parquet or ``stem``.csv; None if there is neither."""
+    """Return the columns of ``stem``.parquet or ``stem``.csv; None if there is neither."""
     parquet, text = stem.with_suffix(".parquet"), stem.with_suffix(".csv")
     if parquet.exists():
         import pyarrow.parquet as pq
@@ -87,7 +87,7 @@ def read_table(stem: Path) -> dict[str, Array] | None:
 
 @dataclass(repr=False)
 class Record(Displayed):
-    """What a run left: windows, channels and where they come from (run.json).
+    """The record of a run: windows, channels and their provenance (run.json).
 
     record.windows["mean"], record.channels["gyro.u"]    numpy arrays, SI
     record.frame("windows"), record.frame("channels")    pandas data frames, units in attrs["units"]
@@ -142,7 +142,7 @@ class Record(Displayed):
         """Return the columns of "windows" or "channels" and their SI units, "" where not known.  Raises UsageError."""
         tables = {"windows": (self.windows, self.run.window_units), "channels": (self.channels, self.run.units)}
         if name not in tables:
-            raise UsageError(f"{name}: no table of a record; there are: {', '.join(tables)}")
+            raise UsageError(f"{name}: not a table of a record; available: {', '.join(tables)}")
         columns, units = tables[name]
         return columns, {c: "s" if c == "time" else units.get(c, "") for c in columns}
 
@@ -178,7 +178,7 @@ class Record(Displayed):
 
     @property
     def complete(self) -> bool:
-        """False when the run was interrupted or failed."""
+        """Whether the run came to its end; False where it was interrupted or failed."""
         return self.run.complete
 
 
@@ -202,11 +202,11 @@ def _check_tables(folder: Path, run: RunDocument) -> None:
 
 
 def rows_to_columns(rows: list[Array], names: list[str], time: bool) -> dict[str, Array]:
-    """Blocks of rows [t, columns...] -> named columns; with ``time`` the first one is kept as "time"."""
+    """Return blocks of rows [t, columns...] as named columns; with ``time`` the first one is kept as "time"."""
     blocks = [r if r.ndim == 2 else r[None, :] for r in rows]
     table = np.concatenate(blocks) if blocks else np.empty((0, 1 + len(names)))
-    found = {"time": np.ascontiguousarray(table[:, 0])} if time else {}
+    columns = {"time": np.ascontiguousarray(table[:, 0])} if time else {}
     for k, name in enumerate(names, 1):
         column = np.ascontiguousarray(table[:, k])
-        found[name] = column.astype(np.int64) if name in WHOLE and not time else column
-    return found
+        columns[name] = column.astype(np.int64) if name in WHOLE and not time else column
+    return columns

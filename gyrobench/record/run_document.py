@@ -33,7 +33,7 @@ class RecordError(GyrobenchError):
 
 
 def _plain(value: Any) -> Any:
-    """Return the same without numbers that JSON lacks: an infinite parameter of a foreign FMU becomes text."""
+    """Return the same without numbers that JSON lacks: an infinite parameter of a third-party FMU becomes text."""
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

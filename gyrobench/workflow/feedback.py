@@ -1,4 +1,4 @@
-"""What a run says while it goes on: notes before it, progress during it."""
+"""Feedback of a run to the user: notes before it, progress during it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user names: systems with values, FMU files, specifications."""
+"""Inputs that a user names: systems with values, FMU files, specifications."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def check_fmu_files(parts: Mapping[str, str | Path]) -> None:
                 raise ValueError("no such file")
             read_model_description(part, validate=False)
         except Exception as error:  # of the zip archive, of the XML, or FMPy's own
-            raise UsageError(f"slot {slot}: {part}: not an FMU that can be read: {error}") from None
+            raise UsageError(f"slot {slot}: {part}: not a readable FMU: {error}") from None
 
 
 def find_specification(spec: str | Path | None) -> Path | None:

@@ -1,4 +1,4 @@
-"""Measured data to the same report as a run."""
+"""Reduction of measured data, with the same report as a run."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def read_result(folder: Path) -> Result:
     _require_folder(folder)
     file = folder / "result.json"
     if not file.is_file():
-        raise UsageError(f"{folder}: has no result.json; gyrobench report {folder} makes it")
+        raise UsageError(f"{folder}: no result.json; write it by gyrobench report {folder}")
     try:
         return load(file.read_text(encoding="utf-8"))
     except ResultError as error:
@@ -103,7 +103,7 @@ def read_result(folder: Path) -> Result:
 
 def _require_two(runs: int) -> None:
     if runs < 2:
-        raise UsageError("compare needs two runs or more: gyrobench compare RUN RUN")
+        raise UsageError("comparison: two runs or more are needed; gyrobench compare RUN RUN")
 
 
 def _require_folder(folder: Path) -> None:
@@ -113,12 +113,12 @@ def _require_folder(folder: Path) -> None:
 
 def _common_ground(results: Sequence[tuple[str, Result]]) -> str:
     """Return a note where systems differ.  Raises UsageError for a run without any coefficient of the baseline."""
-    (first, base), *others = results
+    (base_name, base), *others = results
     known = {c.name for c in base.coefficients}
     for name, result in others:
         if known.isdisjoint(c.name for c in result.coefficients):
             raise UsageError(
-                f"{name} ({result.system}) and {first} ({base.system}) have no coefficient in common: "
+                f"{name} ({result.system}) and {base_name} ({base.system}) have no coefficient in common: "
                 "nothing to compare"
             )
     systems = dict.fromkeys(r.system for _, r in results)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What a run is asked for, beside the system and its values.
+    """The settings of a run other than the system and its values.
 
     step: s, None for the system's own.  in_memory: nothing is written, ``out``, ``force`` and ``resume`` have no
     meaning.  formats: of the report.
@@ -89,7 +89,7 @@ def execute_run(
             kept = save_partial_record(error.record, folder)
             message = f"{error}\nthe record until then is kept in {display_path(kept)}"
             if isinstance(error, RunInterrupted):
-                raise CommandInterrupted(f"{message} (gyrobench report says what it lacks)", error.record) from None
+                raise CommandInterrupted(f"{message} (gyrobench report lists what is missing)", error.record) from None
             raise PostRunError(message, error.record) from None
         if folder is not None and checkpoints is not None:
             record.save(folder)
@@ -126,7 +126,7 @@ def check_step(
     full, half = estimates
     rows: list[dict[str, Any]] = []
     for c in result.coefficients:
-        if c.name in full and c.name in half:  # one that only noise makes is not there without
+        if c.name in full and c.name in half:  # a coefficient of the noise alone is missing without it
             change = half[c.name] - full[c.name]
             ratio = abs(change) / c.u if c.u > 0.0 else None
             rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": ratio})

@@ -1,4 +1,4 @@
-"""Folders of runs: named by what is run; a run does not overwrite another one."""
+"""Folders of runs, named by the content of the run; a run does not overwrite another one."""
 
 from __future__ import annotations
 

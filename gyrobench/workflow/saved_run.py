@@ -1,4 +1,4 @@
-"""From a record to its report: reduction, files of the report, the same again for a run that was saved."""
+"""Reduction of a record and files of its report, of a run just made or of a saved one."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
             missing = _missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
         old = folder / "result.json"
-        if old.exists():  # the step check is a run of its own and is kept
+        if old.exists():  # the step check needs further runs and is kept
             result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
         return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
 

@@ -3,7 +3,7 @@
 reports/out/<suite>/<id>/<test>/     a run like any other: record, report, checkpoint while it runs
 reports/out/<suite>/<id>/            run.json (which tests, their reports), result.json, report.html, report.pdf
 
-A test that fails does not stop the others; one that was stopped goes on with --resume, finished ones are kept.
+A test that fails does not stop the others; one that was stopped continues with --resume, finished ones are kept.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, use
 
 
 class SuiteError(PostRunError):
-    """Some test of a suite failed; the report is of the others."""
+    """At least one test of a suite failed; the report covers the others."""
 
 
 def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT) -> SuiteOutcome:
@@ -67,13 +67,13 @@ def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT
     document.failed, document.complete = failed, not failed
     document.write(folder)
     if not document.tests:
-        raise SuiteError(f"no test of the suite has a result; what each left is in {display_path(folder)}")
+        raise SuiteError(f"no test of the suite has a result; records and checkpoints are in {display_path(folder)}")
     outcome = write_suite_report(suite, folder, document, spec, request.formats)
     if not failed:
         return outcome
     stopped = SuiteError(
-        f"{', '.join(failed)} failed; the report in {display_path(folder)} is of the others. After correcting the "
-        "cause: the same command with --resume runs only what is missing"
+        f"{', '.join(failed)} failed; the report in {display_path(folder)} covers the others. After correcting the "
+        "cause, the same command with --resume runs only what is missing"
     )
     return replace(outcome, stopped=stopped)
 
@@ -83,17 +83,17 @@ def _run_test(request: RunRequest, system: System, folder: Path, label: str, fee
 
     Raises CommandInterrupted.
     """
-    resume_hint = "the suite goes on with the same command and --resume"
+    resume_hint = "the same command with --resume continues the suite"
     has_run = request.resume and not request.force and has_complete_record(folder)
 
     def note(text: str) -> None:
         feedback.notes([f"{label}: {text}"])
 
     if has_run and all((folder / NAMES[kind]).is_file() for kind in request.formats):
-        note(f"kept as it is in {display_path(folder)}")
+        note(f"already complete; kept in {display_path(folder)}")
         return ""
     resume = request.resume and any((f / checkpoint.FILE).is_file() for f in (folder, incomplete_folder(folder)))
-    note("is reduced again" if has_run else "goes on" if resume else "runs")
+    note("reducing again" if has_run else "resuming" if resume else "running")
     try:
         if has_run:
             outcome: RunOutcome = reduce_saved_run(folder, system, None, request.formats)
@@ -110,7 +110,7 @@ def _run_test(request: RunRequest, system: System, folder: Path, label: str, fee
     if outcome.stopped:
         note(str(outcome.stopped))
     if outcome.result is None:
-        return "it has no reduction"
+        return "the system has no reduction"
     result = outcome.result
     note(result.summary[0] if result.summary else result.verdict)
     return ""
@@ -137,7 +137,7 @@ def _identity(
     request: RunRequest, suite: Suite, members: Mapping[str, System], requests: Mapping[str, RunRequest],
     feedback: Feedback,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return what makes this suite another one.  Raises InvalidConfigurationError with the problems of all tests."""
+    """Return the identity of this run of a suite.  Raises InvalidConfigurationError with the problems of all tests."""
     from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.part_files import resolve_parts
     from gyrobench.system.wiring import assemble
@@ -153,8 +153,8 @@ def _identity(
             feedback.notes(notes)
             assembly = assemble(system, paths, requests[name].maps)
             parameters = resolve(assembly, system, requests[name].seed, defaults(assembly))[1]
-            if wrong := system.check_parameters(parameters):
-                raise InvalidConfigurationError(name, wrong)
+            if invalid := system.check_parameters(parameters):
+                raise InvalidConfigurationError(name, invalid)
         except InvalidConfigurationError as error:
             problems += [f"{name}: {p}" for p in error.problems]
             continue

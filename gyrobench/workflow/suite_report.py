@@ -38,12 +38,12 @@ class SuiteOutcome:
 
     @property
     def verdict(self) -> str:
-        """That of the result; fail too where methods disagree."""
+        """Verdict of the result; fail also where methods are inconsistent."""
         return "fail" if self.result.suite.consistency == "inconsistent" else self.result.verdict
 
 
 def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
-    """Return what run.json says of a suite before its tests."""
+    """Return the content of a suite's run.json that is known before its tests."""
     from gyrobench.engine.session import package_versions
 
     return SuiteDocument(
@@ -72,9 +72,9 @@ def reduce_runs(
         raise UsageError(f"{suite.name}: name two runs or more, each the folder of a run with its result.json")
     for folder in runs:
         if not (folder / "result.json").is_file():
-            saved = f"gyrobench report {folder} makes it"
-            hint = saved if (folder / RUN).is_file() else "a measured record becomes a run by gyrobench reduce"
-            raise UsageError(f"{folder}: no result.json there; {hint}")
+            rewrite = f"write it by gyrobench report {folder}"
+            hint = rewrite if (folder / RUN).is_file() else "a measured record becomes a run by gyrobench reduce"
+            raise UsageError(f"{folder}: no result.json; {hint}")
     systems = [str(json.loads((f / "result.json").read_text(encoding="utf-8"))["system"]) for f in runs]
     labels = short_names(runs)
     names = [s if systems.count(s) == 1 else f"{s} {label}" for s, label in zip(systems, labels, strict=True)]
@@ -95,7 +95,7 @@ def report_saved_suite(
     """Write the report of a suite again, from the results of its tests."""
     document = read_run(folder)
     if not isinstance(document, SuiteDocument) or not document.tests:
-        raise RecordError(f"{folder}: the suite did not end; the same run command with --resume goes on")
+        raise RecordError(f"{folder}: the suite is not complete; the same run command with --resume continues it")
     for name in suite.options:
         if name in document.options:
             suite.set(name, document.options[name])
@@ -110,7 +110,7 @@ def write_suite_report(
 
     members = {n: _load_member(folder / test.folder, test.folder) for n, test in document.tests.items()}
     document.tests = {n: member.test for n, member in members.items()}
-    for name in suite.about:  # what the suite is not told the tests may say
+    for name in suite.about:  # what the suite does not state may be stated by its tests
         texts = dict.fromkeys(str(m.result.provenance.get(name) or "") for m in members.values())
         if text := suite[name] or "; ".join(filter(None, texts)):
             setattr(document, name, text)
@@ -141,7 +141,7 @@ def _load_member(folder: Path, label: str) -> Member:
         text = file.read_text(encoding="utf-8")
         result, report_id = load(text), str(json.loads(text)["report_id"])
     except (OSError, ValueError, KeyError) as error:
-        raise RecordError(f"{file}: no result that can be read: {error}") from None
+        raise RecordError(f"{file}: not a readable result: {error}") from None
     if not isinstance(result, DriftTestResult):
         kind = "a suite itself; name its tests" if result.kind == "suite" else f"a {result.kind} test; leave it out"
         raise RecordError(f"{folder}: is {kind}")

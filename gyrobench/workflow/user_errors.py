@@ -1,4 +1,4 @@
-"""Errors as a person reads them: one message and an exit code; after a run also where its record is."""
+"""Errors for the user: one message and an exit code; after a run also the location of its record."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def content_location(error: BaseException) -> str | None:
     An OSError that gyrobench itself met on the user's behalf (a file named in an option) has no location.
     """
     frames = _frames(error)
-    own, standard = (_content_folders(folder) for folder in (Bench.find().folder, standard_folder()))
+    user, standard = (_content_folders(folder) for folder in (Bench.find().folder, standard_folder()))
     if isinstance(error, OSError):
-        ours = [file for file, _ in frames if file.startswith((*own, *standard, str(TOOL) + os.sep))]
-        if not ours or not ours[-1].startswith((*own, *standard)):
+        known = [file for file, _ in frames if file.startswith((*user, *standard, str(TOOL) + os.sep))]
+        if not known or not known[-1].startswith((*user, *standard)):
             return None
-    for folders in (own, standard):
+    for folders in (user, standard):
         lines = [f"{file}:{line}" for file, line in frames if file.startswith(folders)]
         if lines:
             return lines[-1]
@@ -67,7 +67,7 @@ def content_location(error: BaseException) -> str | None:
 
 
 def user_message(error: BaseException) -> str:
-    """Return what a person reads of an error: the text of one of gyrobench's, of others also type and place."""
+    """Return the message of an error for the user: its text; of errors that are not gyrobench's also type and place."""
     if isinstance(error, GyrobenchError):
         if isinstance(error, ReportError):
             lines = [f"  - {name}: {user_message(cause)}" for name, cause in error.failures.items()]

@@ -314,7 +314,7 @@ def test_term_sets(terms, names):
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"terms": 7}, "terms = 7 is no static model: it must be 3, 4, 5, 8, 9 or 10"),
+        ({"terms": 7}, "terms = 7 is not a static model: it must be 3, 4, 5, 8, 9 or 10"),
         ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is not a rotation matrix"),
         ({"mount": [[1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "mount is left-handed"),
         ({"H": 0.0}, "H = 0 N.m.s must be > 0"),

@@ -346,8 +346,8 @@ def test_term_sets(channel, second):
 @pytest.mark.parametrize(
     "parameters, message",
     [
-        ({"terms_x": 5}, "terms_x = 5 is no static model of a channel: it must be 8, 9 or 10"),
-        ({"terms_y": 11}, "terms_y = 11 is no static model of a channel"),
+        ({"terms_x": 5}, "terms_x = 5 is not a static model of a channel: it must be 8, 9 or 10"),
+        ({"terms_y": 11}, "terms_y = 11 is not a static model of a channel"),
         ({"J_x": 1e-4}, "J_x = 0.0001 and J_y = 0 kg.m2: give both"),
         ({"C_y": 1e-4}, "C_x and C_y must be 0 without nutation"),
         ({"mount": [[1, 0, 0], [0, 1, 2e-9], [0, 0, 1]]}, "mount is not a rotation matrix"),

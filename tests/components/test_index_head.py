@@ -180,7 +180,7 @@ def test_refuses(parameters, message):
     "inputs, message",
     [
         ({"mode": 2.0}, "mode = 2 must be 0 hold or 1 index"),
-        ({"mode": 1.0, "target": 0.7}, "0.7 rad is none of the 8 positions of the head: .* multiple of 0.785398"),
+        ({"mode": 1.0, "target": 0.7}, "0.7 rad is not one of the 8 positions of the head: .* multiple of 0.785398"),
         ({"mode": 1.0, "number": 9.0}, "number = 9 must be 1 to 8"),
         ({"mode": 1.0, "number": 1.5}, "number = 1.5 must be 1 to 8"),
     ],

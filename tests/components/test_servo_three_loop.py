@@ -85,7 +85,7 @@ def test_position_loop_is_sampled():
     changes = np.flatnonzero(np.diff(asked)) + 1
     assert changes.tolist() == [49, 99, 149, 199] and asked[49] == pytest.approx(10 * (1 - 0.97 - 49e-4))
     part = started(K_p=1.0, track_period=2.5e-4)
-    with pytest.raises(ComponentError, match=r"track_period = 0.00025 s is no multiple of the internal step"):
+    with pytest.raises(ComponentError, match=r"track_period = 0.00025 s is not a multiple of the internal step"):
         part.do_step(0.0, H)
 
 

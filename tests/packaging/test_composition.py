@@ -181,7 +181,7 @@ def test_nothing_of_the_bases_is_lost(bench: Path) -> None:
     assert gyro.declarations["k"].start == 0.1 and base.declarations["k"].start != 0.1
     assert {k: len(p) for k, p in gyro.pieces.items()} == {k: len(p) + (k == "outputs") for k, p in base.pieces.items()}
     one = gyro(terms=7)
-    with pytest.raises(ComponentError, match="terms = 7 is no static model"):
+    with pytest.raises(ComponentError, match="terms = 7 is not a static model"):
         one.initialize()
     mount = gyro(mount=[[1, 0, 0], [0, 1, 0], [0, 1e-3, 1]])
     with pytest.raises(ComponentError, match="mount is not a rotation matrix"):

@@ -65,7 +65,7 @@ def test_a_difference_is_told(tmp_path: Path) -> None:
     (problem,) = run_reference(path, "native", part="lag", bench=TOYS)
     assert problem.startswith("native: direct at t = 0.007 s is ") and "(1 of 20 rows differ)" in problem
     path.write_text("time,u\n0,1\n")
-    with pytest.raises(ValueError, match="is no reference file"):
+    with pytest.raises(ValueError, match="is not a reference file"):
         run_reference(path, part="lag", bench=TOYS)
 
 

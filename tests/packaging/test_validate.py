@@ -61,7 +61,7 @@ def test_no_binary_for_this_platform(fmu: Callable, tmp_path: Path) -> None:
 def test_not_an_fmu(tmp_path: Path) -> None:
     path = tmp_path / "a.fmu"
     path.write_text("nothing")
-    assert validate(path)[0].startswith("not an FMU that can be read")
+    assert validate(path)[0].startswith("not a readable FMU")
     with pytest.raises(BenchError, match="no such file"):
         validate(tmp_path / "b.fmu")
     with pytest.raises(BenchError, match="no part 'nothing'"):

@@ -117,5 +117,5 @@ def test_a_break_that_is_no_wired_input() -> None:
     with Session(NAME) as s:
         _, parameters, _ = resolve(s.assembly, s.system.with_values(SHORT), 1, s.base)
         parts = operating_point(s.assembly, parameters, lambda slot: load_part(s.names[slot]))
-        with pytest.raises(LinearizationError, match=r"opened at stabilizer\.nothing, which is no wired input"):
+        with pytest.raises(LinearizationError, match=r"break point stabilizer\.nothing: not a connected input"):
             Linear(s.assembly, parts, 1e-4).continuous("stabilizer.nothing")

@@ -71,7 +71,7 @@ def test_profile(tmp_path: Path) -> None:
             "time [s],roll [deg]\n0,1\n1,2\n2,3\n8,3\n9,1\n",
             "a gap of 6 s after time = 2 s, where the median interval is 1 s",
         ),
-        ("time [s]\n0\n1\n2\n", "none of the columns pitch, roll, heading"),
+        ("time [s]\n0\n1\n2\n", "no column pitch, roll or heading"),
         ("time [s],roll [deg]\n" + "".join(f"{k},0\n" for k in range(900)), "900 points: .* every 3th row"),
         ("time [s],roll [m]\n0,1\n", "wrong unit"),
     ],

@@ -48,7 +48,7 @@ def test_template_and_refusals(command: Command, tmp_path: Path) -> None:
         ("1,17.2,17.1,10,10\n2,34.4,34.2,10,20\n3,51.6,51.3,10,10\n", ["range"]),
         ("0,17.2,17.1,10,10\n2,34.4,34.2,10,10\n3,51.6,51.3,10,10\n", ["current"]),
         ("1,17.2,17.1,10,10\n", ["current"]),
-        ("1,17.2,nan,10,10\n2,34.4,34.2,10,10\n3,51.6,51.3,10,10\n", ["rate_minus", "no finite number"]),
+        ("1,17.2,nan,10,10\n2,34.4,34.2,10,10\n3,51.6,51.3,10,10\n", ["rate_minus", "not a finite number"]),
     ):
         file.write_text(template + rows, encoding="utf-8")
         code, out, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")

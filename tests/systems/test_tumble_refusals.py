@@ -116,7 +116,7 @@ def cases(record: Record) -> dict[str, tuple[str, list[str]]]:
     return {
         "missing mount": (text(record, short), ["only one mount", "+pole and −pole"]),
         "missing dwell": (text(record, [k for k in range(count) if phase[k] != 3]), ["only one dwell", "D_F"]),
-        "not finite": (text(record, mean=gap), ["row 12, column 'mean'", "no finite number"]),
+        "not finite": (text(record, mean=gap), ["row 12, column 'mean'", "not a finite number"]),
         "duplicate": (text(record, [0, 1, 2, 2, *range(3, count)]), ["the same as row"]),
         "time goes back": (text(record, [1, 0, *range(2, count)]), ["t_start", "does not come after"]),
         "wrong unit": (text(record, header=head + "mean [V]"), ["column 'mean': wrong unit [V]", "units that fit: A"]),

@@ -48,7 +48,7 @@ class SampledEstimator(Component):
 
 
 class KalmanEstimator(SampledEstimator):
-    """What a Kalman filter says beside its estimate."""
+    """Outputs of a Kalman filter besides its estimate."""
 
     variance = Output("1", "variance of the estimate, as the filter has it")
     innovation = Output("1", "reading less its prediction; 0 where the reading is missing")

@@ -94,7 +94,7 @@ class ChannelDrift(Block):
 
 
 class SdfGyro(Component):
-    """What the single-degree-of-freedom gyros share: float, pickoff, torquer, mount, static and random drift, ports.
+    """Common part of single-degree-of-freedom gyros: float, pickoff, torquer, mount, static and random drift, ports.
 
         omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
                   + turn-on bias + Gauss-Markov + white                     (X, Y, Z) = -f/g0 along I, O, S

@@ -1,4 +1,4 @@
-"""What stabilized platforms share: passive rotations, motors, bearings that stick, gimbals driven by rate servos."""
+"""Common parts of stabilized platforms: passive rotations, motors, bearings with stiction, rate-servo gimbals."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def with_unbalance(n: Vector, u: Vector, f: Vector) -> Vector:
 def motor_current(
     i: Number, i_max: Number, v: Number, v_max: Number, emf: Number, resistance: Number, inductance: Number
 ) -> Number:
-    """Return the current of a motor: its state, or without inductance what flows at once, within i_max."""
+    """Return the current of a motor: its state, or without inductance the static current, within i_max."""
     if inductance > 0.0:
         return i
     return clip((clip(v, -v_max, v_max) - emf) / resistance, -i_max, i_max)
@@ -93,16 +93,22 @@ def motor_slope(
 
 # -------------------------------------------------------------------------------------------- bearings
 # An elastic contact that slips (Prandtl element): a spring from an anchor, with damping; beyond break-away the anchor
-# is dragged along with the Coulomb torque until the motion turns round.  way: angle from the anchor; reach: way at
+# is dragged along with the Coulomb torque until the motion reverses.  deflection: angle from the anchor; reach: that at
 # Coulomb friction; slipping: 0 sticking, else the sense of slip.
 def contact_torque(
-    spring: Number, damping: Number, presliding: Number, reach: Number, way: Number, rate: Number, slipping: Number
+    spring: Number,
+    damping: Number,
+    presliding: Number,
+    reach: Number,
+    deflection: Number,
+    rate: Number,
+    slipping: Number,
 ) -> Number:
     """Return the torque of the contact, against the motion."""
     if slipping == 0.0:
         most = spring * presliding
-        return clip(spring * way + damping * rate, -most, most)
-    return spring * clip(way, -reach, reach)
+        return clip(spring * deflection + damping * rate, -most, most)
+    return spring * clip(deflection, -reach, reach)
 
 
 def contact_moved(
@@ -110,13 +116,13 @@ def contact_moved(
     angle: Number, rate: Number, anchor: Number, slipping: Number,
 ) -> Vector:  # fmt: skip
     """Return (anchor, slipping) after a step."""
-    way = angle - anchor
+    deflection = angle - anchor
     if slipping == 0.0:
-        push = way + damping / spring * rate
+        push = deflection + damping / spring * rate
         if fabs(push) > presliding:
             sense = 1.0 if push > 0.0 else -1.0
             return vector([angle - sense * reach, sense])
-    elif way * slipping >= reach:
+    elif deflection * slipping >= reach:
         return vector([angle - slipping * reach, slipping])
     return vector([anchor, 0.0])
 
@@ -136,7 +142,7 @@ class RateServoGimbals(Component):
 
     rate_gain = Parameter(1.0, "rad/s/V", "rate of a servo for a volt", above=0.0)
     lag = Parameter(2e-3, "s", "lag of a servo", above=0.0)
-    drag = Parameter(200.0, "N.m.s/rad", "torque for which a servo yields a unit rate", above=0.0)
+    drag = Parameter(200.0, "N.m.s/rad", "torque that changes the rate of a servo by one unit", above=0.0)
     rate_max = Parameter(5.0, "rad/s", "largest rate of a gimbal", above=0.0)
     theta_0 = Parameter(NONE, "rad", "joint angles at the start, A order")
 

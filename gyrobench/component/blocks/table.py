@@ -1,4 +1,4 @@
-"""What turntables share: motion in segments, the tilted base, what the instrument on the plate feels."""
+"""Common parts of turntables: motion in segments, the tilted base, rate and specific force on the face."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SegmentMotion(Block):
     a_s = Discrete(FIVE, "rad/s2", "acceleration in each segment")
 
     def rest(self, x: Number) -> None:
-        """At rest at the angle x from now on."""
+        """Set the axis to rest at the angle x, from now on."""
         self.x = x
         self.v = 0.0
         self.a = 0.0
@@ -85,7 +85,7 @@ class SegmentMotion(Block):
         self.target_last = target
 
     def advance(self) -> None:
-        """Angle, rate and acceleration at the present instant."""
+        """Compute angle, rate and acceleration at the present instant."""
         past = self.t - self.t_s[4]
         self.arrived = 1.0
         if past >= 0.0:
@@ -104,14 +104,14 @@ class SegmentMotion(Block):
 
 
 class AxisTable(Component):
-    """What the tables with one axis share: base with tilt, and the rates and forces on the face.
+    """Common part of the tables with one axis: base with tilt, and the rates and forces on the face.
 
     With B = tilted base (rows: table axes in ENU at angle 0, the axis is the third), Rz the passive rotation by the
     table angle, w = Rz B omega_local:
 
         f     = face Rz B f_local
         omega = face (w + (0, 0, rate))
-        alpha = face (w_y rate, -w_x rate, acc)       the whole derivative of omega, so d(omega)/dt = alpha
+        alpha = face (w_y rate, -w_x rate, acc)       the total derivative of omega, so d(omega)/dt = alpha
 
     tilt[1], tilt[2] turn the base about its first and then its new second axis, B = R2 R1 base.  The parts declare the
     input `face` (rows: the gyro axes in table axes).
