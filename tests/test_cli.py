@@ -159,7 +159,7 @@ REFUSED = [
     (["compare", "full"], "comparison: two runs or more are needed"),
     (["compare", "full", "nothing"], "nothing: no such folder"),
     (["compare", "full", "full"], "full: no result.json; write it by gyrobench report full"),
-    (["reduce", NAME], "no record named: gyrobench reduce tumble_single_axis --data FILE.csv"),
+    (["reduce", NAME], "no record named; gyrobench reduce tumble_single_axis --data FILE.csv"),
     (["reduce", NAME, "--data", "no.csv"], "no.csv: No such file"),
     (["export", NAME], "Missing option '--to'"),
     (["export", NAME, "--to", "ssp", "--out", "x.zip"], "an SSP archive ends in .ssp"),

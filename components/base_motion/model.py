@@ -173,14 +173,14 @@ class BaseMotion(Component):
             else:  # quintic between two points, of their slopes and curvatures
                 d = self.profile_t[index(self.piece + 1.0)] - self.profile_t[index(self.piece)]
                 x = (self.t - self.profile_t[index(self.piece)]) / d
-                start = self.parabola(self.piece)
-                end = self.parabola(self.piece + 1.0)
+                first = self.parabola(self.piece)
+                second = self.parabola(self.piece + 1.0)
                 p0 = vector(self.profile[index(self.piece)])
-                p1 = start[0] * d
-                p2 = 0.5 * start[1] * d * d
+                p1 = first[0] * d
+                p2 = 0.5 * first[1] * d * d
                 rise = self.profile[index(self.piece + 1.0)] - p0 - p1 - p2
-                bend = end[0] * d - p1 - 2.0 * p2
-                kink = 0.5 * end[1] * d * d - p2
+                bend = second[0] * d - p1 - 2.0 * p2
+                kink = 0.5 * second[1] * d * d - p2
                 p3 = 10.0 * rise - 4.0 * bend + kink
                 p4 = -15.0 * rise + 7.0 * bend - 2.0 * kink
                 p5 = 6.0 * rise - 3.0 * bend + kink

@@ -200,7 +200,7 @@ def run(
     resume: Resume = False,
     as_json: Json = False,
 ) -> None:
-    """Run a system: simulate, save the record, reduce it, write the report.
+    """Run a system: record, reduction, report.
 
     \b
     Examples:
@@ -248,7 +248,7 @@ def reduce(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Reduce measured data of the same test and write the same report.
+    """Reduce measured data and write the same report.
 
     \b
     Examples:
@@ -382,7 +382,9 @@ def init(
         ),
     ] = None,
 ) -> None:
-    """Create a bench; what it does not define comes from the standard bench.
+    """Create a bench.
+
+    Parts, systems, specifications and templates that it does not define come from the standard bench.
 
     \b
     Example: gyrobench init mybench --copy floated_gyro
