@@ -71,7 +71,7 @@ def test_a_part_a_test_and_their_noise(command: Callable[[str], None], tmp_path:
     plain, model = np.abs(names["z_plain"]), np.abs(names["z_model"])
     assert f"| rms of z | {names['rms_plain']:.1f} | {names['rms_model']:.1f} |" in page
     assert f"| largest absolute z | {plain.max():.1f} | {model.max():.1f} |" in page
-    assert f"of 30 (usual: 1 or 2) | {(plain > 2.0).sum()} | {(model > 2.0).sum()} |" in page
+    assert f"of 30 (expected: 1 or 2) | {(plain > 2.0).sum()} | {(model > 2.0).sum()} |" in page
     hit = [[c.interval[0] <= c.truth <= c.interval[1] for c in run.result.coefficients] for run in names["runs"]]
     assert sorted(row.count(False) for row in hit) == [0, 0, 0, 0, 3]
     whiteness = {t.name: t.p for t in names["runs"][0].result.tests}["Ljung-Box, residuals"]
