@@ -67,7 +67,7 @@ def merge(
         ],
         warnings=[*_shared(labels, [r.warnings for r in parts]), *warnings],
         summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
-        verdict=uncertainty.overall(r.verdict for r in parts),
+        verdict=uncertainty.worst_verdict(r.verdict for r in parts),
         simulated=any(r.simulated for r in parts),
     )
 

@@ -10,8 +10,8 @@ from gyrobench.report import plots, ranking_section, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     Cell,
+    CollapsedBlocks,
     Column,
-    Fold,
     Page,
     Picture,
     Pictures,
@@ -306,4 +306,4 @@ def _equal(doc: Json) -> list[Any]:
     table = Table(
         [Column("setting"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
     )
-    return [Fold(f"{len(rows)} entries", [table])]
+    return [CollapsedBlocks(f"{len(rows)} entries", [table])]

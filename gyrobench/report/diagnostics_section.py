@@ -6,15 +6,25 @@ from typing import Any
 
 from gyrobench.report import diagrams, plots
 from gyrobench.report.numbers import write_number, write_p
-from gyrobench.report.page_model import Column, Fold, Picture, Row, Table, Text, number_cell, pictures, text_cell
-from gyrobench.report.tables import generic, heading, unit_groups, words
+from gyrobench.report.page_model import (
+    CollapsedBlocks,
+    Column,
+    Picture,
+    Row,
+    Table,
+    Text,
+    number_cell,
+    pictures,
+    text_cell,
+)
+from gyrobench.report.tables import heading, render_value, unit_groups, words
 
 Json = dict[str, Any]
 
 
 def residuals(doc: Json) -> list[Any]:
     if not doc["series"] and not doc["tests"]:
-        return generic(doc, ("noise",), "Noise model of the estimation.")
+        return render_value(doc, ("noise",), "Noise model of the estimation.")
     values = [r for s in doc["series"] for r in s["residual"]]
     blocks = pictures(
         Picture(
@@ -68,7 +78,7 @@ def residuals(doc: Json) -> list[Any]:
     spread = number_cell(doc, ("residual_std",))
     dof = write_number(doc["dof"], significant=5).text
     sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
-    return [Text(sentence), *blocks, *generic(doc, ("noise",), "Noise model of the estimation.")]
+    return [Text(sentence), *blocks, *render_value(doc, ("noise",), "Noise model of the estimation.")]
 
 
 def stability(doc: Json) -> list[Any]:
@@ -89,7 +99,7 @@ def stability(doc: Json) -> list[Any]:
             half=True,
         ),
     )
-    return blocks + generic(
+    return blocks + render_value(
         doc, ("allan", "slopes"), "Local slopes of the Allan deviation on logarithmic axes.", significant=3
     )
 
@@ -168,11 +178,11 @@ def estimates(doc: Json) -> list[Any]:
         ),
     )
     caption = "Harmonics of the record. Those outside the model are expected to be noise."
-    return blocks + _method_tables(doc) + generic(doc, ("harmonics",), caption, by_u=True)
+    return blocks + _method_tables(doc) + render_value(doc, ("harmonics",), caption, by_u=True)
 
 
 def repeatability(doc: Json) -> list[Any]:
-    return generic(doc, ("repeatability",), "Repeatability.") + _step(doc)
+    return render_value(doc, ("repeatability",), "Repeatability.") + _step(doc)
 
 
 def _step(doc: Json) -> list[Any]:
@@ -186,7 +196,7 @@ def _step(doc: Json) -> list[Any]:
     caption = (
         "Step check: change of each coefficient when the communication step is halved, noise off; ratio: change / u."
     )
-    table = generic(doc, ("step_check", "rows"), caption, significant=2)
+    table = render_value(doc, ("step_check", "rows"), caption, significant=2)
     return [Text(f"Halving the communication step of {step} s changes no coefficient by more than {worst} u."), *table]
 
 
@@ -249,5 +259,5 @@ def budget(doc: Json) -> list[Any]:
     )
     return [
         *pictures(Picture("budget", diagrams.budget(lines, u, "budget"), caption, alt)),
-        Fold("All lines of the budget", [table]),
+        CollapsedBlocks("All lines of the budget", [table]),
     ]

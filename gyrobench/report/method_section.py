@@ -8,11 +8,11 @@ from typing import Any
 from gyrobench.report import diagrams
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
+    BulletList,
     Cell,
+    CollapsedBlocks,
     Column,
     Equation,
-    Fold,
-    Items,
     Picture,
     Row,
     Table,
@@ -21,14 +21,14 @@ from gyrobench.report.page_model import (
     text_cell,
 )
 from gyrobench.report.references import source_blocks
-from gyrobench.report.result_json import look
+from gyrobench.report.result_json import value_at
 
 Json = dict[str, Any]
 
 
 def model(doc: Json) -> list[Any]:
     blocks: list[Any] = [Equation(doc["equation"])] if doc["equation"] else []
-    blocks += [Items(doc["conventions"])] if doc["conventions"] else []
+    blocks += [BulletList(doc["conventions"])] if doc["conventions"] else []
     return blocks + source_blocks(doc["sources"])
 
 
@@ -45,7 +45,7 @@ def system(doc: Json) -> list[Any]:
         blocks += pictures(
             Picture("system", svg, caption, "Components in execution order with their connections: " + ", ".join(order))
         )
-        blocks.append(Items([f"Execution order: {', '.join(order)}.", *_cuts(run)]))
+        blocks.append(BulletList([f"Execution order: {', '.join(order)}.", *_cuts(run)]))
     rows = []
     keys = (
         "phase",
@@ -87,7 +87,7 @@ def system(doc: Json) -> list[Any]:
     for k in range(len(plan)):
         rows.append(Row([number_cell(doc, ("derived", "plan", k, key), significant=7) for key in keys]))
     if rows:
-        empty = [all(look(plan, k, key) in (None, "") for k in range(len(plan))) for key in keys]
+        empty = [all(value_at(plan, k, key) in (None, "") for k in range(len(plan))) for key in keys]
         for row in rows:
             row.cells = [c for c, e in zip(row.cells, empty, strict=True) if not e]
         columns = [Column(h, unit) for (h, unit), e in zip(heads, empty, strict=True) if not e]
@@ -123,7 +123,7 @@ def full_values(doc: Json) -> list[Any]:
         )
     columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
     return [
-        Fold(
+        CollapsedBlocks(
             "Full precision, as in result.json",
             [Table(columns, rows, "Estimates at full precision, units as in the table of coefficients.", small=True)],
         )

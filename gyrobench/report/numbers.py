@@ -2,7 +2,7 @@
 
 An estimate is rounded to the second significant digit of its standard uncertainty; the uncertainty
 itself to two significant digits.  Where there is no uncertainty, four significant digits.  The full
-value travels beside the rounded one (:class:`Written`), so that a reader, and a test, can go from
+value travels beside the rounded one (:class:`FormattedNumber`), so that a reader, and a test, can go from
 the page back to ``result.json``.
 """
 
@@ -17,7 +17,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
-class Written:
+class FormattedNumber:
     """A number as it stands on the page, cut at its decimal sign, with the full value behind it."""
 
     whole: str  # "−12"
@@ -34,7 +34,9 @@ def decimals(u: float) -> int:
     return 1 - int(f"{abs(u):.1e}".split("e")[1])
 
 
-def write_number(value: float | int | None, u: float | None = None, significant: int = 4, trim: bool = True) -> Written:
+def write_number(
+    value: float | int | None, u: float | None = None, significant: int = 4, trim: bool = True
+) -> FormattedNumber:
     """Round ``value`` to the second significant digit of ``u``, or to ``significant`` digits without one.
 
     ``u`` that is None, zero or not finite counts as none.  A value that is None or not finite gives a
@@ -42,10 +44,10 @@ def write_number(value: float | int | None, u: float | None = None, significant:
     most six decimals (nine from 0.1 on) would do.
     """
     if value is None or isinstance(value, str) or not math.isfinite(value):
-        return Written(NOTHING, "", "")
+        return FormattedNumber(NOTHING, "", "")
     full = repr(int(value)) if isinstance(value, bool | int) else repr(float(value))
     if isinstance(value, int):
-        return Written(str(value).replace("-", MINUS), "", full)
+        return FormattedNumber(str(value).replace("-", MINUS), "", full)
     digits: int | None = None
     if u is not None and math.isfinite(u) and u != 0.0:
         digits = decimals(u)
@@ -55,19 +57,19 @@ def write_number(value: float | int | None, u: float | None = None, significant:
             return _fixed(value, digits, full)
         return _power(value, significant, _exponent(size), full)
     if value == 0.0:
-        return Written("0", "", full)
+        return FormattedNumber("0", "", full)
     exponent = _exponent(float(f"{value:.{significant - 1}e}"))
     if -4 <= exponent < 6:
         return _fixed(value, significant - 1 - exponent, full, trim or value.is_integer())
     return _power(value, significant, exponent, full, trim)
 
 
-def write_p(p: float | None) -> Written:
+def write_p(p: float | None) -> FormattedNumber:
     """A probability: three decimals, or "< 0.001"."""
     if p is None or not math.isfinite(p):
-        return Written(NOTHING, "", "")
+        return FormattedNumber(NOTHING, "", "")
     if p < 0.001:
-        return Written("< 0", ".001", repr(float(p)))
+        return FormattedNumber("< 0", ".001", repr(float(p)))
     return _fixed(p, 3, repr(float(p)))
 
 
@@ -80,7 +82,7 @@ def _exponent(value: float) -> int:
     return math.floor(math.log10(abs(value))) if value else 0
 
 
-def _fixed(value: float, digits: int, full: str, strip: bool = False) -> Written:
+def _fixed(value: float, digits: int, full: str, strip: bool = False) -> FormattedNumber:
     rounded = round(value, digits)
     text = f"{rounded + 0.0:.{max(digits, 0)}f}"  # + 0.0: no negative zero
     if rounded == 0.0:
@@ -89,11 +91,11 @@ def _fixed(value: float, digits: int, full: str, strip: bool = False) -> Written
     if strip and dot:
         rest = rest.rstrip("0")
         dot = "." if rest else ""
-    return Written(whole.replace("-", MINUS), dot + rest, full)
+    return FormattedNumber(whole.replace("-", MINUS), dot + rest, full)
 
 
-def _power(value: float, significant: int, exponent: int, full: str, strip: bool = False) -> Written:
+def _power(value: float, significant: int, exponent: int, full: str, strip: bool = False) -> FormattedNumber:
     mantissa = _fixed(value / 10.0**exponent, significant - 1, full, strip)
     if mantissa.text == "0":
         return mantissa
-    return Written(mantissa.whole, f"{mantissa.rest}·10{superscript(exponent)}", full)
+    return FormattedNumber(mantissa.whole, f"{mantissa.rest}·10{superscript(exponent)}", full)

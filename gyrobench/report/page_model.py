@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gyrobench.report.numbers import Written, write_number
-from gyrobench.report.result_json import look, pointer
+from gyrobench.report.numbers import FormattedNumber, write_number
+from gyrobench.report.result_json import pointer, value_at
 
 Path = Sequence[str | int]
 
@@ -90,7 +90,7 @@ class Text:
 
 
 @dataclass
-class Items:
+class BulletList:
     items: list[str]
     kind: str = "items"
     warn: bool = False
@@ -104,7 +104,7 @@ class Equation:
 
 
 @dataclass
-class Answer:
+class ResultSummary:
     """The box a reader looks at first."""
 
     verdict: str
@@ -125,7 +125,7 @@ class Signatures:
 
 
 @dataclass
-class Fold:
+class CollapsedBlocks:
     """Blocks folded away in HTML, printed in full in PDF."""
 
     title: str
@@ -180,9 +180,9 @@ def walk(blocks: list[Any]) -> list[Any]:
     out: list[Any] = []
     for block in blocks:
         out.append(block)
-        if isinstance(block, Fold):
+        if isinstance(block, CollapsedBlocks):
             out += walk(block.blocks)
-        elif isinstance(block, Answer) and block.requirements:
+        elif isinstance(block, ResultSummary) and block.requirements:
             out.append(block.requirements)
     return out
 
@@ -201,13 +201,13 @@ def number_cell(
     doc: Any,
     path: Path,
     u: float | None = None,
-    write: Callable[..., Written] = write_number,
+    write: Callable[..., FormattedNumber] = write_number,
     mark: str = "",
     significant: int = 4,
     trim: bool = True,
 ) -> Cell:
     """The number at ``path`` of the document; a text that stands there stays a text."""
-    value = look(doc, *path)
+    value = value_at(doc, *path)
     if isinstance(value, str | list | dict):
         return text_cell(value, mark)
     written = write_number(value, u, significant, trim) if write is write_number else write(value)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from gyrobench.bench import standard_folder
-from gyrobench.report.page_model import Items, Text
+from gyrobench.report.page_model import BulletList, Text
 
 #: ids of methods and numbers of errata, as sources name them: TEST-TUMBLE1-SDF, E20, EX14
 IDENTIFIER = re.compile(r"\b[A-Z][A-Z0-9]*-[A-Z0-9-]+\b|\bE[RTXAG]?\d+\b")
@@ -41,4 +41,4 @@ def source_blocks(sources: Sequence[str]) -> list[Any]:
     if any(IDENTIFIER.search(s) for s in sources):
         text += f" {WHERE}"
     works = [entry if entry.startswith(key) else f"{key}: {entry}" for key, entry in cited(sources).items()]
-    return [Text(text, quiet=True), *([Items(works)] if works else [])]
+    return [Text(text, quiet=True), *([BulletList(works)] if works else [])]

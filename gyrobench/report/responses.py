@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from gyrobench.report.page_model import Column, Fold, Picture, Row, Table, number_cell, pictures
+from gyrobench.report.page_model import CollapsedBlocks, Column, Picture, Row, Table, number_cell, pictures
 from gyrobench.report.plots import finite, short
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 
@@ -22,7 +22,7 @@ def blocks(doc: Json) -> list[Any]:
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
         figures += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
         if r["kind"] not in ("step", "time") and r["x"]:
-            figures.append(Fold(f"Points of the {r['name']}", [_points(doc, k)]))
+            figures.append(CollapsedBlocks(f"Points of the {r['name']}", [_points(doc, k)]))
     return figures
 
 

@@ -75,7 +75,7 @@ def pointer(*path: str | int) -> str:
     return "".join("/" + str(p).replace("~", "~0").replace("/", "~1") for p in path)
 
 
-def look(doc: Any, *path: str | int) -> Any:
+def value_at(doc: Any, *path: str | int) -> Any:
     """The value at a path, None where the path ends early."""
     for key in path:
         try:
@@ -99,7 +99,7 @@ def _derived(content: dict[str, Any]) -> dict[str, Any]:
     for line in content["budget"]:
         if line["contribution"] is not None:
             sums[line["coefficient"]] = math.hypot(sums.get(line["coefficient"]) or 0.0, line["contribution"])
-    plan = look(content, "provenance", "plan")
+    plan = value_at(content, "provenance", "plan")
     return {
         "U": expanded,
         "closed_minus_estimate": difference,

@@ -11,12 +11,12 @@ from gyrobench.record.run_document import ABOUT, SetupError
 from gyrobench.report import diagnostics_section, method_section, plots, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
-    Answer,
+    BulletList,
     Cell,
     Column,
-    Items,
     Page,
     Picture,
+    ResultSummary,
     Row,
     Section,
     Table,
@@ -99,7 +99,7 @@ def _unit(key: str) -> str:
     return "" if not unit else unit if unit == "°" else f" {unit}"
 
 
-def answer(doc: Json) -> Answer:
+def answer(doc: Json) -> ResultSummary:
     rows = []
     for k, c in enumerate(doc["coefficients"]):
         if c["limit"] is None:
@@ -127,7 +127,7 @@ def answer(doc: Json) -> Answer:
     ]
     table = Table(columns, rows, "Conformity with each requirement.") if rows else None
     rule = doc["decision_rule"] if rows or doc["verdict"] != NO_VERDICT else ""
-    return Answer(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
+    return ResultSummary(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
 
 
 def setup_errors(doc: Json) -> list[Any]:
@@ -139,7 +139,7 @@ def setup_errors(doc: Json) -> list[Any]:
         "The simulated instrument or its set-up differs from what the test assumes. The estimates, their u and their "
         "verdicts do not allow for these errors."
     )
-    return [Text(text), Items([e.sentence() for e in errors], warn=True)]
+    return [Text(text), BulletList([e.sentence() for e in errors], warn=True)]
 
 
 def coefficients(doc: Json) -> list[Any]:

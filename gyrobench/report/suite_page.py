@@ -7,14 +7,14 @@ from typing import Any
 from gyrobench.report import method_section, result_page
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
-    Answer,
+    BulletList,
     Cell,
+    CollapsedBlocks,
     Column,
-    Fold,
-    Items,
     Page,
     Picture,
     Pictures,
+    ResultSummary,
     Row,
     Section,
     Table,
@@ -61,7 +61,7 @@ def _head(doc: Json) -> list[tuple[str, str]]:
     return [*rows, ("Tests", tests)]
 
 
-def _answer(doc: Json) -> Answer:
+def _answer(doc: Json) -> ResultSummary:
     box = result_page.answer(doc)
     consistency = f"methods {doc['suite']['consistency']}" if doc["suite"]["tested"] else "consistency not tested"
     plain = doc["verdict"] == NO_VERDICT
@@ -114,7 +114,7 @@ def _consistency(doc: Json) -> list[Any]:
         "Welch's test; p, adjusted: for the number of measurands (Holm). Letters: the member tests, as in the head."
     )
     failed = [f"{f['label']} gave no result: {f['reason']}" for f in doc["suite"]["failed"]]
-    return [Table(columns, rows, caption), *([Items(failed, warn=True)] if failed else [])]
+    return [Table(columns, rows, caption), *([BulletList(failed, warn=True)] if failed else [])]
 
 
 def _cross(doc: Json) -> list[Any]:
@@ -236,7 +236,7 @@ def _pairs(doc: Json) -> list[Any]:
             )
     columns = [Column("pair", wide=True), Column("difference"), Column("U of the difference (95 %)"), Column("E_n")]
     table = Table(columns, pair_rows, "Normalized errors of all pairs.", small=True)
-    return [matrix, Fold(f"All {len(pairs)} pairs", [table])]
+    return [matrix, CollapsedBlocks(f"All {len(pairs)} pairs", [table])]
 
 
 def _tests(doc: Json) -> list[Any]:
@@ -274,7 +274,7 @@ def _tests(doc: Json) -> list[Any]:
         sentences += [f"Warning: {w}" for w in m["warnings"]]
         sentences += [] if m.get("complete", True) else ["The record is incomplete."]
         if sentences:
-            blocks.append(Items(sentences))
+            blocks.append(BulletList(sentences))
     return blocks
 
 
@@ -292,7 +292,7 @@ def _how(doc: Json) -> list[Any]:
         "components that both methods share [ISO 13528]. Random errors of different tests are independent, as each "
         "test has a record of its own."
     )
-    blocks: list[Any] = [Text(text), Text(shared), Items(doc["conventions"])]
+    blocks: list[Any] = [Text(text), Text(shared), BulletList(doc["conventions"])]
     rows = []
     for q in suite["quantities"]:
         if len(q["combination"]) > 1:

@@ -7,8 +7,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
-from gyrobench.report.page_model import Cell, Column, Fold, Items, Row, Table, Text, number_cell, text_cell
-from gyrobench.report.result_json import look
+from gyrobench.report.page_model import (
+    BulletList,
+    Cell,
+    CollapsedBlocks,
+    Column,
+    Row,
+    Table,
+    Text,
+    number_cell,
+    text_cell,
+)
+from gyrobench.report.result_json import value_at
 
 # endings of names that tell the unit, longest first
 _UNITS = {
@@ -69,13 +79,15 @@ def limit_text(limit: Sequence[float | None] | None) -> str:
     return f"{write_number(low, significant=6).text} … {write_number(high, significant=6).text}"
 
 
-def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = False, significant: int = 4) -> list[Any]:
+def render_value(
+    doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = False, significant: int = 4
+) -> list[Any]:
     """Blocks for any JSON value: rows of a table for a list of dictionaries, name and value for a dictionary.
 
     With ``by_u`` the floats of a row are rounded to the standard uncertainty that stands in the row (``u``
     or ``u_...``).
     """
-    value = look(doc, *path)
+    value = value_at(doc, *path)
     if not value:
         return []
     if isinstance(value, str):
@@ -91,7 +103,7 @@ def generic(doc: Any, path: tuple[str | int, ...], caption: str, by_u: bool = Fa
                 rows.append(Row([text_cell(name), _cell(doc, (*path, k), None, significant), text_cell(unit)]))
             blocks.append(Table([Column("quantity"), Column("value"), Column("unit")], rows, caption))
         for k in nested:
-            blocks += generic(
+            blocks += render_value(
                 doc,
                 (*path, k),
                 f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption,
@@ -114,7 +126,7 @@ def _is_rows(value: Any) -> bool:
 
 
 def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, significant: int = 4) -> Cell:
-    value = look(doc, *path)
+    value = value_at(doc, *path)
     if isinstance(value, bool):
         return text_cell("yes" if value else "no")
     if isinstance(value, int | float) or value is None:
@@ -189,13 +201,13 @@ def how_tables(doc: Any) -> list[Any]:
         ]
         blocks.append(Table([Column("setting"), Column("value"), Column("unit")], rows, "Settings of the run."))
     if run.get("data"):
-        blocks += generic(doc, ("provenance", "data"), "Data reduced.")
+        blocks += render_value(doc, ("provenance", "data"), "Data reduced.")
     if run.get("notes"):
-        blocks.append(Items([str(n) for n in run["notes"]]))
+        blocks.append(BulletList([str(n) for n in run["notes"]]))
     if run.get("versions"):
         rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
         blocks.append(
-            Fold(
+            CollapsedBlocks(
                 "Package versions",
                 [Table([Column("package"), Column("version")], rows, "Package versions.", small=True)],
             )
@@ -236,5 +248,5 @@ def _defaults(doc: Any) -> list[Any]:
             rows = [Row([text_cell(n), _plain(doc, ("provenance", key, n))]) for n in names]
             caption = f"{what.capitalize()} at their default values, in SI units."
             table = Table([Column("name"), Column("value (SI)")], rows, caption, small=True)
-            blocks.append(Fold(f"Defaults: {len(names)} {what}", [table]))
+            blocks.append(CollapsedBlocks(f"Defaults: {len(names)} {what}", [table]))
     return blocks

@@ -75,7 +75,7 @@ def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
 def _result(m: Measures, s: Signals, title: str, name: str, limits: Specification) -> LoopResult:
     for c in m.coefficients:
         c.limit = limits.get(c.name)
-        c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
+        c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
     error, re_raw = m.named(estimator_result.RANKED), m.named("error re raw")
     gain, noise, delay = (m.named(n) for n in ("gain", "noise re raw", "delay"))
     return LoopResult(
@@ -111,7 +111,7 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Specificatio
             or "The estimator states no variance: it cannot be asked whether it is consistent.",
         ],
         decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.overall(c.verdict for c in m.coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in m.coefficients),
         instrument=name,
         ranked_by=estimator_result.RANKED,
         responses=[last_second(s)],

@@ -78,7 +78,7 @@ class Levels:
         k = float(special.stdtrit(self.dof, 0.975))
         return Coefficient(
             name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=k, interval=(value - k * u, value + k * u),
-            u_a=u, dof=float(self.dof), limit=limit, verdict=uncertainty.verdict(value, k * u, limit),
+            u_a=u, dof=float(self.dof), limit=limit, verdict=uncertainty.assess_conformity(value, k * u, limit),
         )  # fmt: skip
 
     def series(self, dense: Array, seen: Array) -> Series:

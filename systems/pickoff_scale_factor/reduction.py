@@ -128,7 +128,7 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
     result.series.insert(0, levels.series(dense, float_angle(dense, s.gain)))
     for c in levels.coefficients(dict(s.specification or {})):
         _append(result, c)
-    result.verdict = uncertainty.overall(c.verdict for c in result.coefficients)
+    result.verdict = uncertainty.worst_verdict(c.verdict for c in result.coefficients)
     result.summary = [
         f"Pickoff scale factor S = {plus_minus(result.coefficients[0])} per angle of the case, "
         f"K_sg = {plus_minus(result.coefficients[1])}.",

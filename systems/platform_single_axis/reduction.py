@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.estimator_metrics import Value, rms
+from gyrobench.reduction.loops.estimator_metrics import UncertainValue, rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.result import LoopResult, Specification
@@ -24,12 +24,12 @@ def jitter(y: np.ndarray, n: int) -> np.ndarray:
     return np.asarray(y[first : first + slow.size] - slow)
 
 
-def level(y: np.ndarray, stretches: int = 10) -> Value:
+def level(y: np.ndarray, stretches: int = 10) -> UncertainValue:
     """Root mean square of a ride: a sine and noise.  u from the scatter of the mean squares of ten stretches."""
     squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
     whole = math.sqrt(float(np.mean(y * y)))
     u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0
-    return Value(whole, u, stretches - 1)
+    return UncertainValue(whole, u, stretches - 1)
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:

@@ -149,7 +149,9 @@ def _margins(found: LoopFindings, points: list[Point], loop: Loop | None) -> Non
         found.warnings.append(f"The phase margin is {pm[0]:.3g}°; more than {ENOUGH:g}° is wanted [GSP ch. 5].")
     if "crossover" in values and max(p.f for p in points) > 1.25 * values["crossover"][0]:
         f = values["crossover"][0]
-        pair = [margins.between(points, np.array([f / 1.25, f * 1.25]), spline) for spline in (False, True)]
+        pair = [
+            margins.interpolate_response(points, np.array([f / 1.25, f * 1.25]), spline) for spline in (False, True)
+        ]
         slopes = [20.0 * math.log10(abs(v[1] / v[0])) / math.log10(1.25**2) for v in pair]
         closed = None if loop is None else _secant(loop, 2.0 * math.pi * f)
         found.measure("slope", "of |L| at the crossover", "dB/dec", slopes[0], abs(slopes[1] - slopes[0]),

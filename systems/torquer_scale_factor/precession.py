@@ -51,7 +51,9 @@ class Precession:
         J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
         sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
         u = min(sd, half / noise_mixture_fit.NORMAL)
-        return u, float(noise_mixture_fit.dof_of(np.array([half / u if u > 0.0 else noise_mixture_fit.NORMAL]))[0])
+        return u, float(
+            noise_mixture_fit.equivalent_dof(np.array([half / u if u > 0.0 else noise_mixture_fit.NORMAL]))[0]
+        )
 
 
 def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array) -> Precession:

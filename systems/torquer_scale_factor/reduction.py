@@ -183,7 +183,7 @@ def reduce(
             f"Drift along the axis {coefficients[-1].estimate:.3g} °/h.",
         ],
         decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         instrument=s.instrument,
         simulated=s.simulated,
         site=dict(s.site),
@@ -228,7 +228,7 @@ class _Maker:
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
         b = [abs(value) * self.setup.u_current] if scale else []
-        u, U = uncertainty.combine(u_a, half_a, b)
+        u, U = uncertainty.combine_uncertainties(u_a, half_a, b)
         limit = (self.setup.specification or {}).get(name)
         t = value / u_a if u_a > 0.0 else None
         truth = (self.setup.truth or {}).get(name)
@@ -238,7 +238,7 @@ class _Maker:
             p=float(2.0 * special.stdtr(min(dof, 1e9), -abs(t))) if t is not None else None, u_a=u_a,
             dof=float(dof) if math.isfinite(dof) else None,
             truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None, limit=limit,
-            verdict=uncertainty.verdict(value, U, limit),
+            verdict=uncertainty.assess_conformity(value, U, limit),
         )  # fmt: skip
 
 

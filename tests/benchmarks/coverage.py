@@ -42,7 +42,7 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Noise:
-    """One instrument, as noise.Cells has it, on windows of the length ``window`` (s)."""
+    """One instrument, as noise.NoiseGrid has it, on windows of the length ``window`` (s)."""
 
     tau: float
     share: float
@@ -280,7 +280,7 @@ def coverage(case: Case, runs: int, seed: int = 1, corner: str = "population") -
         window = float(np.median(t1 - t0))
         for run in range(runs):
             if corner == "population":
-                noisy = Noise(*noise.draw(rng, t0, t1, readings), window)
+                noisy = Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
             else:
                 tau, share, reading = CORNERS[corner]
                 noisy = Noise(tau * window, share, reading, window)

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from gyrobench.reduction.suite import estimable_combinations
-from gyrobench.reduction.suite.consistency import Value, agree, holm, normalized_error, outlier
+from gyrobench.reduction.suite.consistency import MethodValue, combine_values, holm, normalized_error, outlier
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
@@ -42,7 +42,7 @@ def suite(results: dict[str, DriftTestResult], **more: Any) -> SuiteResult:
 # ------------------------------------------------------------------------------------------- by hand
 def test_normalized_error_by_hand() -> None:
     """U = 1.95996 * 0.1 and 1.95996 * 0.2: E_n = 0.5 / (1.95996 sqrt(0.05)) = 0.5/0.438261."""
-    pair = normalized_error(Value("a", 1.0, 0.1), Value("b", 1.5, 0.0, 0.2))
+    pair = normalized_error(MethodValue("a", 1.0, 0.1), MethodValue("b", 1.5, 0.0, 0.2))
     assert pair.difference == pytest.approx(-0.5)
     assert pytest.approx(0.438261, abs=1e-6) == pair.U
     assert pair.E_n == pytest.approx(1.140872, abs=1e-6)
@@ -50,7 +50,7 @@ def test_normalized_error_by_hand() -> None:
 
 def test_few_degrees_of_freedom_widen() -> None:
     """t(0.975, 4) = 2.776445: U_a^2 = (2.776445 * 0.1)^2 + (1.959964 * 0.2)^2 = 0.0770865 + 0.1536584."""
-    value = Value("a", 0.0, 0.1, 0.2, dof=4.0)
+    value = MethodValue("a", 0.0, 0.1, 0.2, dof=4.0)
     assert math.sqrt(0.0770865 + 0.1536584) == pytest.approx(value.U, rel=1e-6)
     assert value.u == pytest.approx(math.sqrt(0.05))
 
@@ -60,18 +60,18 @@ def test_a_shared_error_does_not_part_methods_and_does_not_average_out() -> None
     U = 1.96 sqrt(0.02); in the mean it stays: u^2 = 0.1^2/2 + 0.3^2.  Taken as independent it would be 0.1/2.
     """
     shared = {"k": np.array([0.3])}
-    a, b = Value("a", 1.0, 0.1, shared=shared), Value("b", 1.4, 0.1, shared=shared)
+    a, b = MethodValue("a", 1.0, 0.1, shared=shared), MethodValue("b", 1.4, 0.1, shared=shared)
     assert pytest.approx(NORMAL * math.sqrt(0.02)) == normalized_error(a, b).U
-    found = agree([a, b])
+    found = combine_values([a, b])
     assert found.mean == pytest.approx(1.2) and found.u == pytest.approx(math.sqrt(0.095))
     assert pytest.approx(0.4**2 / 0.02) == found.Q  # against 0.4^2/0.2, were they independent
-    opposite = Value("b", 1.4, 0.1, shared={"k": np.array([-0.3])})  # errors that part the methods
+    opposite = MethodValue("b", 1.4, 0.1, shared={"k": np.array([-0.3])})  # errors that part the methods
     assert pytest.approx(NORMAL * math.sqrt(0.02 + 0.36)) == normalized_error(a, opposite).U
 
 
 def test_weighted_mean_and_birge_ratio_by_hand() -> None:
     """1, 2, 4 with u 1, 1, 2: weights 1, 1, 1/4; mean 4/2.25 = 16/9; Q = (49 + 4 + 400/4)/81 = 17/9; over 2 dof."""
-    found = agree([Value("a", 1.0, 1.0), Value("b", 2.0, 0.0, 1.0), Value("c", 4.0, 2.0)])
+    found = combine_values([MethodValue("a", 1.0, 1.0), MethodValue("b", 2.0, 0.0, 1.0), MethodValue("c", 4.0, 2.0)])
     assert found.mean == pytest.approx(16.0 / 9.0) and found.u == pytest.approx(2.0 / 3.0)
     assert found.weights == pytest.approx([4.0 / 9.0, 4.0 / 9.0, 1.0 / 9.0])
     assert pytest.approx(17.0 / 9.0) == found.Q and found.birge == pytest.approx(math.sqrt(17.0 / 18.0))
@@ -82,9 +82,9 @@ def test_weighted_mean_and_birge_ratio_by_hand() -> None:
 def test_two_values_are_welch_s_t_test() -> None:
     rng = np.random.default_rng(4)
     x, y = rng.normal(0.0, 1.0, 6), rng.normal(1.0, 3.0, 9)
-    values = [Value(n, float(v.mean()), float(v.std(ddof=1) / math.sqrt(v.size)), dof=v.size - 1.0)
+    values = [MethodValue(n, float(v.mean()), float(v.std(ddof=1) / math.sqrt(v.size)), dof=v.size - 1.0)
               for n, v in (("x", x), ("y", y))]  # fmt: skip
-    assert agree(values).p == pytest.approx(float(stats.ttest_ind(x, y, equal_var=False).pvalue), rel=1e-9)
+    assert combine_values(values).p == pytest.approx(float(stats.ttest_ind(x, y, equal_var=False).pvalue), rel=1e-9)
 
 
 def test_holm_by_hand() -> None:
@@ -93,10 +93,10 @@ def test_holm_by_hand() -> None:
 
 
 def test_the_one_that_is_off_is_named() -> None:
-    values = [Value("a", 1.0, 0.1), Value("b", 1.1, 0.1), Value("c", 2.0, 0.1)]
+    values = [MethodValue("a", 1.0, 0.1), MethodValue("b", 1.1, 0.1), MethodValue("c", 2.0, 0.1)]
     assert outlier(values) == ("c", pytest.approx(float(stats.chi2.sf(0.5, 1))))
     assert outlier(values[1:]) is None  # of two nobody can tell
-    assert outlier([values[0], values[2], Value("d", 3.0, 0.1)]) is None  # none agree
+    assert outlier([values[0], values[2], MethodValue("d", 3.0, 0.1)]) is None  # none agree
 
 
 # ----------------------------------------------------------------------------------------- by counting
@@ -109,11 +109,11 @@ def test_false_alarms_and_coverage(sigma: tuple[float, ...], dof: tuple[float, .
     for _ in range(n):
         error = rng.standard_normal()
         values = [
-            Value(str(k), s * rng.standard_normal() + float(c[0]) * error,
+            MethodValue(str(k), s * rng.standard_normal() + float(c[0]) * error,
                   s * math.sqrt(rng.chisquare(v) / v) if math.isfinite(v) else s, dof=v, shared={"k": c})
             for k, (s, v, c) in enumerate(zip(sigma, dof, shared, strict=True))
         ]  # fmt: skip
-        found = agree(values)
+        found = combine_values(values)
         alarms += found.p < 0.05
         covered += abs(found.mean) < found.U
     low, high = stats.binom.ppf([1e-3, 1.0 - 1e-3], n, 0.05)
@@ -206,7 +206,9 @@ def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
     f, i = r.coefficients
     assert r.suite.disagreeing == ["D_F"] and r.suite.consistency == "inconsistent"
     assert "c deviates by +2 °/h; the others are consistent" in " ".join(r.summary)
-    assert f.u == pytest.approx(agree([Value("", x, 0.2) for x in values.values()]).birge * 0.2 / math.sqrt(3.0))
+    assert f.u == pytest.approx(
+        combine_values([MethodValue("", x, 0.2) for x in values.values()]).birge * 0.2 / math.sqrt(3.0)
+    )
     assert (f.verdict, i.verdict, r.verdict) == ("inconclusive", "pass", "inconclusive")
     assert i.u == pytest.approx(0.2 / math.sqrt(3.0))
 

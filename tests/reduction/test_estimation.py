@@ -65,7 +65,7 @@ def test_delay(true):
     rng = np.random.default_rng(4)
     t = np.arange(20000) * T
     truth = signal.lfilter(*signal.butter(2, 0.02), rng.normal(size=t.size))
-    estimate = estimator_metrics.late(t, truth, true * T) + 0.02 * truth.std() * rng.normal(size=t.size)
+    estimate = estimator_metrics.delay_signal(t, truth, true * T) + 0.02 * truth.std() * rng.normal(size=t.size)
     found = estimator_metrics.delay(t, estimate, truth, 40 * T)
     assert found.value == pytest.approx(true * T, abs=4.0 * found.u + 1e-5)
     assert found.u < 0.2 * T

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, scatter, step
+from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, step, step_noise_std
 from gyrobench.reduction.window_checks import ReductionError
 
 DT = 1e-3
@@ -110,11 +110,11 @@ def test_scatter_of_a_change_knows_slow_noise() -> None:
     less a third of each mean's length: n - (before + after) / 3 ... by hand 200 - 20/3 - 10/3 = 190, to 10 % over 400
     records; white noise of 0.1: 0.1 sqrt(1/20 + 1/10)."""
     rng = np.random.default_rng(9)
-    walks = [scatter(np.cumsum(0.01 * rng.standard_normal(8000)), 20, 190, 10) for _ in range(100)]
+    walks = [step_noise_std(np.cumsum(0.01 * rng.standard_normal(8000)), 20, 190, 10) for _ in range(100)]
     assert np.sqrt(np.mean(np.square(walks))) == pytest.approx(0.01 * math.sqrt(210 - 40 / 3 - 20 / 3), rel=0.1)
-    white = [scatter(0.1 * rng.standard_normal(8000), 20, 190, 10) for _ in range(50)]
+    white = [step_noise_std(0.1 * rng.standard_normal(8000), 20, 190, 10) for _ in range(50)]
     assert np.mean(white) == pytest.approx(0.1 * math.sqrt(1 / 20 + 1 / 10), rel=0.05)
-    assert scatter(np.zeros(500), 20, 190, 10) is None  # two pieces say nothing
+    assert step_noise_std(np.zeros(500), 20, 190, 10) is None  # two pieces say nothing
 
 
 # ------------------------------------------------------------------------------------------- drift

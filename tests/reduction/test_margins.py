@@ -12,10 +12,10 @@ import pytest
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.reduction.loops.margins import (
-    between,
     deviation,
-    excited,
+    excitation_response,
     grid,
+    interpolate_response,
     margins,
     measured_margins,
     measured_values,
@@ -76,7 +76,7 @@ def test_margins_from_sparse_points() -> None:
     assert found.lower == pytest.approx(0.044, rel=0.03)
     assert measured_margins(points[:3]).crossovers == []
     at = np.array([p.f for p in points])
-    np.testing.assert_allclose(between(points, at), [p.value for p in points], rtol=1e-9)
+    np.testing.assert_allclose(interpolate_response(points, at), [p.value for p in points], rtol=1e-9)
 
 
 def covered(draws: int) -> dict[str, int]:
@@ -132,11 +132,11 @@ def test_model_response_and_excitations() -> None:
     f = np.array([0.5, 3.0])
     s = 2j * np.pi * f
     np.testing.assert_allclose(model_response(model(), f)[:, 0, 0], 3.0 / (s + 2.0), rtol=1e-14)
-    np.testing.assert_allclose(excited(model(), "motion", 2, "p.y", f), 1.0 + s * s / (s + 2.0), rtol=1e-14)
+    np.testing.assert_allclose(excitation_response(model(), "motion", 2, "p.y", f), 1.0 + s * s / (s + 2.0), rtol=1e-14)
     with pytest.raises(KeyError, match="is not connected"):
-        excited(model(), "command", 1, "p.y", f)
+        excitation_response(model(), "command", 1, "p.y", f)
     with pytest.raises(KeyError, match="unknown channel"):
-        excited(model(), "torque", 1, "p.z", f)
+        excitation_response(model(), "torque", 1, "p.z", f)
 
 
 def test_discrete_model_is_evaluated_on_the_circle() -> None:

@@ -15,7 +15,7 @@ from scipy import stats
 
 from gyrobench import drift
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
-from gyrobench.reduction.estimation.regression import RegressionError, generalized, least_squares
+from gyrobench.reduction.estimation.regression import RegressionError, generalized_least_squares, least_squares
 
 _spec = importlib.util.spec_from_file_location("coverage_of_tumble", Path(__file__).with_name("coverage.py"))
 assert _spec is not None and _spec.loader is not None
@@ -75,7 +75,7 @@ def test_two_windows_by_hand() -> None:
 
 def test_candidates_are_a_probability() -> None:
     t0, t1, _ = mc.plan(36, 5)
-    c = noise.cells(t0, t1)
+    c = noise.noise_grid(t0, t1)
     assert c.prior.sum() == pytest.approx(1.0) and np.all(c.prior > 0)
     assert np.all((c.share >= 0) & (c.share <= 1)) and c.share[0] == 0.0
     assert c.tau.size == 1 + 9 + 9 * 6  # white alone, Gauss-Markov alone, both
@@ -89,7 +89,7 @@ def test_population_by_hand() -> None:
     """
     t0 = 10.0 * np.arange(40)
     rng = np.random.default_rng(1)
-    drawn = np.array([noise.draw(rng, t0, t0 + 10.0, readings=True) for _ in range(4000)])
+    drawn = np.array([noise.sample_instrument(rng, t0, t0 + 10.0, readings=True) for _ in range(4000)])
     tau, share, reading = drawn.T
     assert 3.0 < tau.min() < 3.1 and 195.0 < tau.max() < 200.0
     assert np.median(tau) == pytest.approx(math.sqrt(3.0 * 200.0), rel=0.1)  # log-uniform
@@ -123,7 +123,7 @@ def test_gain_reproduces_the_design_and_fits_like_generalized_least_squares() ->
     window = float(np.median(t1 - t0))
     R = share * noise.process_covariance(t0, t1, tau) / noise.mean_variance(np.array([window / tau]))[0]
     R = R + (1 - share) * np.diag(window / (t1 - t0))
-    np.testing.assert_allclose(e.gain @ y, generalized(X, y, names, R).beta, rtol=1e-7)
+    np.testing.assert_allclose(e.gain @ y, generalized_least_squares(X, y, names, R).beta, rtol=1e-7)
 
 
 def test_white_noise_gives_nearly_the_ordinary_answer() -> None:
@@ -220,7 +220,7 @@ def test_intervals_cover_the_population(design: str, readings: bool) -> None:
     rng, names = np.random.default_rng(12), drift.terms(9)[: X.shape[1]]
     ratio = []
     for _ in range(runs):
-        V = reading_covariance(t0, t1, *noise.draw(rng, t0, t1, readings))
+        V = reading_covariance(t0, t1, *noise.sample_instrument(rng, t0, t1, readings))
         e = noise_mixture_fit.fit(
             X, np.linalg.cholesky(V) @ rng.standard_normal(t0.size), names, t0, t1, readings=readings
         )

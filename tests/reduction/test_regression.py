@@ -40,7 +40,7 @@ def test_weights_and_covariance_agree() -> None:
     X, v = np.ones((4, 1)), np.array([1.0, 1, 1, 25])
     y = rng.normal(size=4)
     plain, weighted = R.least_squares(X, y, ("m",)), R.least_squares(X, y, ("m",), 1 / v)
-    general = R.generalized(X, y, ("m",), np.diag(v))
+    general = R.generalized_least_squares(X, y, ("m",), np.diag(v))
     assert (plain.gain**2 @ v)[0] == pytest.approx(1.75)
     assert (weighted.gain**2 @ v)[0] == pytest.approx(0.329, abs=1e-3)
     assert general.beta == pytest.approx(weighted.beta) and general.u == pytest.approx(weighted.u)
@@ -51,7 +51,7 @@ def test_generalized_against_the_formula() -> None:
     X, y = rng.normal(size=(30, 4)), rng.normal(size=30)
     A = rng.normal(size=(30, 30))
     C = A @ A.T + np.eye(30)
-    f = R.generalized(X, y, tuple("abcd"), C)
+    f = R.generalized_least_squares(X, y, tuple("abcd"), C)
     W = np.linalg.inv(C)
     beta = np.linalg.solve(X.T @ W @ X, X.T @ W @ y)
     assert f.beta == pytest.approx(beta)
@@ -63,7 +63,7 @@ def test_generalized_against_the_formula() -> None:
 def test_mean_in_equal_correlation() -> None:
     """[RED-GLS] var(mean) = s^2 (1/N + (N-1) rho/N)."""
     C = 0.3 + 0.7 * np.eye(10)
-    f = R.generalized(np.ones((10, 1)), np.arange(10.0), ("m",), C)
+    f = R.generalized_least_squares(np.ones((10, 1)), np.arange(10.0), ("m",), C)
     assert (f.gain @ C @ f.gain.T)[0, 0] == pytest.approx(0.1 + 0.9 * 0.3)
 
 
@@ -105,8 +105,8 @@ def test_refusals() -> None:
         (lambda: R.least_squares(X, np.r_[y[:4], np.inf], ("a",)), "non-finite"),
         (lambda: R.least_squares(two, y, ("a", "b")), "rank 1 for 2 coefficients; not estimable: . − ."),
         (lambda: R.least_squares(X, y, ("a",), np.zeros(5)), "weights must be finite and positive"),
-        (lambda: R.generalized(X, y, ("a",), np.ones((5, 5))), "not positive definite"),
-        (lambda: R.generalized(X, y, ("a",), np.triu(np.ones((5, 5)))), "must be symmetric"),
+        (lambda: R.generalized_least_squares(X, y, ("a",), np.ones((5, 5))), "not positive definite"),
+        (lambda: R.generalized_least_squares(X, y, ("a",), np.triu(np.ones((5, 5)))), "must be symmetric"),
         (
             lambda: R.check_data(np.vander(np.linspace(1, 1.01, 9), 3), np.zeros(9), tuple("abc")),
             "condition number .* least determined",

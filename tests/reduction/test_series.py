@@ -158,9 +158,9 @@ def test_spectrum_of_white_noise() -> None:
 
 # ------------------------------------------------------------------------------------------ uncertainty
 def test_combination() -> None:
-    u, U = uncertainty.combine(3.0, 6.6, [4.0])
+    u, U = uncertainty.combine_uncertainties(3.0, 6.6, [4.0])
     assert (u, U) == pytest.approx((5.0, math.hypot(6.6, 1.959964 * 4)))
-    assert uncertainty.combine(1.0, 2.2, []) == (1.0, 2.2)
+    assert uncertainty.combine_uncertainties(1.0, 2.2, []) == (1.0, 2.2)
 
 
 @pytest.mark.parametrize(("estimate", "limit", "expected"), [
@@ -170,14 +170,14 @@ def test_combination() -> None:
     (math.nan, (-1.0, 1.0), "inconclusive"),
 ])  # fmt: skip
 def test_verdicts(estimate: float, limit: tuple[float | None, float | None] | None, expected: str) -> None:
-    assert uncertainty.verdict(estimate, 0.1, limit) == expected
+    assert uncertainty.assess_conformity(estimate, 0.1, limit) == expected
 
 
 def test_overall() -> None:
-    assert uncertainty.overall(["pass", "no specification given"]) == "pass"
-    assert uncertainty.overall(["pass", "inconclusive", "fail"]) == "fail"
-    assert uncertainty.overall(["pass", "inconclusive"]) == "inconclusive"
-    assert uncertainty.overall([]) == "no specification given"
+    assert uncertainty.worst_verdict(["pass", "no specification given"]) == "pass"
+    assert uncertainty.worst_verdict(["pass", "inconclusive", "fail"]) == "fail"
+    assert uncertainty.worst_verdict(["pass", "inconclusive"]) == "inconclusive"
+    assert uncertainty.worst_verdict([]) == "no specification given"
 
 
 def test_window_problems_are_none_for_good_windows() -> None:

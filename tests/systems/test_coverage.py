@@ -136,7 +136,7 @@ def test_intervals_cover(name: str) -> None:
     ratio = []
     for run in range(runs):
         drawn, record = records[run % 3]
-        n = benchmark.Noise(*noise.draw(rng, t0, t1, readings), window)
+        n = benchmark.Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
         read_so = read(record.windows, record.run.parameters, rng, n)
         result = drawn.reduce(Record({**record.windows, **read_so}, {}, record.run))
         ratio.append(

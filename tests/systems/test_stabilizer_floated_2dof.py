@@ -115,7 +115,7 @@ def test_5_25_prints_the_loop_gain(steps: Session) -> None:
     model = steps.run(IDEAL).run.linear.closed.continuous
     f = np.array([0.01, 0.5, 2.0, 16.0, 60.0])
     s = 2j * np.pi * f
-    found = margins.excited(model, "torque", 1, "platform.attitude", f)
+    found = margins.excitation_response(model, "torque", 1, "platform.attitude", f)
     np.testing.assert_allclose(found, closed.Loop(**DEFAULT).compliance(s), rtol=1e-6)
     assert np.min(np.abs(8250.0 / (0.5 * s**2) / found)) > 1e3
     loop = steps.run(IDEAL).run.linear.loops["stabilizer"].continuous

@@ -101,7 +101,7 @@ def linear_result(
         warnings=[*fit_warnings, *warnings],
         summary=list(summary),
         decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         site=dict(site or {}),
         instrument=instrument,
         simulated=any(q.truth is not None for q in fit.quantities) if simulated is None else simulated,
@@ -120,7 +120,7 @@ def plus_minus(c: Coefficient) -> str:
 def _coefficient(fit: Findings, j: int, effects: Sequence[Effect], limits: Specification) -> Coefficient:
     q, r = fit.quantities[j], fit.reported
     contributions = [float(e.sensitivity[j]) * e.size for e in effects]
-    u, U = uncertainty.combine(float(r.u[j]), float(r.half_width[j]), contributions)
+    u, U = uncertainty.combine_uncertainties(float(r.u[j]), float(r.half_width[j]), contributions)
     limit = limits.get(q.title, limits.get(q.name))
     estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
     truth = None if q.truth is None else q.truth / q.scale
@@ -141,7 +141,7 @@ def _coefficient(fit: Findings, j: int, effects: Sequence[Effect], limits: Speci
         truth=truth,
         z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
         limit=limit,
-        verdict=uncertainty.verdict(estimate, U_s, limit),
+        verdict=uncertainty.assess_conformity(estimate, U_s, limit),
         combination=dict(q.combination or {q.name: 1.0}),
     )
     return replace(c, z=None) if fit.ideal else c  # u is rounding: nothing to compare with

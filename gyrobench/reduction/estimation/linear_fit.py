@@ -191,7 +191,7 @@ class Findings:
         u = np.minimum(sd, half / noise_mixture_fit.NORMAL)
         size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
         covariance = (J @ r.covariance @ J.T) * np.outer(size, size)
-        dof = noise_mixture_fit.dof_of(half / np.maximum(u, 1e-300))
+        dof = noise_mixture_fit.equivalent_dof(half / np.maximum(u, 1e-300))
         p = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
         reported = Estimates(value, covariance, u, half, p, dof, J @ r.gain)
         return replace(self, quantities=tuple(quantities), reported=reported, tests=list(self.tests))

@@ -50,7 +50,7 @@ def process_covariance(t0: Array, t1: Array, tau: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Cells:
+class NoiseGrid:
     """Candidate noise models: correlation time, correlated share of the variance of a window, prior weight.
 
     share = sigma^2 v / (N^2/T + sigma^2 v) for a window of the typical length; reading: what reading errors make of
@@ -63,8 +63,8 @@ class Cells:
     reading: Array  # (G,)
 
 
-#: The population of instrument noise that intervals are made for; candidates are a quadrature over it, draw() samples
-#: it.  One in four instruments has white noise alone, one in four Gauss-Markov drift alone, two have both.
+#: The population of instrument noise that intervals are made for; candidates are a quadrature over it,
+#: sample_instrument() samples it.  One in four instruments has white noise alone, one in four Gauss-Markov drift alone, two have both.
 FAMILIES = (0.25, 0.25, 0.5)
 #: Correlation time, log-uniform: from SHORTEST windows to LONGEST of the record (of slower drift a record holds no
 #: more than a constant and a trend).
@@ -96,7 +96,7 @@ def _middles(low: Array | float, high: float, n: int) -> Array:
     return out
 
 
-def cells(t0: Array, t1: Array, readings: bool = False) -> Cells:
+def noise_grid(t0: Array, t1: Array, readings: bool = False) -> NoiseGrid:
     """The grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
     window, shortest, longest = _taus(t0, t1)
     tau = _middles(shortest, longest, TAUS)
@@ -105,16 +105,18 @@ def cells(t0: Array, t1: Array, readings: bool = False) -> Cells:
     share = np.concatenate([[0.0], np.ones(TAUS), odds / (1.0 + odds)])
     prior = np.repeat(np.array(FAMILIES) / (1, TAUS, TAUS * ODDS), (1, TAUS, TAUS * ODDS))
     if not readings:
-        return Cells(every, share, prior, np.zeros_like(every))
+        return NoiseGrid(every, share, prior, np.zeros_like(every))
     part = _middles(*READING, READINGS)
     size = np.concatenate([[0.0], part / (1.0 + part)])
     weight = np.concatenate([[NO_READING], np.full(READINGS, (1.0 - NO_READING) / READINGS)])
     n = size.size
-    return Cells(np.tile(every, n), np.tile(share, n), np.outer(weight, prior).ravel(), np.repeat(size, every.size))
+    return NoiseGrid(np.tile(every, n), np.tile(share, n), np.outer(weight, prior).ravel(), np.repeat(size, every.size))
 
 
-def draw(rng: np.random.Generator, t0: Array, t1: Array, readings: bool = False) -> tuple[float, float, float]:
-    """tau (s), share and reading of one instrument of the population, as :class:`Cells` has them."""
+def sample_instrument(
+    rng: np.random.Generator, t0: Array, t1: Array, readings: bool = False
+) -> tuple[float, float, float]:
+    """tau (s), share and reading of one instrument of the population, as :class:`NoiseGrid` has them."""
 
     def log_uniform(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))

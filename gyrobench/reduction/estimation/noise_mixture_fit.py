@@ -1,6 +1,6 @@
 """Least squares whose noise - white, Gauss-Markov or both - is estimated from the same data, with honest intervals.
 
-Each candidate noise model (:func:`gyrobench.reduction.estimation.noise.cells`) gives a generalized least squares
+Each candidate noise model (:func:`gyrobench.reduction.estimation.noise.noise_grid`) gives a generalized least squares
 estimate, its covariance and a restricted likelihood (REML, the scale integrated out):
 
     log L = -1/2 [ log|R| + log|X' R^-1 X| + (n - p) log(v' R^-1 v) ]
@@ -100,7 +100,7 @@ def fit(
     design = check_data(X, y, names, limit)
     check_windows(t0, t1)
     n, p = X.shape
-    grid = noise.cells(t0, t1, readings)
+    grid = noise.noise_grid(t0, t1, readings)
     scale = np.linalg.norm(X, axis=0)
     Q, R = np.linalg.qr(X / scale)
     start = Q.T @ y
@@ -154,7 +154,7 @@ def fit(
             "record only."
         )
     return Estimate(
-        tuple(names), beta, covariance, u, half, probability, dof_of(half / u), y - X @ beta,
+        tuple(names), beta, covariance, u, half, probability, equivalent_dof(half / u), y - X @ beta,
         scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
         (float(grid.tau[k]), float(grid.share[k])), tuple(warnings), mixture, float(grid.reading[k]),
         _spread(w, np.sqrt(s2 * grid.reading / 2.0) * window, k),
@@ -223,7 +223,7 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
     return out
 
 
-def dof_of(ratio: Array) -> Array:
+def equivalent_dof(ratio: Array) -> Array:
     """Degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
     table = np.concatenate([np.arange(1.0, 30.0, 0.25), np.geomspace(30.0, 1e4, 60)])
     quantile = special.stdtrit(table, 0.975)
@@ -245,13 +245,13 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     return float(values[k]), low, high
 
 
-def _whitened(t0: Array, t1: Array, columns: Array, grid: noise.Cells, which: slice) -> tuple[Array, Array]:
+def _whitened(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid, which: slice) -> tuple[Array, Array]:
     """(G, n, c) and log determinants (G,) of some models of the grid."""
     Z, logdet = noise.whiten(t0, t1, columns, grid.tau[which], grid.share[which], grid.reading[which])
     return Z.transpose(1, 0, 2), logdet
 
 
-def _moments(t0: Array, t1: Array, columns: Array, grid: noise.Cells) -> tuple[Array, Array, Array, Array]:
+def _moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
     """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model; some at a time."""
     p, size = columns.shape[1] - 1, grid.tau.size // np.unique(grid.reading).size
     many = size * max(1, BLOCK // (columns.size * size))

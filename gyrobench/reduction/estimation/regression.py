@@ -194,7 +194,7 @@ def least_squares(X: Array, y: Array, names: Sequence[str], weights: Array | Non
     return _solve(X * w[:, None], y * w, X, y, names, np.diag(w))
 
 
-def generalized(X: Array, y: Array, names: Sequence[str], covariance: Array) -> Fit:
+def generalized_least_squares(X: Array, y: Array, names: Sequence[str], covariance: Array) -> Fit:
     """Least squares with the covariance of the data known up to a factor; it must be symmetric and positive
     definite.
     """

@@ -123,7 +123,7 @@ def combine_days(
         summary=[
             f"{n} {what}s; {variation} from {what} to {what} by more than noise.", *_few(coefficients, table, what)
         ],
-        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
     )  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def _mean(per_day: list[Coefficient], limit: tuple[float | None, float | None] |
     stats = statistics([c.estimate for c in per_day])
     half = float(special.stdtrit(stats.n - 1, 0.975)) * stats.u
     common = math.sqrt(float(np.mean([max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0) for c in per_day])))
-    u, U = uncertainty.combine(stats.u, half, [common])
+    u, U = uncertainty.combine_uncertainties(stats.u, half, [common])
     first = per_day[0]
     closed = [c.closed for c in per_day if c.closed is not None]
     truth = [c.truth for c in per_day if c.truth is not None]
@@ -157,7 +157,7 @@ def _mean(per_day: list[Coefficient], limit: tuple[float | None, float | None] |
         truth=true,
         z=(stats.mean - true) / u if true is not None and u > 0.0 else None,
         limit=limit,
-        verdict=uncertainty.verdict(stats.mean, U, limit),
+        verdict=uncertainty.assess_conformity(stats.mean, U, limit),
     )
 
 

@@ -14,7 +14,7 @@ DECISION_RULE = (
 )
 
 
-def combine(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
+def combine_uncertainties(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
     """Standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
 
     u^2 = u_a^2 + sum of squares; U^2 = half_a^2 + 1.96^2 times the same sum (type B known with many degrees of
@@ -29,7 +29,7 @@ def p_text(p: float) -> str:
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
-def verdict(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:
+def assess_conformity(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:
     """pass, fail, inconclusive or "no specification given" by :data:`DECISION_RULE`; None is an open side."""
     if limit is None or limit == (None, None):
         return NO_VERDICT
@@ -42,7 +42,7 @@ def verdict(estimate: float, U: float, limit: tuple[float | None, float | None] 
     return "fail" if estimate + U < low or estimate - U > high else "inconclusive"
 
 
-def overall(verdicts: Iterable[str]) -> str:
+def worst_verdict(verdicts: Iterable[str]) -> str:
     """fail before inconclusive before pass; "no specification given" when none was."""
     given = set(verdicts)
     for word in ("fail", "inconclusive", "pass"):

@@ -3,8 +3,8 @@
 Less noise alone proves nothing (an estimate that is always 0 has none): every measure of noise has one of distortion
 beside it, the gain and phase with which a known signal comes through.  [EST-KF-AR, BENCH-DYN-SINE]
 
-All functions are pure.  Series are arrays (n,) sampled evenly at ``time`` (s); numbers come back as :class:`Value` with
-a standard uncertainty.  Errors are correlated in time: where a mean of squares is taken, n squares count as
+All functions are pure.  Series are arrays (n,) sampled evenly at ``time`` (s); numbers come back as
+:class:`UncertainValue` with a standard uncertainty.  Errors are correlated in time: where a mean of squares is taken, n squares count as
 
     n / (1 + 2 sum rho_k^2)                      (Gaussian: the squares of a series correlate as rho_k^2)
 
@@ -32,7 +32,7 @@ DECIBEL = 20.0 / math.log(10.0)
 
 
 @dataclass(frozen=True)
-class Value:
+class UncertainValue:
     """An estimate with its standard uncertainty and the degrees of freedom of that."""
 
     value: float
@@ -68,9 +68,9 @@ class Consistency:
         return self.low <= self.mean <= self.high
 
     @property
-    def value(self) -> Value:
+    def value(self) -> UncertainValue:
         """The mean with the scatter it has if the filter is consistent."""
-        return Value(self.mean, math.sqrt(2.0 / self.dof))
+        return UncertainValue(self.mean, math.sqrt(2.0 / self.dof))
 
 
 # ------------------------------------------------------------------------------------ mean squares
@@ -89,26 +89,26 @@ def independent_squares(x: Array) -> float:
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum(rho * rho - 1.0 / n))))
 
 
-def rms(x: Array) -> Value:
+def rms(x: Array) -> UncertainValue:
     """Root mean square; u = rms/sqrt(2 nu) of nu independent squares."""
     value = math.sqrt(float(np.mean(x * x)))
-    return Value(value, value / math.sqrt(2.0 * independent_squares(x)))
+    return UncertainValue(value, value / math.sqrt(2.0 * independent_squares(x)))
 
 
-def decibels(a: Value, b: Value) -> Value:
+def decibels(a: UncertainValue, b: UncertainValue) -> UncertainValue:
     """20 log10 of a over b; u as if the two were independent (too large for an error and the noise behind it)."""
     if a.value == 0.0 or b.value == 0.0:
-        return Value(-math.inf if b.value > 0.0 else math.nan, math.nan)
-    return Value(DECIBEL * math.log(a.value / b.value), DECIBEL * math.hypot(a.u / a.value, b.u / b.value))
+        return UncertainValue(-math.inf if b.value > 0.0 else math.nan, math.nan)
+    return UncertainValue(DECIBEL * math.log(a.value / b.value), DECIBEL * math.hypot(a.u / a.value, b.u / b.value))
 
 
 # --------------------------------------------------------------------------------- delay and distortion
-def late(time: Array, x: Array, delay: float) -> Array:
+def delay_signal(time: Array, x: Array, delay: float) -> Array:
     """x of ``delay`` s ago, linear between samples; before the record its first value."""
     return np.interp(time - delay, time, x)
 
 
-def delay(time: Array, estimate: Array, truth: Array, most: float) -> Value:
+def delay(time: Array, estimate: Array, truth: Array, most: float) -> UncertainValue:
     """Delay at which the truth fits the estimate best (least mean square difference), 0 to ``most`` s.
 
     Whole samples first, then the parabola through the three least; u from ten stretches.  Both about their means.
@@ -120,7 +120,7 @@ def delay(time: Array, estimate: Array, truth: Array, most: float) -> Value:
         raise ValueError(f"the record is too short for a delay of up to {most:g} s: {20 * most:g} s are needed")
     whole = _delay(estimate, truth, lags) * step
     parts = zip(np.array_split(estimate, STRETCHES), np.array_split(truth, STRETCHES), strict=True)
-    return Value(whole, _scatter([_delay(e, t, lags) * step for e, t in parts]), STRETCHES - 1)
+    return UncertainValue(whole, _scatter([_delay(e, t, lags) * step for e, t in parts]), STRETCHES - 1)
 
 
 def _delay(estimate: Array, truth: Array, lags: int) -> float:
@@ -142,8 +142,8 @@ def _scatter(values: list[float]) -> float:
 class Response:
     """How a known signal comes through: gain, phase (rad, negative: late), and what else the estimate holds."""
 
-    gain: Value
-    phase: Value | None
+    gain: UncertainValue
+    phase: UncertainValue | None
     rest: Array  # estimate less the signal as it came through
 
 
@@ -182,7 +182,7 @@ def sine(time: Array, x: Array, frequency: float) -> Sine:
     return Sine(complex(whole[0], whole[1]), np.array([complex(p[0], p[1]) for p in parts]), x - basis @ whole)
 
 
-def rms_of_sine(time: Array, x: Array, frequency: float) -> Value:
+def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
     """Root mean square of a sine under noise, such as the error of an estimate that is late.
 
     u^2(mean square) = (A u(A))^2 + (2 rest u(rest))^2: the sine, always there, scatters by its amplitude A only.
@@ -191,8 +191,8 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> Value:
     value = math.sqrt(float(np.mean(x * x)))
     rest = rms(s.rest)
     if value == 0.0:
-        return Value(0.0, 0.0)
-    return Value(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
+        return UncertainValue(0.0, 0.0)
+    return UncertainValue(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
 
 
 def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
@@ -203,8 +203,8 @@ def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: floa
     e, x = sine(time, estimate, frequency), sine(time, truth, frequency)
     whole = e.whole / x.whole
     parts = e.parts / x.parts / whole
-    gain = Value(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
-    phase = Value(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
+    gain = UncertainValue(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
+    phase = UncertainValue(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
     return Response(gain, phase, e.rest)
 
 
@@ -221,7 +221,7 @@ def response_to_truth(estimate: Array, truth: Array) -> Response:
     weights = [float(x[s] @ x[s]) for s in stretches]
     share = np.array(weights) / sum(weights)
     u = math.sqrt(float(np.sum((share * (np.array(parts) - gain)) ** 2)) * STRETCHES / (STRETCHES - 1))
-    return Response(Value(gain, u, STRETCHES - 1), None, e - gain * x)
+    return Response(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
 
 
 # ------------------------------------------------------------------------------------- consistency
@@ -256,7 +256,7 @@ def whiteness(innovation: Array, lags: int = 20) -> tuple[dict[str, list[float]]
     return acf, *residual_series.ljung_box(acf, innovation.size, lags)
 
 
-def variance_ratio(estimated: Array, true: float) -> Value:
+def variance_ratio(estimated: Array, true: float) -> UncertainValue:
     """Mean of an estimated variance over the true one, u from ten stretches."""
     parts = [float(np.mean(p)) / true for p in np.array_split(estimated, STRETCHES)]
-    return Value(float(np.mean(estimated)) / true, _scatter(parts), STRETCHES - 1)
+    return UncertainValue(float(np.mean(estimated)) / true, _scatter(parts), STRETCHES - 1)

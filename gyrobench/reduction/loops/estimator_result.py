@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops import estimator_metrics
-from gyrobench.reduction.loops.estimator_metrics import Array, Consistency, Value
+from gyrobench.reduction.loops.estimator_metrics import Array, Consistency, UncertainValue
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, Test
 
@@ -83,7 +83,9 @@ class Measures:
     def named(self, name: str) -> Coefficient:
         return next(c for c in self.coefficients if c.name == name)
 
-    def add(self, name: str, meaning: str, unit: str, v: Value, truth: float | None = None, **more: Any) -> None:
+    def add(
+        self, name: str, meaning: str, unit: str, v: UncertainValue, truth: float | None = None, **more: Any
+    ) -> None:
         low, high = v.interval
         c = Coefficient(
             name, meaning, unit, v.value, v.u, v.k, (low, high), u_a=v.u, truth=truth, **more,
@@ -101,7 +103,7 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     if problems := s.problems():
         raise ReductionError(problems)
     step = float(s.time[1] - s.time[0])
-    behind = estimator_metrics.late(s.time, s.truth, s.latency)
+    behind = estimator_metrics.delay_signal(s.time, s.truth, s.latency)
     known = slice(math.ceil(s.latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
     if s.time[known].size < 400:
         raise ReductionError(f"the record is too short for the latency of {s.latency:g} s")
@@ -129,7 +131,7 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
 def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str) -> None:
     """Errors against the truth of the same instant and of one latency ago."""
 
-    def size(time: Array, x: Array) -> Value:
+    def size(time: Array, x: Array) -> UncertainValue:
         return estimator_metrics.rms_of_sine(time, x, frequency) if frequency else estimator_metrics.rms(x)
 
     raw, m.error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
@@ -140,8 +142,8 @@ def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: flo
     m.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
 
 
-def _times(v: Value, factor: float) -> Value:
-    return Value(v.value * factor, v.u * factor, v.dof)
+def _times(v: UncertainValue, factor: float) -> UncertainValue:
+    return UncertainValue(v.value * factor, v.u * factor, v.dof)
 
 
 def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None) -> None:

@@ -223,7 +223,7 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
     )
 
 
-def scatter(y: Array, before: int, gap: int, after: int) -> float | None:
+def step_noise_std(y: Array, before: int, gap: int, after: int) -> float | None:
     """Standard deviation that a change between two means has where nothing is excited.
 
     y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``

@@ -35,8 +35,8 @@ from gyrobench.reduction.loops.loop_measures import (
     drift,
     gates,
     response,
-    scatter,
     step,
+    step_noise_std,
 )
 from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
@@ -107,7 +107,7 @@ class LoopFindings:
                 truth=truth,
                 z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
                 limit=limit,
-                verdict=uncertainty.verdict(estimate, half, limit),
+                verdict=uncertainty.assess_conformity(estimate, half, limit),
             )
         )
 
@@ -242,8 +242,8 @@ class LoopFindings:
         if model is None or output not in model.outputs:
             return None
         try:
-            values = m.excited(model, kind, axis, output, f)
-            return values + m.excited(model, kind, axis, plus, f) if plus else values
+            values = m.excitation_response(model, kind, axis, output, f)
+            return values + m.excitation_response(model, kind, axis, plus, f) if plus else values
         except KeyError:
             return None
 
@@ -266,7 +266,7 @@ class LoopFindings:
         measures = step(gate.t, y, baseline)
         if quiet is not None:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
-            u = scatter(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
+            u = step_noise_std(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
             measures = measures if u is None else replace(measures, u_change=u)
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
@@ -343,7 +343,7 @@ class LoopFindings:
         """The Result with all that was collected; limits of the specification are applied by coefficient name."""
         for c in self.coefficients if specification else ():
             c.limit = (specification or {}).get(c.name, c.limit)
-            c.verdict = uncertainty.verdict(c.estimate, c.k * c.u, c.limit)
+            c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
         run = self.record.run
         result = LoopResult(
             system=run.system,
@@ -358,7 +358,7 @@ class LoopFindings:
             warnings=self.warnings,
             summary=list(summary),
             decision_rule=uncertainty.DECISION_RULE,
-            verdict=uncertainty.overall(c.verdict for c in self.coefficients),
+            verdict=uncertainty.worst_verdict(c.verdict for c in self.coefficients),
             instrument=instrument or run.instrument,
             simulated=not run.measured,
             ranked_by=ranked_by,

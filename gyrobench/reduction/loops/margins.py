@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 DENSE = 2000  # points of a response on which margins are looked for
 
 
-def excited(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
+def excitation_response(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
     """Response of a channel ("slot.output") to an excitation: torque, command, test, or motion (angle of the base).
 
     A motion moves angle, rate and acceleration at once; they are summed as 1, s, s^2.  Raises KeyError where the model
@@ -118,7 +118,7 @@ def margins(f: Array, gain: Complex) -> Margins:
     )
 
 
-def between(points: Sequence[Point], f: Array, spline: bool = False) -> Complex:
+def interpolate_response(points: Sequence[Point], f: Array, spline: bool = False) -> Complex:
     """Measured points interpolated in log gain and unwrapped phase over log frequency, monotone between points.
 
     Consecutive points must not turn by more than 180 degrees; f must lie inside their range.  spline: by a cubic spline
@@ -139,7 +139,7 @@ def measured_margins(points: Sequence[Point]) -> Margins:
     if len(points) < 4:
         return Margins()
     f = grid(min(p.f for p in points), max(p.f for p in points))
-    return margins(f, between(points, f))
+    return margins(f, interpolate_response(points, f))
 
 
 def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
@@ -152,7 +152,7 @@ def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
     if len(points) < 4:
         return {}
     f = grid(min(p.f for p in points), max(p.f for p in points))
-    shown, other = margins(f, between(points, f)), margins(f, between(points, f, spline=True))
+    shown, other = margins(f, interpolate_response(points, f)), margins(f, interpolate_response(points, f, spline=True))
     values: dict[str, tuple[float, float]] = {}
     if shown.crossovers:
         cross, phase = min(shown.crossovers, key=lambda c: abs(c[1]))
@@ -177,7 +177,7 @@ def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:
     """Relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
     u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / f)))[:2])
     near = np.clip([0.99 * f, 1.01 * f], min(p.f for p in points), max(p.f for p in points))
-    gain = between(points, near)
+    gain = interpolate_response(points, near)
     span = math.log(near[1] / near[0])
     return u, math.log(abs(gain[1]) / abs(gain[0])) / span, float(np.angle(gain[1] / gain[0])) / span
 

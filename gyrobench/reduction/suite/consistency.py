@@ -32,7 +32,7 @@ LEVEL = 0.05  # of the consistency test
 
 
 @dataclass(frozen=True)
-class Value:
+class MethodValue:
     """What one test says about a quantity, in its printed unit.
 
     u_a: standard uncertainty of type A with ``dof`` degrees of freedom.  u_b: of type B, of this test alone.  shared:
@@ -98,7 +98,7 @@ class Agreement:
     pairs: tuple[Pair, ...]
 
 
-def normalized_error(a: Value, b: Value) -> Pair:
+def normalized_error(a: MethodValue, b: MethodValue) -> Pair:
     """E_n of two values; a source that both share counts with the difference of what it does to them."""
     square = (a.k_a * a.u_a) ** 2 + (b.k_a * b.u_a) ** 2 + NORMAL**2 * (a.u_b**2 + b.u_b**2)
     for source in {**a.shared, **b.shared}:
@@ -111,7 +111,7 @@ def normalized_error(a: Value, b: Value) -> Pair:
     return Pair(a.label, b.label, difference, U, abs(difference) / U if U > 0.0 else math.inf)
 
 
-def covariance(values: Sequence[Value]) -> Array:
+def covariance(values: Sequence[MethodValue]) -> Array:
     """(M, M) of the values, shared errors off the diagonal."""
     C = np.diag([v.own for v in values])
     for source in dict.fromkeys(s for v in values for s in v.shared):
@@ -121,7 +121,7 @@ def covariance(values: Sequence[Value]) -> Array:
     return np.asarray(C, dtype=float)
 
 
-def agree(values: Sequence[Value]) -> Agreement:
+def combine_values(values: Sequence[MethodValue]) -> Agreement:
     """Weighted mean and consistency of two values or more.  Raises ValueError for fewer, or for one without own u."""
     if len(values) < 2:
         raise ValueError(f"{len(values)} value: at least two are needed to compare")
@@ -171,12 +171,12 @@ def holm(p: Sequence[float]) -> list[float]:
     return out
 
 
-def outlier(values: Sequence[Value], level: float = LEVEL) -> tuple[str, float] | None:
+def outlier(values: Sequence[MethodValue], level: float = LEVEL) -> tuple[str, float] | None:
     """The one test without which the others agree, and their p then; None for fewer than three, or where there is none
     or more than one.
     """
     if len(values) < 3:
         return None
-    p_without = [(v.label, agree([o for o in values if o is not v]).p) for v in values]
+    p_without = [(v.label, combine_values([o for o in values if o is not v]).p) for v in values]
     cured = [(label, p) for label, p in p_without if p >= level]
     return cured[0] if len(cured) == 1 else None

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, units
-from gyrobench.reduction.suite.consistency import Value
+from gyrobench.reduction.suite.consistency import MethodValue
 from gyrobench.result import Coefficient, DriftTestResult
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ CLOSE = 1e-9  # a quantity is seen when it is put together to this fraction
 
 
 @dataclass(frozen=True)
-class Compared:
+class Measurand:
     """A quantity: printed name, unit and meaning, and the combination of coefficients that it is."""
 
     name: str
@@ -55,18 +55,18 @@ def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
     return bool(min(np.max(np.abs(x - y)), np.max(np.abs(x + y))) < SAME)
 
 
-def _shown(c: Coefficient) -> Compared:
+def _shown(c: Coefficient) -> Measurand:
     """Under the model's name where it is one coefficient: u_zx = -gamma Dy_y is compared as Dy_y."""
     made_of = combination(c)
     name = next(iter(made_of))
     if len(made_of) == 1 and name in MODEL:
-        return Compared(name, units.display(drift.surface_unit(name)), drift.meaning(name), {name: 1.0})
-    return Compared(c.name, c.unit, c.meaning, made_of)
+        return Measurand(name, units.display(drift.surface_unit(name)), drift.meaning(name), {name: 1.0})
+    return Measurand(c.name, c.unit, c.meaning, made_of)
 
 
-def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
+def quantities(results: Mapping[str, DriftTestResult]) -> list[Measurand]:
     """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
-    reported: list[tuple[Compared, str]] = []
+    reported: list[tuple[Measurand, str]] = []
     for label, result in results.items():
         for c in result.coefficients:
             new = _shown(c)
@@ -78,7 +78,7 @@ def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
     ]
     place = {n: k for k, n in enumerate((*drift.NAMES, *drift.NAMES_2DOF["x"], *drift.NAMES_2DOF["y"]))}
 
-    def rank(q: Compared) -> tuple[int, int]:
+    def rank(q: Measurand) -> tuple[int, int]:
         plain = len(q.combination) == 1
         first = place.get(next(iter(q.combination)), len(place))
         return (0 if plain and first < len(place) else 1 if not plain else 2, first)
@@ -86,7 +86,7 @@ def quantities(results: Mapping[str, DriftTestResult]) -> list[Compared]:
     return sorted(named, key=rank)
 
 
-def weights(quantity: Compared, result: DriftTestResult) -> Array | None:
+def weights(quantity: Measurand, result: DriftTestResult) -> Array | None:
     """c (q,) of quantity = c' estimates; None where the test does not see it."""
     made_of = [combination(c) for c in result.coefficients]
     for j, own in enumerate(made_of):
@@ -104,7 +104,7 @@ def weights(quantity: Compared, result: DriftTestResult) -> Array | None:
     return np.asarray(np.where(np.abs(c) < CLOSE * np.max(np.abs(c)), 0.0, c), dtype=float)
 
 
-def value(label: str, quantity: Compared, result: DriftTestResult, shared: Collection[str]) -> Value | None:
+def value(label: str, quantity: Measurand, result: DriftTestResult, shared: Collection[str]) -> MethodValue | None:
     """What the test says of the quantity; None where it does not see it.  shared: sources of type B of all tests."""
     c = weights(quantity, result)
     if c is None:
@@ -134,7 +134,7 @@ def value(label: str, quantity: Compared, result: DriftTestResult, shared: Colle
     dof = min((coefficients[j].dof or math.inf for j in used), default=math.inf)
     name = coefficients[used[0]].name if used.size == 1 else ""
     estimate = float(c @ np.array([e.estimate for e in coefficients]))
-    return Value(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
+    return MethodValue(label, estimate, math.sqrt(max(square, 0.0)), u_b, dof, common, truth, name)
 
 
 def ideal(result: DriftTestResult) -> bool:

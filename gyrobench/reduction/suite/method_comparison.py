@@ -19,8 +19,8 @@ from gyrobench.record.run_document import RunDocument, SuiteTestRun
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
 from gyrobench.reduction.suite import consistency, estimable_combinations
-from gyrobench.reduction.suite.consistency import LEVEL, Value
-from gyrobench.reduction.suite.estimable_combinations import Compared
+from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
+from gyrobench.reduction.suite.estimable_combinations import Measurand
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import (
     Coefficient,
@@ -52,11 +52,11 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Compare:
+class MeasurandComparison:
     """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
 
-    quantity: Compared
-    values: tuple[Value, ...]
+    quantity: Measurand
+    values: tuple[MethodValue, ...]
     found: consistency.Agreement | None
     p: float | None = None  # adjusted for the number of quantities
 
@@ -83,7 +83,7 @@ class Compare:
             return f"consistent; E_n > 1: {', '.join(significant)}" if significant else "consistent"
         outlier = consistency.outlier(self.values)
         if outlier is not None:
-            others = consistency.agree([v for v in self.values if v.label != outlier[0]])
+            others = consistency.combine_values([v for v in self.values if v.label != outlier[0]])
             deviating = next(v for v in self.values if v.label == outlier[0])
             deviation = deviating.estimate - others.mean
             size = f"{deviation:+.2g} {self.quantity.unit}".replace("-", "−")
@@ -92,7 +92,7 @@ class Compare:
         return f"inconsistent: {', '.join(f'E_n of {x}' for x in significant) or 'no single pair'}{which}"
 
 
-def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[Compare]:
+def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[MeasurandComparison]:
     """Every quantity that the results report, by every one that sees it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
@@ -101,11 +101,11 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
         candidates = [estimable_combinations.value(label, q, r, shared) for label, r in results.items()]
         values = tuple(v for v in candidates if v is not None)
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
-        out.append(Compare(q, values, consistency.agree(values) if weighed else None))
+        out.append(MeasurandComparison(q, values, consistency.combine_values(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
     adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
     for k, p in zip(tested, adjusted, strict=True):
-        out[k] = Compare(out[k].quantity, out[k].values, out[k].found, p)
+        out[k] = MeasurandComparison(out[k].quantity, out[k].values, out[k].found, p)
     return out
 
 
@@ -209,7 +209,7 @@ def combine_methods(
         system=system, title=title, method=method, sources=list(sources),
         conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
         coefficients=coefficients, tests=tests, decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.overall(c.verdict for c in coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         site=dict(first.site) if all(s == sites[0] for s in sites) else {},
         instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
         simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
@@ -217,7 +217,7 @@ def combine_methods(
     )  # fmt: skip
 
 
-def _coefficient(c: Compare, limits: Specification) -> Coefficient:
+def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
     q, a = c.quantity, c.found
     limit = limits.get(q.name)
     if a is not None:
@@ -229,7 +229,7 @@ def _coefficient(c: Compare, limits: Specification) -> Coefficient:
         estimate, u, U, u_a, dof = v.estimate, v.u, v.U, v.u_a, v.dof
         meaning = f"{q.meaning}; {v.label} only" if len(c.values) == 1 else q.meaning
     truth = c.truth
-    verdict = uncertainty.verdict(estimate, U, limit)
+    verdict = uncertainty.assess_conformity(estimate, U, limit)
     return Coefficient(
         name=q.name, meaning=meaning, unit=q.unit, estimate=estimate, u=u, k=U / u if u > 0.0 else NORMAL,
         interval=(estimate - U, estimate + U), u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
@@ -238,7 +238,7 @@ def _coefficient(c: Compare, limits: Specification) -> Coefficient:
     )  # fmt: skip
 
 
-def _row(c: Compare) -> dict[str, Any]:
+def _row(c: MeasurandComparison) -> dict[str, Any]:
     a = c.found
     weights = a.weights.tolist() if a is not None else [None] * len(c.values)
     return {
@@ -277,7 +277,7 @@ def _member(label: str, m: Member) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _consistency(compared: Sequence[Compare]) -> dict[str, Any]:
+def _consistency(compared: Sequence[MeasurandComparison]) -> dict[str, Any]:
     tested = [c for c in compared if c.p is not None]
     inconsistent = [c for c in tested if c.disagree]
     pairs = [p for c in tested if c.found for p in c.found.pairs]
@@ -290,7 +290,7 @@ def _consistency(compared: Sequence[Compare]) -> dict[str, Any]:
     }
 
 
-def _summary(suite: SuiteComparison, compared: Sequence[Compare]) -> list[str]:
+def _summary(suite: SuiteComparison, compared: Sequence[MeasurandComparison]) -> list[str]:
     if suite.consistency == "not tested":
         return ["No measurand is determined by two methods with noise: consistency was not tested."]
     many = len(suite.pairs)
@@ -307,7 +307,7 @@ def _summary(suite: SuiteComparison, compared: Sequence[Compare]) -> list[str]:
 
 
 def _warnings(
-    results: Mapping[str, DriftTestResult], compared: Sequence[Compare], failed: Mapping[str, str]
+    results: Mapping[str, DriftTestResult], compared: Sequence[MeasurandComparison], failed: Mapping[str, str]
 ) -> list[str]:
     out = [f"{label} gave no result: {why}" for label, why in failed.items()]
     out += differences(results)
