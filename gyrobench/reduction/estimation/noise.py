@@ -64,7 +64,8 @@ class NoiseGrid:
 
 
 #: The population of instrument noise that intervals are made for; candidates are a quadrature over it,
-#: sample_instrument() samples it.  One in four instruments has white noise alone, one in four Gauss-Markov drift alone, two have both.
+#: sample_instrument() samples it.  One in four instruments has white noise alone, one in four Gauss-Markov drift
+#: alone, two have both.
 FAMILIES = (0.25, 0.25, 0.5)
 #: Correlation time, log-uniform: from SHORTEST windows to LONGEST of the record (of slower drift a record holds no
 #: more than a constant and a trend).

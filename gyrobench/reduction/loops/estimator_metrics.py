@@ -4,7 +4,8 @@ Less noise alone proves nothing (an estimate that is always 0 has none): every m
 beside it, the gain and phase with which a known signal comes through.  [EST-KF-AR, BENCH-DYN-SINE]
 
 All functions are pure.  Series are arrays (n,) sampled evenly at ``time`` (s); numbers come back as
-:class:`UncertainValue` with a standard uncertainty.  Errors are correlated in time: where a mean of squares is taken, n squares count as
+:class:`UncertainValue` with a standard uncertainty.  Errors are correlated in time: where a mean of squares is taken,
+n squares count as
 
     n / (1 + 2 sum rho_k^2)                      (Gaussian: the squares of a series correlate as rho_k^2)
 
