@@ -196,7 +196,7 @@ def test_drift_command_and_monitor_of_the_whole_run(whole: Any) -> None:
     found = {c.name: c for c in result.coefficients}
     for name in ("drift x", "drift y", "drift z", "monitor", "rate gain"):
         assert abs(found[name].z) < 4.0, name
-    coupling = next(t for t in result.tables if t["title"].startswith("Coupling"))
+    coupling = next(t for t in result.tables if t["title"].startswith("Cross-axis coupling"))
     for k, row in enumerate(coupling["rows"], 1):  # gyros out of true by 3' about each axis: up to 0.09 % each way
         assert row[k] == pytest.approx(100.0) and all(0.0 <= x < 0.3 for j, x in enumerate(row[1:], 1) if j != k)
     assert found["platform error"].estimate < 1e-3
