@@ -61,12 +61,12 @@ _OWN = {"x": {"I": "x", "O": "y", "S": "z"}, "y": {"I": "y", "O": "x", "S": "z"}
 
 
 def _axes(name: str) -> str:
-    """The axes a coefficient multiplies: "" for D_F and Dx_0, "IS" for D_IS, "xz" for Dx_xz."""
+    """Return the axes a coefficient multiplies: "" for D_F and Dx_0, "IS" for D_IS, "xz" for Dx_xz."""
     return "".join(a for a in name.partition("_")[2] if a in _AXES)
 
 
 def name_2dof(channel: str, name: str) -> str:
-    """What the coefficient ``name`` is called in the x or y channel of a two-degree-of-freedom gyro: D_IS is
+    """Return what the coefficient ``name`` is called in the x or y channel of a two-degree-of-freedom gyro: D_IS is
     Dx_xz and Dy_yz.  Raises KeyError for another channel."""
     return f"D{channel}_" + ("".join(sorted(_OWN[channel][a] for a in _axes(name))) or "0")
 
@@ -76,7 +76,7 @@ NAMES_2DOF = {c: tuple(name_2dof(c, n) for n in NAMES) for c in ("x", "y")}
 
 
 def meaning(name: str) -> str:
-    """What a coefficient multiplies, in words."""
+    """Return what a coefficient multiplies, in words."""
     if name in MEANING:
         return MEANING[name]
     channel, axes = name[1:].split("_")
@@ -90,12 +90,12 @@ def meaning(name: str) -> str:
 
 
 def order(name: str) -> int:
-    """Power of g of a coefficient: D_F 0, D_I 1, D_IS 2; Dx_0 0, Dx_xz 2."""
+    """Return the power of g of a coefficient: D_F 0, D_I 1, D_IS 2; Dx_0 0, Dx_xz 2."""
     return len(_axes(name))
 
 
 def surface_unit(name: str) -> str:
-    """Unit of ``name`` for the user: deg/h, deg/h/g or deg/h/g2."""
+    """Return the unit of ``name`` for the user: deg/h, deg/h/g or deg/h/g2."""
     return ("deg/h", "deg/h/g", "deg/h/g2")[order(name)]
 
 
@@ -135,7 +135,7 @@ def fold_problems(true: Mapping[str, float], prefix: str = "") -> list[str]:
 
 
 def regressors(xyz: ArrayLike, names: tuple[str, ...] = NAMES) -> NDArray[np.float64]:
-    """Rows of the design: ``xyz`` (..., 3) in multiples of g0, sign of Hu 1981 -> (..., len(names)).
+    """Return the rows of the design: ``xyz`` (..., 3) in multiples of g0, sign of Hu 1981 -> (..., len(names)).
 
     ``names`` of a two-degree-of-freedom gyro stand over its axes x, y, z, in both channels.
     """
@@ -173,7 +173,7 @@ CONVENTIONS = {
 
 
 def change_sign(coefficients: Mapping[str, float], from_: str, to: str) -> dict[str, float]:
-    """Coefficients written in convention ``from_`` rewritten in ``to`` (keys of :data:`CONVENTIONS`).
+    """Return the coefficients written in convention ``from_`` rewritten in ``to`` (keys of :data:`CONVENTIONS`).
 
     Turning the force axis round changes the linear terms only; turning the rate round changes all.  [CONV-SIGNS]
     """
@@ -210,7 +210,7 @@ def _positive(H: float, m: float) -> None:
 
 
 def from_physical(H: float, m: float, physical: Mapping[str, float]) -> dict[str, float]:
-    """Coefficients (rad/s per g0^n) of spin momentum ``H``, float mass ``m`` and the quantities of
+    """Return the coefficients (rad/s per g0^n) of spin momentum ``H``, float mass ``m`` and the quantities of
     :data:`PHYSICAL`.
 
     Only what ``physical`` determines is returned.  D_O and D_OO have no rigid-body cause and never come out.
@@ -249,7 +249,7 @@ def from_physical(H: float, m: float, physical: Mapping[str, float]) -> dict[str
 
 
 def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer: float = 0.0) -> dict[str, float]:
-    """Coefficients of both channels of a two-degree-of-freedom gyro, rad/s per g0^n.  [GYRO-STATIC-2DOF]
+    """Return the coefficients of both channels of a two-degree-of-freedom gyro, rad/s per g0^n.  [GYRO-STATIC-2DOF]
 
     ``m``: mass of rotor and inner gimbal, kg.  ``physical``: M_x, M_y (constant torques, N.m), l_x, l_y, l_z (m),
     K_ij (m/N; displacement along i per unit force along j) or the differences K_zz-K_xx, K_zz-K_yy.  ``outer``:
@@ -285,7 +285,7 @@ def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer:
 
 
 def to_physical(H: float, m: float, coefficients: Mapping[str, float]) -> dict[str, float]:
-    """The inverse of :func:`from_physical`; D_O and D_OO have no physical form and are refused unless
+    """Return the inverse of :func:`from_physical`; D_O and D_OO have no physical form and are refused unless
     zero.
     """
     _positive(H, m)
@@ -307,7 +307,7 @@ def to_physical(H: float, m: float, coefficients: Mapping[str, float]) -> dict[s
 
 
 def merge(coefficients: Mapping[str, float], H: float, m: float, physical: Mapping[str, float]) -> dict[str, float]:
-    """Coefficients given partly as D's and partly in physical form; one given in both forms is refused."""
+    """Return the coefficients given partly as D's and partly in physical form; one given in both forms is refused."""
     derived = from_physical(H, m, physical) if physical else {}
     twice = sorted(derived.keys() & coefficients.keys())
     if twice:

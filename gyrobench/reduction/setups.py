@@ -205,7 +205,7 @@ class TumbleSetup(RebalanceSetup):
 
 
 def scale_factor_problems(k: float, name: str = "k") -> list[str]:
-    """What is wrong with the scale factor of a torquer, rad/s/A."""
+    """Return what is wrong with the scale factor of a torquer, rad/s/A."""
     if math.isfinite(k) and k > 0.0:
         return []
     return [f"scale factor {name} = {k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'"]

@@ -29,7 +29,7 @@ def _list(rows: NDArray[np.intp], shown: int = 5) -> str:
 
 
 def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQUIRED) -> list[str]:
-    """What is wrong with the rows of a record, as sentences; rows count from 1.
+    """Return what is wrong with the rows of a record, as sentences; rows count from 1.
 
     Columns ``required`` (t_start and t_end among them) in SI: all finite, times strictly increasing, no window twice,
     none flagged (saturated torquer, lost lock) in any column whose name begins with "flagged".

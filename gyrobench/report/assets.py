@@ -8,7 +8,7 @@ from gyrobench.bench import standard_folder
 
 
 def content_dir(bench: Path | None = None, name: str = "templates/report.html.j2") -> Path:
-    """The ``reports`` folder that holds the content file ``name``: the bench's own before the standard one.
+    """Return the ``reports`` folder that holds the content file ``name``: the bench's own before the standard one.
 
     Raises FileNotFoundError when neither has it.
     """

@@ -34,7 +34,7 @@ _ABREAST = 3  # runs in one table, so that it fits on paper
 
 
 def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json:
-    """The content of ``comparison.json``.
+    """Return the content of ``comparison.json``.
 
     Differences are run minus baseline; their standard uncertainty takes the runs as independent and the
     larger coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty.
@@ -97,7 +97,7 @@ def _difference(run: Json | None, base: Json | None) -> Json | None:
 
 
 def _facts(doc: Json) -> dict[str, Any]:
-    """Everything about a run that may explain a difference, by name."""
+    """Return everything about a run that may explain a difference, by name."""
     run = doc["provenance"]
     facts: dict[str, Any] = {"system": doc["system"], "instrument": doc["instrument"], "method": doc["method"]}
     facts |= {f"site {k}": v for k, v in doc["site"].items()}
@@ -114,7 +114,7 @@ def _facts(doc: Json) -> dict[str, Any]:
 
 
 def _spread(what: str, values: list[Any]) -> list[Json]:
-    """A fact as rows: lists and dictionaries that differ are taken apart, so that only what differs is shown."""
+    """Return a fact as rows: lists and dictionaries that differ are taken apart, so that only what differs is shown."""
     differs = any(v != values[0] for v in values)
     if differs and all(isinstance(v, dict) for v in values):
         keys = list(dict.fromkeys(k for v in values for k in v))
@@ -128,7 +128,7 @@ def _spread(what: str, values: list[Any]) -> list[Json]:
 
 
 def page(doc: Json) -> Page:
-    """The report of a comparison document."""
+    """Return the report of a comparison document."""
     runs = doc["runs"]
     base = _letter(doc["baseline"])
     head = [
@@ -153,7 +153,7 @@ def page(doc: Json) -> Page:
 
 
 def side_tables(doc: Json) -> list[Table]:
-    """The tables that stand side by side: runs, ranking, estimates and differences."""
+    """Return the tables that stand side by side: runs, ranking, estimates and differences."""
     ranked = ranking_section.section(doc, [_letter(k) for k in range(len(doc["runs"]))]).blocks
     blocks = [_runs(doc), *ranked, *_estimates(doc), *_differences(doc)]
     return [b for b in blocks if isinstance(b, Table)]
@@ -205,7 +205,7 @@ def _differing(doc: Json) -> list[Any]:
 
 
 def _value(doc: Json, path: tuple[str | int, ...]) -> Cell:
-    """A fact as text; numbers carry their full value and their place in ``comparison.json``."""
+    """Return a fact as text; numbers carry their full value and their place in ``comparison.json``."""
     cell = number_cell(doc, path, significant=8)
     if not cell.number:
         value: Any = doc
@@ -217,7 +217,7 @@ def _value(doc: Json, path: tuple[str | int, ...]) -> Cell:
 
 
 def _broken(text: str) -> str:
-    """A long word without a place to break gets shortened (hashes: the first 16 digits)."""
+    """Return the text, shortened where it is one long word (of a hash the first 16 digits)."""
     return text if len(text) < 40 or " " in text else text[:16] + "…"
 
 

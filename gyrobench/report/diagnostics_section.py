@@ -186,7 +186,7 @@ def repeatability(doc: Json) -> list[Any]:
 
 
 def _step(doc: Json) -> list[Any]:
-    """The coupling error: what halving the step changes."""
+    """Return the step check: the changes of the coefficients when the communication step is halved."""
     check = doc["step_check"]
     if not check.get("rows"):
         unchecked = Text("The communication step was not checked in this run (option --check-step).", quiet=True)
@@ -201,7 +201,7 @@ def _step(doc: Json) -> list[Any]:
 
 
 def _method_tables(doc: Json) -> list[Any]:
-    """The tables a method brings itself; numbers are rounded to the column "u" where there is one."""
+    """Return the tables a method brings itself; numbers are rounded to the column "u" where there is one."""
     blocks: list[Any] = []
     for k, table in enumerate(doc["tables"]):
         heads = [str(h) for h in table.get("columns", [])]

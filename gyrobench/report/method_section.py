@@ -113,7 +113,7 @@ def _cuts(run: Mapping[str, Any]) -> list[str]:
 
 
 def full_values(doc: Json) -> list[Any]:
-    """All digits of the estimates: the proof that page and result.json hold the same numbers."""
+    """Return the table of the estimates at full precision, as they are in result.json."""
     rows = []
     for k, c in enumerate(doc["coefficients"]):
         path = ("coefficients", k)

@@ -30,7 +30,7 @@ class FormattedNumber:
 
 
 def decimals(u: float) -> int:
-    """Digits after the decimal sign that show ``u`` with two significant digits (negative: tens ...)."""
+    """Return the digits after the decimal sign that show ``u`` with two significant digits (negative: tens ...)."""
     return 1 - int(f"{abs(u):.1e}".split("e")[1])
 
 
@@ -65,7 +65,7 @@ def write_number(
 
 
 def write_p(p: float | None) -> FormattedNumber:
-    """A probability: three decimals, or "< 0.001"."""
+    """Return a probability: three decimals, or "< 0.001"."""
     if p is None or not math.isfinite(p):
         return FormattedNumber(NOTHING, "", "")
     if p < 0.001:

@@ -176,7 +176,7 @@ class Page:
 
 
 def walk(blocks: list[Any]) -> list[Any]:
-    """All blocks with those inside folds and answers, in order."""
+    """Return all blocks with those inside folds and answers, in order."""
     out: list[Any] = []
     for block in blocks:
         out.append(block)
@@ -188,7 +188,7 @@ def walk(blocks: list[Any]) -> list[Any]:
 
 
 def pictures(*items: Picture) -> list[Any]:
-    """The pictures that have something to show, as one block; no block when none has."""
+    """Return the pictures that have something to show, as one block; no block when none has."""
     shown = [p for p in items if p.svg]
     return [Pictures(shown)] if shown else []
 
@@ -206,7 +206,7 @@ def number_cell(
     significant: int = 4,
     trim: bool = True,
 ) -> Cell:
-    """The number at ``path`` of the document; a text that stands there stays a text."""
+    """Return the number at ``path`` of the document; a text that stands there stays a text."""
     value = value_at(doc, *path)
     if isinstance(value, str | list | dict):
         return text_cell(value, mark)

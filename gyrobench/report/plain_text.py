@@ -10,7 +10,7 @@ from gyrobench.result import NO_VERDICT, Result, SuiteResult
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> list[str]:
-    """Return rows as aligned lines; columns in ``left`` are flush left, the others flush right."""
+    """Return the rows as aligned lines; columns in ``left`` are flush left, the others flush right."""
     widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))] if rows else []
     return [
         indent + "  ".join(x.ljust(w) if k in left else x.rjust(w) for k, (x, w) in enumerate(zip(r, widths))).rstrip()  # noqa: B905

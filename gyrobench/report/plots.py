@@ -31,20 +31,20 @@ Json = Mapping[str, Any]
 
 
 def short(label: str, length: int = 26) -> str:
-    """A series label for a figure: the part before the colon when it is long."""
+    """Return a series label for a figure: the part before the colon when it is long."""
     head = label.split(":")[0].strip() or label
     label = label if len(label) <= length else head
     return label if len(label) <= length else label[: length - 1] + "…"
 
 
 def finite(*columns: Sequence[float | None]) -> list[list[float]]:
-    """The columns without the rows that hold a None or a value that is not finite."""
+    """Return the columns without the rows that hold a None or a value that is not finite."""
     rows = [r for r in zip(*columns, strict=False) if all(v is not None and math.isfinite(v) for v in r)]
     return [list(c) for c in zip(*rows, strict=True)] if rows else [[] for _ in columns]
 
 
 def is_curve(series: Json) -> bool:
-    """A series that can be drawn against its position: three or more points that are not all in one place."""
+    """Return whether a series can be drawn: three or more points that are not all in one place."""
     x = [v for v in series["x"] if v is not None]
     return len(x) >= 3 and max(x) > min(x)
 
@@ -156,7 +156,7 @@ def channels(record: Json, names: Sequence[str], units: Mapping[str, str], key: 
 
 
 def acf(data: Json, key: str) -> str:
-    """Autocorrelation of the residuals with its bounds for white noise."""
+    """Return the autocorrelation of the residuals with its bounds for white noise."""
     lag, rho = finite(data["lag"], data["rho"])
     lag, rho = [m for m in lag if m > 0], [r for m, r in zip(lag, rho, strict=True) if m > 0]
     if not lag:
@@ -226,7 +226,7 @@ def allan(data: Json, key: str) -> str:
 
 
 def psd(data: Json, key: str) -> str:
-    """Power spectral density of the residuals, both axes logarithmic."""
+    """Return the power spectral density of the residuals, both axes logarithmic."""
     f, density = finite(data["f"], data["S"])
     rows = [(a, b) for a, b in zip(f, density, strict=True) if a > 0 and b > 0]
     if len(rows) < 2:
@@ -257,7 +257,7 @@ def plain_log(ax: Any, ratio: float) -> None:
 
 
 def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: str) -> str:
-    """Correlation of the estimates, lower triangle, in hundredths."""
+    """Return the correlation of the estimates, lower triangle, in hundredths."""
     from matplotlib.patches import Rectangle
 
     n = len(names)

@@ -40,7 +40,7 @@ def ranking(docs: Sequence[Json]) -> Json:
 
 
 def section(doc: Json, letters: Sequence[str]) -> Section:
-    """The section of a comparison document (:mod:`.comparison`) that shows its ranking; empty without one."""
+    """Return the section of a comparison document (:mod:`.comparison`) that shows its ranking; empty without one."""
     ranked = doc["ranking"]
     if not ranked:
         return Section("Ranking", "ranking", [])

@@ -46,7 +46,7 @@ def equation_svg(source: str, key: str) -> str:
 
 
 def html(page: Page, bench: Path | None = None) -> str:
-    """The page as one self-contained HTML file."""
+    """Return the page as one self-contained HTML file."""
     import jinja2
     import markupsafe
 
@@ -69,7 +69,7 @@ def html(page: Page, bench: Path | None = None) -> str:
 
 
 def pdf(page: Page, bench: Path | None = None) -> bytes:
-    """The page as a PDF (A4, searchable text, vector figures)."""
+    """Return the page as a PDF (A4, searchable text, vector figures)."""
     import matplotlib
 
     data = asdict(page)

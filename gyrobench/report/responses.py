@@ -58,7 +58,7 @@ def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
 
 
 def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = ()) -> str:
-    """The same response of one or several runs in one figure; gain in dB over phase, or values over time."""
+    """Return the same response of one or several runs in one figure; gain in dB over phase, or values over time."""
     first = named[0][1]
     if first["kind"] == "time":
         return _steps([(c["label"], {**first, **c}) for c in curves] or named, key, ())
@@ -139,7 +139,7 @@ def _shift(curve: Json, points: Json) -> float:
 
 
 def _nearest(phase: Sequence[float], first: Json) -> list[float]:
-    """The phase moved by whole turns to that of the first run."""
+    """Return the phase moved by whole turns to that of the first run."""
     turns = 360.0 * round((first["phase"][0] - phase[0]) / 360.0) if first["phase"] else 0.0
     return [p + turns for p in phase]
 

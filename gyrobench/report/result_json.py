@@ -43,14 +43,14 @@ def plain(value: Any) -> Any:
 
 
 def document(result: Result) -> dict[str, Any]:
-    """The content of ``result.json``: the result, ``derived``, ``schema`` and ``report_id``."""
+    """Return the content of ``result.json``: the result, ``derived``, ``schema`` and ``report_id``."""
     content = plain(result.as_dict())
     content["derived"] = _derived(content)
     return {"schema": SCHEMA, "report_id": content_hash(content), **content}
 
 
 def report_id(result: Result) -> str:
-    """Ten hexadecimal digits that stand for the content: same numbers and provenance, same id."""
+    """Return ten hexadecimal digits that stand for the content: same numbers and provenance, same id."""
     return str(document(result)["report_id"])
 
 
@@ -76,7 +76,7 @@ def pointer(*path: str | int) -> str:
 
 
 def value_at(doc: Any, *path: str | int) -> Any:
-    """The value at a path, None where the path ends early."""
+    """Return the value at a path, None where the path ends early."""
     for key in path:
         try:
             doc = doc[key]
@@ -86,7 +86,7 @@ def value_at(doc: Any, *path: str | int) -> Any:
 
 
 def content_hash(content: dict[str, Any]) -> str:
-    """Ten hexadecimal digits of the SHA-256 of JSON content."""
+    """Return ten hexadecimal digits of the SHA-256 of JSON content."""
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:10]
 
@@ -110,7 +110,7 @@ def _derived(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _moments(y: Sequence[float | None], residual: Sequence[float | None]) -> dict[str, float | None]:
-    """Mean of the windows and root mean square of the residuals of a series."""
+    """Return the mean of the windows and root mean square of the residuals of a series."""
     ys = [v for v in y if v is not None]
     rs = [v for v in residual if v is not None]
     return {
@@ -120,7 +120,7 @@ def _moments(y: Sequence[float | None], residual: Sequence[float | None]) -> dic
 
 
 def _phase(phase: Mapping[str, Any]) -> dict[str, Any]:
-    """A phase of the plan in degrees, degrees per hour and seconds, as the plan table shows it."""
+    """Return a phase of the plan in degrees, degrees per hour and seconds, as the plan table shows it."""
     mode = phase.get("mode")
     name = mode if isinstance(mode, str) else MODES.get(int(mode), str(mode)) if mode is not None else ""
     turning = name == "rate"

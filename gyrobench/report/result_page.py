@@ -34,7 +34,7 @@ Json = dict[str, Any]
 
 
 def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
-    """The report of one result document (see :func:`gyrobench.report.result_json.document`).
+    """Return the report of one result document (see :func:`gyrobench.report.result_json.document`).
 
     ``record`` may hold the decimated channels of the run: "time" in s and "slot.variable" columns; they
     are drawn as long records.
@@ -195,7 +195,7 @@ def _capital(text: str) -> str:
 
 
 def _shown(record: Mapping[str, Any], units: Mapping[str, str], most: int = 6) -> list[str]:
-    """The channels to draw: the first ones, those that do not move and counters and flags after the others."""
+    """Return the channels to draw: the first ones, those that do not move and counters and flags after the others."""
     names = [n for n in record if n != "time"]
 
     def dull(name: str) -> bool:

@@ -26,7 +26,7 @@ class SpecificationError(GyrobenchError, ValueError):
 
 
 def surface_unit(unit: str) -> str:
-    """The report's spelling of a unit: "deg/h/g2" is "°/h/g²"."""
+    """Return the report's spelling of a unit: "deg/h/g2" is "°/h/g²"."""
     return _UNITS.get(unit, unit)
 
 

@@ -93,7 +93,7 @@ def styled() -> Iterator[None]:
 
 
 def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
-    """A figure without a window, and its axes (an array of two dimensions)."""
+    """Return a figure without a window, and its axes (an array of two dimensions)."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -106,7 +106,7 @@ def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
 
 
 def svg(fig: Any, key: str, zoom: Any = None) -> str:
-    """The figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own.
+    """Return the figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own.
 
     ``zoom`` is the axes whose x axis the page's script may zoom; its limits are written into the element.
     """
@@ -134,7 +134,7 @@ def clean_svg(text: str, key: str) -> str:
 
 
 def themed(svg_text: str) -> str:
-    """The SVG with neutral colours replaced by the page's CSS variables."""
+    """Return the SVG with neutral colours replaced by the page's CSS variables."""
     for colour, variable in THEMED.items():
         svg_text = svg_text.replace(colour, variable)
     return svg_text

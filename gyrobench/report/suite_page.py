@@ -33,7 +33,7 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 def page(doc: Json) -> Page:
-    """The report of a suite's result document (see :mod:`gyrobench.reduction.suite.method_comparison`)."""
+    """Return the report of a suite's result document (see :mod:`gyrobench.reduction.suite.method_comparison`)."""
     with styled():
         sections = [
             Section("Result and conformity", "answer", [_answer(doc)]),
@@ -163,7 +163,7 @@ def _cross(doc: Json) -> list[Any]:
 
 
 def _forest(q: Json, key: str) -> Picture:
-    """Estimates with 95 % intervals by method; the band is the weighted mean, dashed the truth."""
+    """Return the estimates with 95 % intervals by method; the band is the weighted mean, dashed the truth."""
     values = q["values"]
     fig, axes = figure(HALF, 15 + 5.5 * len(values))
     ax = axes[0, 0]

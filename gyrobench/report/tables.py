@@ -40,7 +40,7 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """A field name as words and its unit: ``sigma_deg_per_h`` or ``sigma / (°/h)`` is ("sigma", "°/h")."""
+    """Return a field name as words and its unit: ``sigma_deg_per_h`` or ``sigma / (°/h)`` is ("sigma", "°/h")."""
     if " / " in key:
         name, unit = key.rsplit(" / ", 1)
         return name, unit[1:-1] if unit.startswith("(") and unit.endswith(")") else unit
@@ -137,13 +137,13 @@ def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, signifi
 
 
 def _plain(doc: Any, path: tuple[str | int, ...]) -> Cell:
-    """A parameter: all its digits that matter, not aligned, for magnitudes differ."""
+    """Return a parameter: all its digits that matter, not aligned, for magnitudes differ."""
     cell = _cell(doc, path, None, 8)
     return Cell(cell.text, full=cell.full, pointer=cell.pointer)
 
 
 def compact(value: Any, length: int = 72) -> str:
-    """A list or dictionary in one line, cut where it gets long."""
+    """Return a list or dictionary in one line, cut where it gets long."""
     text = json.dumps(value, ensure_ascii=False, separators=(", ", ": "))
     if len(text) <= length:
         return text
@@ -216,7 +216,7 @@ def how_tables(doc: Any) -> list[Any]:
 
 
 def _changed(doc: Any) -> list[Any]:
-    """What was changed against the defaults: parameters, options, swapped parts."""
+    """Return what was changed against the defaults: parameters, options, swapped parts."""
     run = doc["provenance"]
     changed = [str(c) for c in (run.get("changed") or [])]
     if not changed:

@@ -38,7 +38,7 @@ class Composite:
 
 
 def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list[str]:
-    """Why there are no composite statistics, as sentences.  earth: Earth rate along the input axis, rad/s."""
+    """Return why there are no composite statistics, as sentences.  earth: Earth rate along the input axis, rad/s."""
     sentences = []
     if d.size < LEAST:
         sentences.append(f"{d.size} windows: at least {LEAST} are needed")
@@ -61,7 +61,7 @@ def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list
 
 
 def composite(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> Composite:
-    """Statistics of the drift rates ``d`` (n,), rad/s.  Raises ReductionError with :func:`problems`."""
+    """Return the statistics of the drift rates ``d`` (n,), rad/s.  Raises ReductionError with :func:`problems`."""
     if reasons := problems(d, t_start, t_end, earth):
         raise ReductionError(reasons)
     n, dT = d.size, round(float(np.median(t_end - t_start)), 9)

@@ -57,7 +57,7 @@ def fit(start: Array, end: Array, y: Array, order: int = 2) -> Fit:
 
 
 def whole_turns(start: Array, end: Array, tolerance: float = 0.01) -> float | None:
-    """Number of turns the windows of one phase cover without gap, or None unless it is a whole number."""
+    """Return the number of turns the windows of one phase cover without gap, or None unless it is a whole number."""
     turned = float(np.sum(np.abs(end - start))) / (2.0 * math.pi)
     span = abs(float(end[-1] - start[0])) / (2.0 * math.pi)
     whole = round(turned)

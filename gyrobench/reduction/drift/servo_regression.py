@@ -55,12 +55,12 @@ class Held:
 
     @property
     def rate(self) -> Array:
-        """Mean table rate of each window (n,), rad/s."""
+        """Return the mean table rate of each window (n,), rad/s."""
         out: Array = (self.angle_end - self.angle_start) / (self.t_end - self.t_start)
         return out
 
     def seen(self, local: Array) -> Array:
-        """A vector in ENU in gyro axes at the 12 nodes of each window: (n, 12, 3)."""
+        """Return a vector in ENU in gyro axes at the 12 nodes of each window: (n, 12, 3)."""
         v = self.axes @ local
         a = window_regressors.Turning(self.angle_start, self.angle_end, self.t_start, self.t_end, self.axes).nodes()
         c, s = np.cos(a), np.sin(a)
@@ -90,7 +90,7 @@ def held_windows(
 
 
 def drift_rate(held: Held, site: Site) -> Array:
-    """The data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
+    """Return the data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
     out: Array = earth + along * held.rate
@@ -98,14 +98,14 @@ def drift_rate(held: Held, site: Site) -> Array:
 
 
 def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
-    """Window means (n, p) of the drift regressors ``names``."""
+    """Return the window means (n, p) of the drift regressors ``names``."""
     return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
 
 def window_problems(
     windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
 ) -> list[str]:
-    """What is wrong with the rows of the held phases, as sentences."""
+    """Return what is wrong with the rows of the held phases, as sentences."""
     for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
         windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
     problems = window_checks.window_problems(windows, required)

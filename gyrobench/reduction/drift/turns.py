@@ -97,7 +97,7 @@ class Turns:
 
     # ------------------------------------------------------------------------------------------ turns
     def _turn_columns(self) -> Array:
-        """The harmonics the model holds for each turn but the first of each phase."""
+        """Return the harmonics the model holds for each turn but the first of each phase."""
         block, names = harmonic.columns(self.start, self.end, range(self.held + 1))
         columns = []
         for _, phase in self.phases:

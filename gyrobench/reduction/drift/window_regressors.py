@@ -50,7 +50,7 @@ def misread(turning: Turning, n: int, size: float) -> list[Turning]:
 
 
 def average(values: Array) -> Array:
-    """Mean over the nodes (axis 1)."""
+    """Return the mean over the nodes (axis 1)."""
     out: Array = (
         np.tensordot(values, _WEIGHTS, axes=([1], [0]))
         if values.ndim == 2
@@ -60,7 +60,7 @@ def average(values: Array) -> Array:
 
 
 def _in_face(local: Array, turning: Turning, base: Array) -> Array:
-    """A local vector (3,) in face axes at every node: (n, 12, 3)."""
+    """Return a local vector (3,) in face axes at every node: (n, 12, 3)."""
     x, y, z = base @ local
     a = turning.nodes()
     c, s = np.cos(a), np.sin(a)
@@ -70,13 +70,13 @@ def _in_face(local: Array, turning: Turning, base: Array) -> Array:
 
 
 def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, ...]) -> Array:
-    """Window means (n, p) of the drift regressors ``names`` at local gravity ``gravity`` (m/s2)."""
+    """Return the window means (n, p) of the drift regressors ``names`` at local gravity ``gravity`` (m/s2)."""
     xyz = _in_face(np.array([0.0, 0.0, -gravity / G0]), turning, base)
     return average(drift.regressors(xyz, names))
 
 
 def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float, axis: int = 0) -> Array:
-    """Window means (n,) of the inertial rate along a gyro axis (0 input, 1 output, 2 spin), rad/s: Earth and
+    """Return the window means (n,) of the inertial rate along a gyro axis (0 input, 1 output, 2 spin), rad/s: Earth and
     table.
     """
     earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, axis])

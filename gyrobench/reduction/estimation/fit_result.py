@@ -56,7 +56,7 @@ def linear_result(
     harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
 ) -> DriftTestResult:  # fmt: skip
-    """The result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
+    """Return the result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
 
     equation: Typst math.  conventions, warnings, summary: sentences.  specification: name -> limits in the printed
     unit.  no_closed: why there are no values of the source's formulas, if there should be.  tables: the method's own,

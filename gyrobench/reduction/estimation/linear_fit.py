@@ -60,7 +60,7 @@ class Quantity:
 
     @classmethod
     def drift(cls, name: str, truth: float | None = None, closed: float | None = None, meaning: str = "") -> Quantity:
-        """A drift coefficient in rad/s per g0^n: D_F, D_IS ..., or Dx_0, Dy_yz ... of a channel."""
+        """Return a drift coefficient in rad/s per g0^n: D_F, D_IS ..., or Dx_0, Dy_yz ... of a channel."""
         unit = units.display(drift.surface_unit(name))
         return cls(name, meaning or drift.meaning(name), unit, units.factor("deg/h"), truth, closed)
 
@@ -237,7 +237,7 @@ class Findings:
 
     # ------------------------------------------------------------------------------------------ noise
     def noise(self) -> dict[str, Any]:
-        """The noise model of the estimation; units in the keys."""
+        """Return the noise model of the estimation; units in the keys."""
         e, unit, scale = self.est, self.y_unit, self.y_scale
         if self.white:
             parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
@@ -310,7 +310,7 @@ class Findings:
         return [f"{t.name}: p < 0.001, {t.finding}. The stated u may be too small." for t in loud]
 
     def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
-        """Coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""
+        """Return coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""
         columns = np.column_stack([self.X, extra, self.y])
         if self.white:
             Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]

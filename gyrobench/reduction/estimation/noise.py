@@ -98,7 +98,7 @@ def _middles(low: Array | float, high: float, n: int) -> Array:
 
 
 def noise_grid(t0: Array, t1: Array, readings: bool = False) -> NoiseGrid:
-    """The grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
+    """Return the grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
     window, shortest, longest = _taus(t0, t1)
     tau = _middles(shortest, longest, TAUS)
     odds = _middles(_least_odds(window, tau), STRONGEST, ODDS).ravel()

@@ -56,7 +56,7 @@ class Mixture:
         return np.sqrt(self.weight @ (sd**2 + off**2)), half
 
     def outside(self, J: Array, distance: Array) -> Array:
-        """Probability that a combination lies farther than ``distance`` (q,) from its mean."""
+        """Return the probability that a combination lies farther than ``distance`` (q,) from its mean."""
         sd = np.sqrt(np.maximum(np.einsum("qi,gij,qj->gq", J, self.covariance, J), 1e-300))
         return _tails(self.weight, self.off @ J.T, sd, self.dof, distance)
 
@@ -90,7 +90,7 @@ class Estimate:
 def fit(
     X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False
 ) -> Estimate:
-    """Coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
+    """Return the coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
 
     readings: the data are differences of readings at t0 and t1, neighbours share one.
 
@@ -194,7 +194,7 @@ def check_windows(t0: Array, t1: Array) -> None:
 
 
 def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
-    """Probability of the mixture outside +-distance from its mean, per coefficient."""
+    """Return the probability of the mixture outside +-distance from its mean, per coefficient."""
     upper = special.stdtr(dof, -(distance - off) / sd)
     lower = special.stdtr(dof, -(distance + off) / sd)
     out: Array = w @ (upper + lower)
@@ -224,7 +224,7 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
 
 
 def equivalent_dof(ratio: Array) -> Array:
-    """Degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
+    """Return the degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
     table = np.concatenate([np.arange(1.0, 30.0, 0.25), np.geomspace(30.0, 1e4, 60)])
     quantile = special.stdtrit(table, 0.975)
     out = np.interp(ratio, quantile[::-1], table[::-1])
@@ -233,7 +233,7 @@ def equivalent_dof(ratio: Array) -> Array:
 
 
 def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = None) -> tuple[float, float, float]:
-    """Value of the likeliest model with the 5 % and 95 % points over all (``where``) models."""
+    """Return the value of the likeliest model with the 5 % and 95 % points over all (``where``) models."""
     if where is not None:
         w = np.where(where, w, 0.0)
         k = k if where[k] else int(np.argmax(w))

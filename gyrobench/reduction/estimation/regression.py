@@ -48,7 +48,7 @@ def _words(names: Sequence[str], vector: Array, floor: float = 0.05) -> str:
 
 
 def examine(X: Array, names: Sequence[str], tolerance: float = 1e-9) -> Design:
-    """Rank, condition, lost combinations and weakest direction of ``X`` (n, p) with columns called ``names``.
+    """Return rank, condition, lost combinations and weakest direction of ``X`` (n, p) with columns called ``names``.
 
     A lost combination "D_II + D_OO − 0.99 D_F" is a change of the coefficients that leaves every datum as it is.
     """
@@ -138,7 +138,7 @@ class Fit:
 
 
 def correlation(covariance: Array) -> Array:
-    """Correlation matrix of a covariance; 0 off the diagonal where a variance is 0."""
+    """Return the correlation matrix of a covariance; 0 off the diagonal where a variance is 0."""
     u = np.sqrt(np.diag(covariance))
     safe = np.where(u > 0, u, 1.0)
     out: Array = covariance / np.outer(safe, safe)

@@ -53,7 +53,7 @@ def statistics(values: Sequence[float], about: float | None = None) -> Statistic
 
 
 def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float]:
-    """Chi-squared and its probability that values of uncertainties ``u`` are those of one quantity."""
+    """Return chi-squared and its probability that values of uncertainties ``u`` are those of one quantity."""
     x, w = np.asarray(values, dtype=float), 1.0 / np.asarray(u, dtype=float) ** 2
     q = float(np.sum(w * (x - np.sum(w * x) / np.sum(w)) ** 2))
     return q, float(special.chdtrc(x.size - 1, q))

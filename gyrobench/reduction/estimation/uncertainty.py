@@ -15,7 +15,7 @@ DECISION_RULE = (
 
 
 def combine_uncertainties(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
-    """Standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
+    """Return the standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
 
     u^2 = u_a^2 + sum of squares; U^2 = half_a^2 + 1.96^2 times the same sum (type B known with many degrees of
     freedom).

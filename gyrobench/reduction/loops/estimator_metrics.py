@@ -70,13 +70,13 @@ class Consistency:
 
     @property
     def value(self) -> UncertainValue:
-        """The mean with the scatter it has if the filter is consistent."""
+        """Return the mean with the scatter it has if the filter is consistent."""
         return UncertainValue(self.mean, math.sqrt(2.0 / self.dof))
 
 
 # ------------------------------------------------------------------------------------ mean squares
 def independent_squares(x: Array) -> float:
-    """How many of the n squares of a series about zero count as independent, n/(1 + 2 sum rho_k^2).
+    """Return how many of the n squares of a series about zero count as independent, n/(1 + 2 sum rho_k^2).
 
     Lags up to n/20; each squared correlation is taken less 1/n, which is what white noise leaves of it.
     """
@@ -91,7 +91,7 @@ def independent_squares(x: Array) -> float:
 
 
 def rms(x: Array) -> UncertainValue:
-    """Root mean square; u = rms/sqrt(2 nu) of nu independent squares."""
+    """Return the root mean square; u = rms/sqrt(2 nu) of nu independent squares."""
     value = math.sqrt(float(np.mean(x * x)))
     return UncertainValue(value, value / math.sqrt(2.0 * independent_squares(x)))
 
@@ -160,7 +160,7 @@ class Sine:
 
     @property
     def u(self) -> float:
-        """Standard uncertainty of either part."""
+        """Return the standard uncertainty of either part."""
         return float(np.sqrt(np.mean(np.abs(self.parts - self.whole) ** 2) / 2.0 / (STRETCHES - 1)))
 
 
@@ -184,7 +184,7 @@ def sine(time: Array, x: Array, frequency: float) -> Sine:
 
 
 def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
-    """Root mean square of a sine under noise, such as the error of an estimate that is late.
+    """Return the root mean square of a sine under noise, such as the error of an estimate that is late.
 
     u^2(mean square) = (A u(A))^2 + (2 rest u(rest))^2: the sine, always there, scatters by its amplitude A only.
     """
@@ -197,7 +197,7 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
 
 
 def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
-    """Gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
+    """Return the gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
 
     u from the scatter of ten stretches.  Raises ValueError below ten periods.
     """
@@ -210,7 +210,7 @@ def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: floa
 
 
 def response_to_truth(estimate: Array, truth: Array) -> Response:
-    """Gain of a random truth: regression of the estimate on it (align them first), both about their means."""
+    """Return gain of a random truth: regression of the estimate on it (align them first), both about their means."""
     e, x = estimate - estimate.mean(), truth - truth.mean()
 
     def slope(rows: slice) -> float:
@@ -248,7 +248,7 @@ def nis(values: Array, level: float = 0.999) -> Consistency:
 
 
 def whiteness(innovation: Array, lags: int = 20) -> tuple[dict[str, list[float]], float, float]:
-    """Autocorrelation (see :func:`gyrobench.reduction.estimation.residual_series.autocorrelation`), Ljung-Box Q,
+    """Return autocorrelation (see :func:`gyrobench.reduction.estimation.residual_series.autocorrelation`), Ljung-Box Q,
     probability.
 
     [DRIFT-WHITENESS-LB]  No degrees of freedom are taken off: the model was given, not fitted to this record.
@@ -258,6 +258,6 @@ def whiteness(innovation: Array, lags: int = 20) -> tuple[dict[str, list[float]]
 
 
 def variance_ratio(estimated: Array, true: float) -> UncertainValue:
-    """Mean of an estimated variance over the true one, u from ten stretches."""
+    """Return the mean of an estimated variance over the true one, u from ten stretches."""
     parts = [float(np.mean(p)) / true for p in np.array_split(estimated, STRETCHES)]
     return UncertainValue(float(np.mean(estimated)) / true, _scatter(parts), STRETCHES - 1)

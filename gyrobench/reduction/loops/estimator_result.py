@@ -45,7 +45,7 @@ class Signals:
     R_hat: Array | None = None
 
     def problems(self) -> list[str]:
-        """What makes these series unfit, as sentences."""
+        """Return what makes these series unfit, as sentences."""
         problems = []
         given = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         for name, x in given.items():
@@ -95,7 +95,7 @@ class Measures:
 
 
 def measure(s: Signals, frequency: float | None = None, R: float | None = None, unit: str = "1") -> Measures:
-    """All measures; raises ReductionError with everything that is wrong with the series.
+    """Return all measures; raises ReductionError with everything that is wrong with the series.
 
     frequency: Hz, of the sine that the truth is; None where the truth is random.  R: true variance of a reading.
     unit: of z, as printed.

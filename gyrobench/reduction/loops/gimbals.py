@@ -57,7 +57,7 @@ class Flight:
         self.error = np.linalg.norm(self.axes, axis=1)
 
     def __getitem__(self, name: str) -> Array:
-        """A channel over the flight, the rests between the legs included."""
+        """Return a channel over the flight, the rests between the legs included."""
         if name not in self.channels:
             raise ReductionError(f"the record has no channel {name}; it has {', '.join(self.channels)}")
         return self.channels[name][self.first : self.last]
@@ -68,7 +68,7 @@ class Flight:
         return math.hypot(self.noise, moves / math.sqrt(12.0))
 
     def leg(self, gate: Gate) -> slice:
-        """Where a phase lies in the arrays of the flight."""
+        """Return where a phase lies in the arrays of the flight."""
         return slice(gate.inside.start - self.first, gate.inside.stop - self.first)
 
     def leg_at(self, k: int) -> str:
@@ -101,7 +101,7 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
 
 
 def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> dict[str, Any]:
-    """Table of what each leg did.  columns: name -> value in the stretch of the flight that is the leg."""
+    """Return the table of what each leg did.  columns: name -> value in the stretch of the flight that is the leg."""
     rows = []
     for gate in flight.gates:
         s = flight.leg(gate)
@@ -120,7 +120,7 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
 def over_time(
     name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = ""
 ) -> Response:
-    """Figure of several quantities (printed units) over time; runs are compared by the first one.
+    """Return the figure of several quantities (printed units) over time; runs are compared by the first one.
 
     Each stretch of samples is drawn by its smallest and largest value.
     """

@@ -47,7 +47,7 @@ class Gate:
         return self.channels[name][self.inside]
 
     def rest(self, name: str) -> Array:
-        """The channel in the second half of the settling, before the gate opened (empty without settling)."""
+        """Return the channel in the second half of the settling, before the gate opened (empty without settling)."""
         return self.channels[name][self.before]
 
     @property
@@ -77,7 +77,7 @@ class Gate:
 
 
 def gates(record: Record, slot: str = "exciter") -> list[Gate]:
-    """The phases of a record (gyrobench.record.record.Record) in their order, those that were run to their end.
+    """Return the phases of a record (gyrobench.record.record.Record) in their order, those that were run to their end.
 
     Raises ReductionError for a record without the channels phase and gate of the exciter in ``slot``, or without
     a single whole phase.
@@ -256,7 +256,7 @@ class Drift:
 
 
 def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
-    """Drift of an angle (rad) in a hold phase.
+    """Return the drift of an angle (rad) in a hold phase.
 
     The rate is (end - start) / time; its uncertainty the scatter of the rates of ``blocks`` equal parts over sqrt(n)
     (independent parts: noise slower than a part is not in it).  Raises ReductionError for fewer than 4 samples a block.
@@ -280,7 +280,7 @@ def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
 
 # ------------------------------------------------------------------------------------------- axes
 def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> dict[str, Any]:
-    """Table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
+    """Return the table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
 
     points: (k, j) -> complex ratio at one frequency, numbered from 1.  axes: their names.  A missing pair stays empty.
     """

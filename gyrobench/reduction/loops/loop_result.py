@@ -67,7 +67,7 @@ class LoopFindings:
             self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
-        """The phases of a kind, in their order."""
+        """Return the phases of a kind, in their order."""
         return [
             g for g in self.gates if g.kind == kind and axis in (None, g.axis) and (shape is None or g.shape == shape)
         ]
@@ -113,7 +113,7 @@ class LoopFindings:
 
     @property
     def estimates(self) -> dict[str, float]:
-        """What was measured, in printed units."""
+        """Return what was measured, in printed units."""
         return {c.name: c.estimate for c in self.coefficients}
 
     def tell(self, *texts: str) -> list[str]:
@@ -126,7 +126,7 @@ class LoopFindings:
     def open_loop(
         self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0
     ) -> list[Point]:
-        """The open loop L = -(inside - test) / inside of the test sines on an axis, with margins.
+        """Return the open loop L = -(inside - test) / inside of the test sines on an axis, with margins.
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
         test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
@@ -252,7 +252,7 @@ class LoopFindings:
         self, gate: Gate, output: str, *, scale: float = 1.0, unit: str = "1", y_name: str = "",
         plus: str | None = None, drift: float = 0.0, quiet: Gate | None = None,
     ) -> Step:  # fmt: skip
-        """Measures of a step phase (SI) and its figure, with the response of the linear model over it.
+        """Return the measures of a step phase (SI) and its figure, with the response of the linear model over it.
 
         drift: rate (SI per s) with which the output moves without the step too; it is taken off.  quiet: a hold phase
         several times as long, from whose noise the uncertainty of the change is taken; without, it is that of white
@@ -369,7 +369,7 @@ class LoopFindings:
 
 
 def _curve(label: str, f: Array, values: Any) -> dict[str, Any]:
-    """A model's curve, thinned for drawing; phase unwrapped, degrees."""
+    """Return a model's curve, thinned for drawing; phase unwrapped, degrees."""
     phase = np.degrees(np.unwrap(np.angle(values)))
     pick = np.unique(np.linspace(0, len(f) - 1, CURVE).astype(int))
     return {
@@ -401,7 +401,7 @@ def _bode(
 
 
 def _simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:
-    """Response of a channel to a unit step of the excitation at the gate's opening, at the gate's times; SI."""
+    """Return response of a channel to a unit step of the excitation at the gate's opening, at the gate's times; SI."""
     name = f"{gate.kind}[{gate.axis}]"
     wired = [j for j, n in enumerate(model.inputs) if n.partition(".")[2] == name]
     if gate.shape != "step" or gate.kind == "motion" or output not in model.outputs or not wired:

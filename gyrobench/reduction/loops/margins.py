@@ -48,7 +48,7 @@ def excitation_response(model: LinearModel, kind: str, axis: int, output: str, f
 
 
 def grid(low: float, high: float, count: int = DENSE) -> Array:
-    """Frequencies equally spaced in the logarithm."""
+    """Return frequencies equally spaced in the logarithm."""
     return np.geomspace(low, high, count)
 
 
@@ -66,7 +66,7 @@ class Margins:
 
     @property
     def crossover(self) -> float | None:
-        """The frequency (Hz) of the smallest phase margin."""
+        """Return the frequency (Hz) of the smallest phase margin."""
         return min(self.crossovers, key=lambda c: abs(c[1]))[0] if self.crossovers else None
 
     @property
@@ -104,7 +104,7 @@ COLUMNS = [
 
 
 def margins(f: Array, gain: Complex) -> Margins:
-    """Margins of a loop gain given densely (some hundred points) over rising frequencies, by python-control."""
+    """Return margins of a loop gain given densely (some hundred points) over rising frequencies, by python-control."""
     import control
 
     data = control.frd(np.asarray(gain), 2.0 * np.pi * np.asarray(f), smooth=True)
@@ -135,7 +135,7 @@ def interpolate_response(points: Sequence[Point], f: Array, spline: bool = False
 
 
 def measured_margins(points: Sequence[Point]) -> Margins:
-    """Margins inside the range of the measured frequencies (4 points at least, else none)."""
+    """Return the margins inside the range of the measured frequencies (4 points at least, else none)."""
     if len(points) < 4:
         return Margins()
     f = grid(min(p.f for p in points), max(p.f for p in points))
@@ -143,7 +143,7 @@ def measured_margins(points: Sequence[Point]) -> Margins:
 
 
 def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
-    """What measured points say of the loop's limits: name -> (value, standard uncertainty).
+    """Return what measured points say of the loop's limits: name -> (value, standard uncertainty).
 
     crossover (Hz) and phase (degrees) of the smallest phase margin; upper and f_upper, lower and f_lower: the factors
     on the gain to the next limits, and their frequencies (Hz).  Missing where the range of the points has none.  The
@@ -174,7 +174,7 @@ def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
 
 
 def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:
-    """Relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
+    """Return the relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
     u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / f)))[:2])
     near = np.clip([0.99 * f, 1.01 * f], min(p.f for p in points), max(p.f for p in points))
     gain = interpolate_response(points, near)

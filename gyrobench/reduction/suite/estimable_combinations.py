@@ -48,7 +48,7 @@ def _vector(made_of: Mapping[str, float], basis: Sequence[str]) -> Array:
 
 
 def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
-    """Whether two combinations differ by a factor at most, to :data:`SAME`."""
+    """Return whether two combinations differ by a factor at most, to :data:`SAME`."""
     basis = sorted({*a, *b})
     x, y = _vector(a, basis), _vector(b, basis)
     x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)

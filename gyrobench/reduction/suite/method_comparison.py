@@ -110,13 +110,13 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
 
 
 def common(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[str]:
-    """Those of the sources ``shared`` that two results or more name."""
+    """Return those of the sources ``shared`` that two results or more name."""
     named = [{b["source"] for b in r.type_b} for r in results.values()]
     return sorted(s for s in set(shared) if sum(s in sources for sources in named) > 1)
 
 
 def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
-    """Why the results are not of one instrument, as sentences."""
+    """Return why the results are not of one instrument, as sentences."""
     sentences = []
     families: dict[str, list[str]] = {}
     for label, r in results.items():
@@ -141,7 +141,7 @@ def problems(results: Mapping[str, DriftTestResult]) -> list[str]:
 
 
 def differences(results: Mapping[str, DriftTestResult], slots: Sequence[str] = ("gyro", "accelerometer")) -> list[str]:
-    """Where the simulated instrument was not the same in all tests, as sentences."""
+    """Return where the simulated instrument was not the same in all tests, as sentences."""
     by_name: dict[str, dict[str, list[str]]] = {}
     for label, r in results.items():
         run = RunDocument.model_validate(r.provenance)
