@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 from gyrobench.component import Component
+from gyrobench.component.vectors import copied
 from gyrobench.packaging import load_part
 
 BENCH = Path(__file__).resolve().parents[2]
@@ -79,12 +79,12 @@ class Wired:
     def _pull(self, name: str, values: dict[tuple[str, str], Any] | None = None) -> None:
         for a, out, into in self.wires[name]:
             x = values[a, out] if values else getattr(self.parts[a], out)
-            setattr(self.parts[name], into, deepcopy(x))
+            setattr(self.parts[name], into, x)  # a part copies what is assigned to an array
 
     def step(self, h: float) -> None:
         before = None
         if self.late:
-            before = {(a, o): deepcopy(getattr(self.parts[a], o)) for w in self.wires.values() for a, o, _ in w}
+            before = {(a, o): copied(getattr(self.parts[a], o)) for w in self.wires.values() for a, o, _ in w}
         count = self.parts["sampler"].count if "sampler" in self.parts else 0.0
         for name in self.order:
             self._pull(name, before)
