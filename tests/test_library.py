@@ -206,7 +206,7 @@ MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
         lambda r: gb.load("drift_test_suite"),
         "is a suite of tests: gyrobench.load_suite",
     ),
-    "no suite": (lambda r: gb.load_suite(NAME), "is one test, no suite"),
+    "no suite": (lambda r: gb.load_suite(NAME), "is one test, not a suite"),
     "option": (lambda r: gb.load(NAME, lattitude=1), "lattitude: no such option .*latitude"),
     "unit": (lambda r: gb.load(NAME, latitude="3 V"), "latitude"),
     "kind": (lambda r: gb.load(NAME, latitude=None), "latitude = None: a number is expected"),

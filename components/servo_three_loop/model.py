@@ -19,7 +19,7 @@ class ServoThreeLoop(Component):
     inputs; each integral waits while its own output is limited and the error pushes further.
 
     The defaults fit a motor of 2 Ohm, 4 mH, 1 N.m/A on 2 kg.m2: the current loop cancels L/R and crosses 500 Hz (so a
-    step of 0.2 ms or less), the rate loop crosses 10 Hz, the position loop has 1 Hz.
+    step of 0.2 ms or shortfall), the rate loop crosses 10 Hz, the position loop has 1 Hz.
 
     Not modelled: delay of a computer beside that of the exchange, resolution of the measurements.
     Source: Xia 2008, section 1.3.2 (structure; it gives no gains); SERVO-3LOOP.
@@ -60,19 +60,19 @@ class ServoThreeLoop(Component):
         self.track = clip(self.K_p * (self.theta_wish - self.theta), -self.w_max, self.w_max)
         self.count = 0.0
 
-    def off(self) -> Number:
+    def rate_error(self) -> Number:
         return (self.u + self.test) / self.K_u - self.command - self.track
 
     def flow(self) -> None:
-        off = self.off()
-        unlimited = -(self.K_w * off + self.q)
-        self.der.q = self.K_wi * off
-        if (unlimited > self.i_max and off < 0.0) or (unlimited < -self.i_max and off > 0.0):
+        error = self.rate_error()
+        unlimited = -(self.K_w * error + self.q)
+        self.der.q = self.K_wi * error
+        if (unlimited > self.i_max and error < 0.0) or (unlimited < -self.i_max and error > 0.0):
             self.der.q = 0.0
-        less = clip(unlimited, -self.i_max, self.i_max) - self.i_motor
-        volts = self.K_c * less + self.p
-        self.der.p = self.K_ci * less
-        if (volts > self.v_max and less > 0.0) or (volts < -self.v_max and less < 0.0):
+        shortfall = clip(unlimited, -self.i_max, self.i_max) - self.i_motor
+        volts = self.K_c * shortfall + self.p
+        self.der.p = self.K_ci * shortfall
+        if (volts > self.v_max and shortfall > 0.0) or (volts < -self.v_max and shortfall < 0.0):
             self.der.p = 0.0
 
     @sampled(every=1)
@@ -92,7 +92,7 @@ class ServoThreeLoop(Component):
 
     def outputs(self) -> None:
         self.e = self.u + self.test
-        unlimited = -(self.K_w * self.off() + self.q)
+        unlimited = -(self.K_w * self.rate_error() + self.q)
         amps = clip(unlimited, -self.i_max, self.i_max)
         volts = self.K_c * (amps - self.i_motor) + self.p
         self.i_wish = amps

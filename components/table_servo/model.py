@@ -128,8 +128,8 @@ class TableServo(AxisTable):
             "stiffness and capture need a damped gyro: with C_g = 0, which integrates the table angle, the static "
             "stiffness is infinite; give the crossover, and capture = 0",
         )
-        bare = self.network == 0.0 and self.crossover == 0.0 and self.stiffness == 0.0
-        self.refuse(bare, "network 0 needs a crossover or a stiffness")
+        unset = self.network == 0.0 and self.crossover == 0.0 and self.stiffness == 0.0
+        self.refuse(unset, "network 0 needs a crossover or a stiffness")
         w = 100.0 * pi if self.network < 3.0 else 20.0 * pi
         w = self.crossover if self.crossover > 0.0 else w
         # leads: zero w / sqrt(r), pole w sqrt(r); lag-lead (1 + s/w_l) / (1 + 5 s/w_l) with w_l = w / 12

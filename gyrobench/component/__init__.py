@@ -1,4 +1,4 @@
-"""What a part is: declarations, the language of its equations, the class that steps them.
+"""The part: declarations, the language of its equations, the class that steps them.
 
 Of gyrobench this package imports only ``errors``: a Python FMU carries a copy of both.
 """

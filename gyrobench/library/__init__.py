@@ -12,8 +12,8 @@
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
 
 The bench is the nearest folder above the working folder with components/, systems/ and reports/, as for the command.
-Every error meant for people is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a part or a
-system passes as it is before a run, and after it as a PostRunError that holds the record.
+Every error with a message for the user is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a
+part or a system passes unchanged before a run, and after it as a PostRunError that holds the record.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def load(
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
-    mapping file of a foreign FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
+    mapping file of a third-party FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
@@ -82,7 +82,7 @@ def load_suite(
     """Return a suite of the bench, ready to run; arguments as of :func:`load`.  Raises UsageError for a system."""
     test = load_test(name)
     if not isinstance(test, Suite):
-        raise UsageError(f"{name} is one test, no suite: gyrobench.load('{name}')")
+        raise UsageError(f"{name} is one test, not a suite: gyrobench.load('{name}')")
     suite = SuiteExperiment(test, parts or {}, maps or {})
     for key, value in {**(values or {}), **options}.items():
         suite.set(key, value)

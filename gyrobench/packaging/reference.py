@@ -36,7 +36,7 @@ AMPLITUDES = {"rad/s": 1e-3, "rad/s2": 1e-3, "m/s2": 12.0, "A": 2e-3, "V": 2e-2,
 
 @dataclass
 class Reference:
-    """What a reference file holds: ``inputs`` and ``outputs`` by FMI name, one value a row."""
+    """Content of a reference file: ``inputs`` and ``outputs`` by FMI name, one value a row."""
 
     part: str
     version: str

@@ -1,4 +1,4 @@
-"""The typed form of run.json: what a record says of its run, of its test in a laboratory, or of the tests of a suite.
+"""The typed form of run.json: provenance of a run, of a test in a laboratory, or of the tests of a suite.
 
     run = RunDocument(system="tumble_single_axis", options={"latitude": 0.8})
     run.write(folder)
@@ -53,8 +53,8 @@ class Entry(BaseModel):
         for name, field in type(self).model_fields.items():  # a list that was filled in place counts as given
             if getattr(self, name) != field.get_default(call_default_factory=True):
                 self.model_fields_set.add(name)
-        found: dict[str, Any] = _plain(self.model_dump(exclude_unset=True, by_alias=True))
-        return found
+        document: dict[str, Any] = _plain(self.model_dump(exclude_unset=True, by_alias=True))
+        return document
 
 
 class PlanRow(Entry):
@@ -90,7 +90,7 @@ class PartInfo(Entry):
 
 
 class SetupError(Entry):
-    """A parameter that was set past the option that owns it, or past the method: the test does not know of it."""
+    """A parameter that was set past the option that owns it, or past the method: the test does not use this value."""
 
     parameter: str = Field(description="slot.parameter")
     value: Value = Field(description="of the run, SI")
@@ -99,14 +99,14 @@ class SetupError(Entry):
     option: str = Field(default="", description="that owns the parameter; empty: the method assumes its value")
 
     def comparison(self) -> str:
-        """Return what is simulated beside what the test assumes, as a person writes it."""
+        """Return what is simulated beside what the test assumes, as text."""
         value, assumed = (units.format_quantity(v, self.unit) for v in (self.value, self.assumed))
         option = f" (option {self.option})" if self.option else ""
         text = f"{self.parameter} = {value}, while plan and reduction assume {assumed}{option}"
         return text.replace(" -", " −").replace("[-", "[−")
 
     def sentence(self) -> str:
-        """Return the comparison, and what to write for a test that knows of the value."""
+        """Return the comparison, and the setting of a test that uses the value."""
         if not self.option:
             return f"{self.comparison()}. No option changes what they assume."
         value = units.format_quantity(self.value, self.unit).replace("°", "deg").replace(" ", "")
@@ -149,8 +149,10 @@ class LinearModels(Entry):
     missing: str = Field(default="", description="why there is no linear model")
     closed: LinearPair = Field(default_factory=LinearPair, description="from the excitations to the channels")
     loops: dict[str, OpenLoop] = Field(default_factory=dict)
-    wanted: dict[str, float] = Field(default_factory=dict, description="loop -> crossover asked for, Hz")
-    warnings: list[str] = Field(default_factory=list, description="what the models say against the run, said before it")
+    wanted: dict[str, float] = Field(default_factory=dict, description="loop -> requested gain crossover, Hz")
+    warnings: list[str] = Field(
+        default_factory=list, description="warnings from the linear models, given before the run"
+    )
 
 
 class DataFile(Entry):
@@ -171,7 +173,7 @@ class Day(Entry):
 
 
 class Document(Entry):
-    """What the run.json of a run and of a suite have in common."""
+    """Common keys of the run.json of a run and of a suite."""
 
     system: str = Field(default="", description="name of the system or suite")
     title: str = ""
@@ -215,7 +217,7 @@ class RunDocument(Document):
     units: dict[str, str] = Field(default_factory=dict, description="recorded channel -> unit")
     window_units: dict[str, str] = Field(default_factory=dict, description="column of the windows -> unit, SI")
     plan: list[PlanRow] = Field(default_factory=list)
-    notes: list[str] = Field(default_factory=list, description="said before the run")
+    notes: list[str] = Field(default_factory=list, description="notes and warnings given before the run")
     linear: LinearModels | None = Field(default=None, description="of a system with loops")
     timing: dict[str, float] = Field(default_factory=dict, description="slot -> s of wall time")
     steps: int = Field(default=0, description="communication steps done")

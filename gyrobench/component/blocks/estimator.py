@@ -1,4 +1,4 @@
-"""What estimators share: the sampling clock, the outputs of Kalman filters, the test of an autoregressive model."""
+"""Common parts of estimators: sampling clock, outputs of Kalman filters, the test of an autoregressive model."""
 
 from __future__ import annotations
 
