@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.loops import loop_result
 from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, step, step_noise_std
 from gyrobench.reduction.window_checks import ReductionError
 
@@ -178,3 +179,21 @@ def test_cross_axis_table() -> None:
     table = cross_axis({(1, 1): 2.0, (1, 2): 0.1j, (2, 2): -4.0, (2, 1): 1.0}, ["pitch", "roll"], "1 Hz")
     assert table["columns"] == ["excited axis", "pitch / %", "roll / %"]
     assert table["rows"] == [["pitch", 100.0, 5.0], ["roll", 25.0, 100.0]]
+
+
+def test_step_response_of_a_linear_model() -> None:
+    """Powers of the model give what its recursion x[k+1] = A x[k] + B u, y = C x + D u gives, to 1e-12 of its size."""
+    rng, n = np.random.default_rng(0), 7
+    A = rng.standard_normal((n, n))
+    A *= 0.999 / np.max(np.abs(np.linalg.eigvals(A)))
+    B, C, D = rng.standard_normal((n, 2)), rng.standard_normal((3, n)), rng.standard_normal((3, 2))
+    names = {"inputs": ["load.torque[1]", "load.torque[2]"], "outputs": ["u", "v", "w"], "states": list("abcdefg")}
+    model = types.SimpleNamespace(**names, A=A, B=B, C=C, D=D, step=1e-3)
+    gate = types.SimpleNamespace(kind="torque", axis=2, shape="step", t=3.0 + np.arange(0.0, 5.0, 1e-2), amplitude=2.5)
+    x, expected = np.zeros(n), []
+    for k in range(4991):
+        if k % 10 == 0:
+            expected.append(C[1] @ x + D[1, 1] * 2.5)
+        x = A @ x + B[:, 1] * 2.5
+    computed = loop_result._simulated(model, gate, "v")  # type: ignore[arg-type]
+    np.testing.assert_allclose(computed, expected, rtol=0.0, atol=1e-12 * np.max(np.abs(expected)))

@@ -125,7 +125,7 @@ def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
 
 def test_report_of_a_run(command: Command, tmp_path: Path) -> None:
     """A run by command gives the report; outside 20 to 70 degrees it warns."""
-    values = {**SHORT, "rate": 0.1, "windows": 24, "settle": 5.0, "latitude": "75deg", "model": "simple"}
+    values = {**SHORT, "rate": "0.1rad/s", "windows": 24, "settle": 5.0, "latitude": "75deg", "model": "simple"}
     words = [w for k, v in values.items() for w in ("--set", f"{k}={v}")]
     code, out, err = command("run", NAME, *words, "--out", tmp_path)
     assert code == 0, err
