@@ -116,9 +116,10 @@ def test_failing_gyro_under_isolation(
 
     The first dwell has two windows of 0.35 s (a sixth of a turn at 3 rad/s); its gate opens at 0.3 s.
     """
-    hasty = {"rate": "3rad/s", "windows": 6, "dwell": 0.7, "settle": 0.3}
+    hasty = {"windows": 6, "dwell": 0.7, "settle": 0.3}
     code, out, err = command(
-        "run", NAME, "--part", f"gyro={foreign('faulty')}", "--isolate", "gyro", *words(hasty), "--set", "k=0.08",
+        "run", NAME, "--part", f"gyro={foreign('faulty')}", "--isolate", "gyro", *words(hasty), "--set", "rate=3rad/s",
+        "--set", "k=0.08",
         "--set", f"gyro.fault={fault}", "--set", "gyro.at=1500", "--set", "rebalance.K_p=0", "--set", "rebalance.K_i=0",
         "--out", tmp_path / "run",
     )  # fmt: skip
