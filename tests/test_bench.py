@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -233,3 +235,13 @@ def test_the_tool_names_no_content() -> None:
             if isinstance(n, ast.Constant) and isinstance(n.value, str) and n.value in names
         }
         assert not texts, f"{file} names {texts}"
+
+
+def test_what_the_benchmarks_import_exists() -> None:
+    """They are not run by the tests; some hold programs as text."""
+    for file in sorted((Path(__file__).parent / "benchmarks").glob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        for module, names in re.findall(r"^\s*from (gyrobench[\w.]*) import ([\w, ]+)", text, re.M):
+            for name in re.findall(r"(\w+)(?: as \w+)?", names):
+                found = hasattr(importlib.import_module(module), name)
+                assert found or importlib.util.find_spec(f"{module}.{name}"), f"{file.name}: {module} has no {name}"

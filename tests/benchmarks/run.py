@@ -92,7 +92,7 @@ RUN = """
 import sys, time
 from pathlib import Path
 from gyrobench.bench import standard_folder
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 with Session(load_system("tumble_single_axis", standard_folder()), bench=standard_folder()) as session:
     began = time.process_time()
@@ -134,7 +134,7 @@ def tumble(quick: bool) -> None:
 PLATFORM = """
 import sys, time
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
-from gyrobench.system.run import Session
+from gyrobench.engine.session import Session
 with Session("platform_three_axis", engine=sys.argv[1]) as s:
     type(s.system).plan = lambda self: LoopPlan([LoopPhase("hold", dwell=float(sys.argv[2]))])
     began, wall = time.process_time(), time.perf_counter()
