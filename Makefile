@@ -12,7 +12,7 @@ demo: $(VENV)/demo.stamp
 	$(BIN)/gyrobench run tumble_single_axis --set latitude=45.75deg --check-step
 
 test: check
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder  # files of few, long tests would come last
 
 check: $(VENV)/test.stamp
 	$(BIN)/ruff check .
