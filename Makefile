@@ -11,8 +11,9 @@ demo: $(VENV)/demo.stamp
 	$(BIN)/gyrobench build --all
 	$(BIN)/gyrobench run tumble_single_axis --set latitude=45.75deg --check-step
 
+# Without reordering: xdist would put files of few, long tests last.
 test: check
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder  # files of few, long tests would come last
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 check: $(VENV)/test.stamp
 	$(BIN)/ruff check .

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 
 import gyrobench as gb
@@ -91,7 +92,6 @@ def test_results_and_records_are_arrays(run: gb.Run) -> None:
 
 
 def test_results_and_records_are_data_frames(run: gb.Run) -> None:
-    pandas = pytest.importorskip("pandas")
     windows = run.record.frame("windows")
     assert isinstance(windows, pandas.DataFrame) and windows.attrs["units"]["mean"] == "A"
     assert np.array_equal(windows["mean"].to_numpy(), run.record.windows["mean"])
@@ -158,7 +158,6 @@ def test_fmus_stay_loaded_between_runs_and_are_freed(monkeypatch: pytest.MonkeyP
 
 
 def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:
-    pytest.importorskip("pandas")
     names = ("estimator_none", "estimator_moving_average")
     runs = [gb.load("estimator_bench", parts={"estimator": n}).run(seed=2) for n in names]
     assert all(isinstance(r.result, LoopResult) for r in runs)

@@ -75,7 +75,7 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
 
 
 def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -> None:
-    """Return the definitions of all units in use, spelled out in base units."""
+    """Add the definitions of all units in use to the description, spelled out in base units."""
     used = sorted({unit_name(s) for s in cls.layout if s.decl.type is float} | set(extra))
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name in used:
@@ -136,7 +136,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
 
 
 def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
-    """Return the outputs with the inputs and states they follow without delay; derivatives; initial unknowns."""
+    """Add the outputs with the inputs and states they follow without delay, derivatives and initial unknowns."""
     depends = {
         "output": dependencies(source, "outputs"),
         "derivative": {},

@@ -96,6 +96,11 @@ class Configurable:
         if name not in self.given:
             self.given.append(name)
 
+    def unfinished(self) -> list[str]:
+        """What the declaration still lacks, as sentences: methods that its family leaves to it."""
+        lacking = [n for n in dir(type(self)) if getattr(getattr(type(self), n), "__isabstractmethod__", False)]
+        return [f"{type(self).__name__} has no {n}(), which its family leaves to the test" for n in lacking]
+
     def with_values(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with further values set."""
         other = copy.copy(self)
@@ -113,7 +118,7 @@ def load_configurable(name: str, bench: Path | None = None) -> Configurable:
     """Return the system or suite ``name`` of a bench with its default values.
 
     Raises BenchError when there is no such system, InvalidConfigurationError when its file does not define exactly one
-    system or suite.
+    system or suite, or one that is not finished.
     """
     folder = Bench.find(bench).system_folder(name)
     file = folder / "system.py"
@@ -132,4 +137,6 @@ def load_configurable(name: str, bench: Path | None = None) -> Configurable:
         raise InvalidConfigurationError(name, [f"{file}: defines {len(classes)} systems or suites, must define one"])
     loaded = classes[0]()
     loaded.name, loaded.folder = name, folder
+    if lacks := loaded.unfinished():
+        raise InvalidConfigurationError(name, [f"{file}: {lack}" for lack in lacks])
     return loaded

@@ -216,6 +216,16 @@ class System(Configurable):
         return self.measured_data.read(self, data, values)
 
     # ------------------------------------------------------------ used by the bench
+    def unfinished(self) -> list[str]:
+        lacks = super().unfinished()
+        if empty := [slot for slot, s in self.slots.items() if not s.part]:
+            parts = ", ".join(f'{slot}="..."' for slot in empty)
+            lacks.append(f"slot {', '.join(empty)}: no part; name it by with_parts({parts})")
+        if self.reduction and self.folder and not (self.folder / f"{self.reduction}.py").is_file():
+            missing = f'reduction = "{self.reduction}": no file {self.reduction}.py in {self.folder}'
+            lacks.append(f"{missing}; write from_record(record, specification) there")
+        return lacks
+
     def refuse(self) -> None:
         """Raises InvalidConfigurationError when the plan or the values are impossible."""
         plan = self.plan()
@@ -239,10 +249,4 @@ def load_system(name: str, bench: Path | None = None) -> System:
     system = load_configurable(name, bench)
     if not isinstance(system, System):
         raise UsageError(f"{name} is a suite of tests; gyrobench show {name} names them")
-    if empty := [slot for slot, s in system.slots.items() if not s.part]:
-        parts = ", ".join(f'{slot}="..."' for slot in empty)
-        raise InvalidConfigurationError(name, [f"slot {', '.join(empty)}: no part; name it by with_parts({parts})"])
-    if system.reduction and system.folder and not (system.folder / f"{system.reduction}.py").is_file():
-        missing = f'reduction = "{system.reduction}": no file {system.reduction}.py in {system.folder}'
-        raise InvalidConfigurationError(name, [f"{missing}; write from_record(record, specification) there"])
     return system

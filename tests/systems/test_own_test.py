@@ -73,15 +73,29 @@ def test_what_comes_along_from_the_family(bench: Path, command: Command) -> None
     assert "misses the simulated truth" in out and "site.latitude = 0°, while plan and reduction assume 45.75°" in out
 
 
-def test_a_family_without_parts_is_refused(bench: Path) -> None:
+def test_a_family_without_parts_is_refused(bench: Path, command: Command) -> None:
     file = bench / "systems" / NAME / "system.py"
     line = next(n for n in file.read_text("utf-8").splitlines() if "with_parts" in n)
     file.write_text(file.read_text("utf-8").replace(line, line.replace('gyro="floated_gyro", ', "")), encoding="utf-8")
     with pytest.raises(InvalidConfigurationError, match=r'slot gyro: no part; name it by with_parts\(gyro="..."\)'):
         load_system(NAME, bench)
+    code, _, err = command("run", NAME)
+    assert code == 2 and 'slot gyro: no part; name it by with_parts(gyro="...")' in err
     file.write_text(EXAMPLE.read_text("utf-8").replace("rebalance=", "balance="), encoding="utf-8")
     with pytest.raises(InvalidConfigurationError, match="no slot 'balance' in RebalanceTest; slots: site, sequencer"):
         load_system(NAME, bench)
+
+
+@pytest.mark.parametrize("template, method", [("tumble_single_axis", "faces"), ("servo_polar", "holds")])
+def test_what_a_family_leaves_to_the_test_is_asked_for(
+    bench: Path, command: Command, template: str, method: str
+) -> None:
+    folder = bench / "systems" / NAME
+    shutil.copytree(standard_folder() / "systems" / template, folder, dirs_exist_ok=True)
+    source = (folder / "system.py").read_text("utf-8")
+    (folder / "system.py").write_text(source.replace(f"def {method}(", f"def other_{method}("), encoding="utf-8")
+    code, _, err = command("run", NAME)
+    assert code == 2 and f"has no {method}(), which its family leaves to the test" in err
 
 
 def test_the_declared_reduction_of_every_system_is_one() -> None:

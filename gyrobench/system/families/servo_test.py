@@ -8,6 +8,7 @@ it.  [LOOP-TABLE-SERVO, MEAS-SERVO]
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -102,9 +103,9 @@ class ServoTest(TableTest):
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "table.rumble")
     channels: ClassVar[tuple[str, ...]] = ("table.angle", "gyro.u", "gyro.drift")
 
+    @abstractmethod
     def holds(self) -> Sequence[Hold]:
         """Return the phases in which the gyro holds the table, in their order."""
-        raise NotImplementedError
 
     def plan(self) -> Plan:
         """Each hold after a phase that brings the table to its start angle with the float caged."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 from gyrobench import frames
@@ -30,9 +31,9 @@ class TumbleTest(TableTest):
         "settle": Option(10.0, "s", "wait before averaging, after each move", 0.0),
     }
 
+    @abstractmethod
     def faces(self) -> dict[str, Any]:
         """Return the mounts: gyro axes (rows) in the table axes at angle 0."""
-        raise NotImplementedError
 
     def base(self) -> Array:
         return frames.polar_base(self["latitude"])
