@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,37 @@ def test_whitening_is_the_inverse_root_of_the_covariance(tau: float, share: floa
     np.testing.assert_allclose(W[:, 0] @ covariance @ W[:, 0].T, np.eye(5), atol=1e-9)
     assert logdet[0] == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
     assert np.allclose(W[:, 0], np.tril(W[:, 0]))
+
+
+@pytest.mark.parametrize("reading", [0.0, 0.3])
+def test_whitening_in_blocks_and_its_transpose(monkeypatch: pytest.MonkeyPatch, reading: float) -> None:
+    """Blocks of 7 windows give what one block gives; the matrix of whiten(), applied from the left, gives W' z."""
+    rng = np.random.default_rng(5)
+    length, gap = rng.uniform(2.0, 9.0, 60), np.where(rng.random(60) < 0.2, 30.0, 0.0)
+    t1 = np.cumsum(length + gap)
+    t0, z, model = t1 - length, rng.normal(size=(60, 2)), (12.0, 0.7, reading)
+    arrays = [np.array([v, v]) for v in model]
+    whole, logdet = noise.whiten(t0, t1, np.eye(60), *arrays)
+    monkeypatch.setattr(noise, "NUMBERS", 7 * 60 * 2)
+    blocks, logdet_blocks = noise.whiten(t0, t1, np.eye(60), *arrays)
+    np.testing.assert_allclose(blocks, whole, atol=1e-13)
+    np.testing.assert_allclose(logdet_blocks, logdet, rtol=1e-13)
+    np.testing.assert_allclose(noise.whiten_transposed(t0, t1, z, model), whole[:, 0].T @ z, atol=1e-13)
+
+
+def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
+    """A matrix of 10,000 x 10,000 would take 800 MB."""
+    t0 = 10.0 * np.arange(10_000)
+    y = 1.0 + 0.1 * np.random.default_rng(1).normal(size=t0.size)
+    tracemalloc.start()
+    try:
+        e = noise_mixture_fit.fit(np.ones((t0.size, 1)), y, ["mean"], t0, t0 + 10.0)
+        noise_mixture_fit.ordinary(np.ones((t0.size, 1)), y, ["mean"], t0, t0 + 10.0, np.ones(t0.size))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 30e6
+    assert e.u[0] == pytest.approx(0.1 / 100.0, rel=0.1) and e.gain[0] == pytest.approx(1e-4, rel=0.2)
 
 
 def test_two_windows_by_hand() -> None:

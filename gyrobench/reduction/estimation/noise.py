@@ -17,6 +17,7 @@ Not modelled: flicker noise, random walk, quanta that are no white error.  [RED-
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,7 @@ FAINTEST, STRONGEST = 0.3, 100.0
 #: the rest of a window, log-uniform.
 NO_READING, READING = 0.25, (0.05, 100.0)
 TAUS, ODDS, READINGS = 9, 6, 4  # cells of the quadrature; more change no coverage
+NUMBERS = 1 << 16  # held of whitened data at a time
 
 
 def _taus(t0: Array, t1: Array) -> tuple[float, float, float]:
@@ -134,6 +136,150 @@ def sample_instrument(
     return tau, share, reading
 
 
+@dataclass(frozen=True)
+class _Filter:
+    """Gains of the innovations recursion for m windows and G models, each array (m, G):
+
+    e_i = y_i - a_i x_i + h_i e_{i-1},   x_{i+1} = f_i x_i + k_i e_i,   var e_i = s_i
+
+    x: mean of the process at the start of window i, given the windows before it; f and k reach over the gap to the
+    next window.  h: 1/T_i times what e_{i-1} says of the error of the reading that both windows share; None without.
+    """
+
+    rows: slice
+    a: Array
+    f: Array
+    k: Array
+    s: Array
+    h: Array | None = None
+
+
+def _filters(t0: Array, t1: Array, tau: Array, share: Array, reading: Array | None, rows: int) -> Iterator[_Filter]:
+    """Yield the recursion for ``rows`` windows at a time; the variances run on from block to block.
+
+    The covariance is scaled so that a window of the median length has variance 1.
+    """
+    length = t1 - t0
+    window = float(np.median(length))
+    gap = np.append(t0[1:] - t1[:-1], 0.0)
+    neighbour = np.append(0.0, np.where(gap[:-1] > 1e-6 * window, 0.0, 1.0 / length[:-1]))  # 0: a reading of its own
+    rest = np.ones_like(share) if reading is None else 1.0 - reading
+    size = rest * share / mean_variance(window / tau)
+    q = (1.0 - rest) * window**2 / 2.0  # variance of one reading error
+    p, last = size, (np.zeros_like(size), np.ones_like(size))
+    for start in range(0, length.size, rows):
+        block = slice(start, start + rows)
+        t = length[block, None]
+        r = t / tau
+        phi, a, v = np.exp(-r), mean_gain(r), mean_variance(r)
+        pause = np.exp(-np.maximum(gap[block], 0.0)[:, None] / tau)
+        # given the start: variance of the mean, of the process at the next window, covariance of the two
+        n = np.maximum(v - a * a, 0.0) * size + rest * (1.0 - share) * window / t
+        d = (pause * pause * (1.0 - phi * phi) + (1.0 - pause * pause)) * size
+        c = pause * a * (1.0 - phi) * size
+        f = pause * phi
+        if np.any(q > 0.0):
+            shared = q * neighbour[block, None] / t
+            p, k, s = _variances_with_readings(p, last, a, f, n + 2.0 * q / (t * t), d, c, shared)
+            yield _Filter(block, a, f, k, s, shared / np.concatenate([last[1][None], s[:-1]]))
+            last = k[-1], s[-1]
+        else:
+            p, k, s = _variances(p, a, f, n, d, c)
+            yield _Filter(block, a, f, k, s)
+
+
+def _variances(p: Array, a: Array, f: Array, n: Array, d: Array, c: Array) -> tuple[Array, Array, Array]:
+    """Return p (G,) of the window after the last, k and s (m, G), from the variance p of x at the first window.
+
+    p' = f^2 p + d - (f a p + c)^2 / s  with  s = a^2 p + n  is  (alpha p + beta) / s: the squares of p cancel.
+    """
+    square = a * a
+    alpha = f * f * n + square * d - 2.0 * f * a * c
+    beta = d * n - c * c
+    path, s = np.empty((len(a) + 1, p.size)), np.empty_like(a)
+    path[0] = p
+    for al, be, sq, ni, pi, si, after in zip(alpha, beta, square, n, path[:-1], s, path[1:], strict=True):
+        np.multiply(sq, pi, out=si)
+        si += ni
+        np.multiply(al, pi, out=after)
+        after += be
+        after /= si
+    return path[-1], (f * a * path[:-1] + c) / s, s
+
+
+def _variances_with_readings(
+    p: Array, last: tuple[Array, Array], a: Array, f: Array, n: Array, d: Array, c: Array, shared: Array
+) -> tuple[Array, Array, Array]:
+    """As :func:`_variances`, with reading errors of variance q: n holds 2 q/T^2; shared: q/(T T'), T' of the neighbour.
+
+    last: k and s of the window before the first, which tells of the shared reading: its variance over T^2 falls by
+    shared^2/s, and its covariance with x over T is -k shared.
+    """
+    k, s = np.empty_like(a), np.empty_like(a)
+    known = shared * shared
+    squared = f * f
+    k0, s0 = last
+    for ai, fi, ff, ni, di, ci, hi, gi, ki, si in zip(a, f, squared, n, d, c, shared, known, k, s, strict=True):
+        cross = hi * k0
+        seen = ai * p
+        seen += cross
+        cross += seen
+        cross *= ai
+        cross += ni
+        np.divide(gi, s0, out=si)
+        np.subtract(cross, si, out=si)
+        seen *= fi
+        seen += ci
+        np.divide(seen, si, out=ki)
+        p = ff * p
+        p += di
+        seen *= ki
+        p -= seen
+        k0, s0 = ki, si
+    return p, k, s
+
+
+def _rows(models: int, columns: int) -> int:
+    return max(1, NUMBERS // max(models * columns, 1))
+
+
+def whitened_blocks(
+    t0: Array, t1: Array, columns: Array, tau: Array, share: Array, reading: Array | None = None
+) -> Iterator[tuple[slice, Array, Array]]:
+    """Yield rows, ``columns`` of these rows made white (m, c, G) and their part of the log determinant (G,).
+
+    As :func:`whiten`, some windows at a time: the memory does not grow with the record.
+    """
+    c = columns.shape[1]
+    x, before, scratch = np.zeros((3, c, tau.size))
+    for w in _filters(t0, t1, tau, share, reading, _rows(tau.size, c)):
+        y = columns[w.rows, :, None]
+        e = np.empty((y.shape[0], c, tau.size))
+        if w.h is None:
+            path = w.k[:, None, :] * y  # becomes x of the next window
+            e[0] = x
+            for move, after in zip(w.f - w.k * w.a, path, strict=True):
+                np.multiply(move, x, out=scratch)
+                after += scratch
+                x = after
+            e[1:] = path[:-1]
+            e *= w.a[:, None, :]
+            np.subtract(y, e, out=e)
+        else:
+            for yi, ai, fi, ki, hi, ei in zip(y, w.a, w.f, w.k, w.h, e, strict=True):
+                np.multiply(hi, before, out=ei)
+                ei += yi
+                np.multiply(ai, x, out=scratch)
+                ei -= scratch
+                np.multiply(ki, ei, out=scratch)
+                x *= fi
+                x += scratch
+                before = ei
+            before = before.copy()
+        e *= (1.0 / np.sqrt(w.s))[:, None, :]
+        yield w.rows, e, np.log(w.s).sum(axis=0)
+
+
 def whiten(
     t0: Array, t1: Array, columns: Array, tau: Array, share: Array, reading: Array | None = None
 ) -> tuple[Array, Array]:
@@ -141,68 +287,26 @@ def whiten(
 
     The covariance is scaled so that a window of the median length has variance 1.  Innovations of the process, O(n).
     """
-    if reading is not None and np.any(reading > 0.0):
-        return _whiten_readings(t0, t1, columns, tau, share, reading)
-    n, c = columns.shape
-    length = (t1 - t0)[:, None]
-    window = float(np.median(length))
-    size = share / mean_variance(window / tau)
-    r = length / tau
-    phi, a, v = np.exp(-r), mean_gain(r), mean_variance(r)
-    noise = np.maximum(v - a * a, 0.0) * size + (1.0 - share) * window / length  # of the mean, start given
-    cross, drive = a * (1.0 - phi) * size, (1.0 - phi * phi) * size
-    pause = np.exp(-np.maximum(t0[1:] - t1[:-1], 0.0)[:, None] / tau)
-    p = np.array(size)  # variance of the process at the start of the window, given what came before
-    m = np.zeros((tau.size, c))  # its mean, per column
-    out, variance = np.empty((n, tau.size, c)), np.empty((n, tau.size))
-    for i in range(n):
-        ai, fi = a[i], phi[i]
-        s = ai * ai * p + noise[i]
-        e = columns[i] - ai[:, None] * m
-        variance[i] = s
-        out[i] = e
-        k = (fi * ai * p + cross[i]) / s
-        m = fi[:, None] * m + k[:, None] * e
-        p = fi * fi * p + drive[i] - k * k * s
-        if i < n - 1:
-            g = pause[i]
-            m *= g[:, None]
-            p = g * g * p + (1.0 - g * g) * size
-    out /= np.sqrt(variance)[:, :, None]
-    return out, np.log(variance).sum(axis=0)
+    out, logdet = np.empty((len(columns), columns.shape[1], tau.size)), np.zeros(tau.size)
+    for rows, white, part in whitened_blocks(t0, t1, columns, tau, share, reading):
+        out[rows] = white
+        logdet += part
+    return out.transpose(0, 2, 1), logdet
 
 
-def _whiten_readings(
-    t0: Array, t1: Array, columns: Array, tau: Array, share: Array, reading: Array
-) -> tuple[Array, Array]:
-    """:func:`whiten` with reading errors: the state is the process x and the error n of the window's first reading."""
-    n, c = columns.shape
-    length = (t1 - t0)[:, None]
-    window = float(np.median(length))
-    without_reading = 1.0 - reading
-    size = without_reading * share / mean_variance(window / tau)
-    q = reading * window**2 / 2.0  # variance of one reading error
-    r = length / tau
-    phi, a, v = np.exp(-r), mean_gain(r), mean_variance(r)
-    noise = np.maximum(v - a * a, 0.0) * size + without_reading * (1.0 - share) * window / length + q / length**2
-    cross, drive = a * (1.0 - phi) * size, (1.0 - phi * phi) * size
-    gap = np.append(t0[1:] - t1[:-1], 0.0)
-    pause = np.exp(-np.maximum(gap, 0.0)[:, None] / tau)
-    px, pn, both = np.array(size), np.array(q), np.zeros_like(q)
-    x, first = np.zeros((tau.size, c)), np.zeros((tau.size, c))
-    out, variance = np.empty((n, tau.size, c)), np.empty((n, tau.size))
-    for i in range(n):
-        ai, fi, ti = a[i], phi[i], float(length[i, 0])
-        s = ai * ai * px - 2.0 * ai * both / ti + pn / ti**2 + noise[i]
-        e = columns[i] - ai[:, None] * x + first / ti
-        variance[i], out[i] = s, e
-        kx, kn = (fi * (ai * px - both / ti) + cross[i]) / s, q / ti / s
-        x = fi[:, None] * x + kx[:, None] * e
-        first = kn[:, None] * e
-        px, pn, both = fi * fi * px + drive[i] - kx * kx * s, q - kn * kn * s, -kx * kn * s
-        g = pause[i]
-        x, px, both = g[:, None] * x, g * g * px + (1.0 - g * g) * size, g * both
-        if gap[i] > 1e-6 * window:  # a reading of its own
-            first, pn, both = np.zeros_like(first), np.array(q), np.zeros_like(both)
-    out /= np.sqrt(variance)[:, :, None]
-    return out, np.log(variance).sum(axis=0)
+def whiten_transposed(t0: Array, t1: Array, columns: Array, model: tuple[float, float, float]) -> Array:
+    """W' z of ``columns`` z (n, c) for one model (tau, share, reading), where W is what :func:`whiten` multiplies by.
+
+    With z = W x it is R^-1 x.  The recursion of :class:`_Filter` run backwards, O(n).
+    """
+    tau, share, reading = (np.array([v]) for v in model)
+    (w,) = _filters(t0, t1, tau, share, reading, len(columns))
+    out = columns / np.sqrt(w.s)
+    later = np.zeros(columns.shape[1])
+    h = np.zeros_like(w.s) if w.h is None else w.h
+    after, h_after = np.zeros_like(later), 0.0
+    for i in range(len(columns) - 1, -1, -1):
+        out[i] += w.k[i, 0] * later + h_after * after
+        later = w.f[i, 0] * later - w.a[i, 0] * out[i]
+        after, h_after = out[i], h[i, 0]
+    return out

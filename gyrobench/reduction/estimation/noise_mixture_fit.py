@@ -23,7 +23,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,6 @@ from gyrobench.reduction.estimation.regression import Design, RegressionError, c
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
-BLOCK = 1_000_000  # numbers that are whitened at a time
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -133,10 +131,11 @@ def fit(
     probability = mixture.outside(np.eye(p), np.abs(beta))
 
     k = int(np.argmax(ll))
-    Z = _whitened(t0, t1, both, grid, slice(k, k + 1))[0][0]
-    Lk = Z[:, :p] @ Mi[k]
+    best = slice(k, k + 1)
+    Z = noise.whiten(t0, t1, both, grid.tau[best], grid.share[best], grid.reading[best])[0][:, 0, :]
     scatter = Z[:, p] - Z[:, :p] @ b[k]
-    gain = T @ (Lk.T @ _whitened(t0, t1, np.eye(n), grid, slice(k, k + 1))[0][0])
+    model = float(grid.tau[k]), float(grid.share[k]), float(grid.reading[k])
+    gain = T @ Mi[k] @ noise.whiten_transposed(t0, t1, Z[:, :p], model).T
     window = float(np.median(t1 - t0))
     v = noise.mean_variance(window / grid.tau)
     white = float(w[(grid.share == 0.0) & (grid.reading == 0.0)].sum())
@@ -156,7 +155,7 @@ def fit(
     return Estimate(
         tuple(names), beta, covariance, u, half, probability, equivalent_dof(half / u), y - X @ beta,
         scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
-        (float(grid.tau[k]), float(grid.share[k])), tuple(warnings), mixture, float(grid.reading[k]),
+        model[:2], tuple(warnings), mixture, model[2],
         _spread(w, np.sqrt(s2 * grid.reading / 2.0) * window, k),
     )  # fmt: skip
 
@@ -245,22 +244,15 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     return float(values[k]), low, high
 
 
-def _whitened(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid, which: slice) -> tuple[Array, Array]:
-    """(G, n, c) and log determinants (G,) of some models of the grid."""
-    Z, logdet = noise.whiten(t0, t1, columns, grid.tau[which], grid.share[which], grid.reading[which])
-    return Z.transpose(1, 0, 2), logdet
-
-
 def _moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
-    """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model; some at a time."""
-    p, size = columns.shape[1] - 1, grid.tau.size // np.unique(grid.reading).size
-    many = size * max(1, BLOCK // (columns.size * size))
-    starts = [0, *range(size, grid.tau.size, many)]  # the first models have no reading errors, which is quicker
-    parts = []
-    for start, end in pairwise([*starts, grid.tau.size]):
-        Z, logdet = _whitened(t0, t1, columns, grid, slice(start, end))
-        zx, zy = Z[:, :, :p], Z[:, :, p]
-        xy, yy = np.einsum("gnp,gn->gp", zx, zy), np.einsum("gn,gn->g", zy, zy)
-        parts.append((zx.transpose(0, 2, 1) @ zx, xy, yy, logdet))
-    M, xy, yy, logdet = (np.concatenate(v) for v in zip(*parts, strict=True))
-    return M, xy, yy, logdet
+    """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model."""
+    models, c = grid.tau.size, columns.shape[1]
+    square, logdet = np.zeros((models, c, c)), np.zeros(models)
+    for alike in (grid.reading == 0.0, grid.reading > 0.0):  # without reading errors it is quicker
+        g = np.flatnonzero(alike)
+        if g.size:
+            for _, Z, part in noise.whitened_blocks(t0, t1, columns, grid.tau[g], grid.share[g], grid.reading[g]):
+                zt = np.ascontiguousarray(Z.transpose(2, 1, 0))
+                square[g] += zt @ zt.transpose(0, 2, 1)
+                logdet[g] += part
+    return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1], logdet

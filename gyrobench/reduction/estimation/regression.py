@@ -166,6 +166,7 @@ def check_data(X: Array, y: Array, names: Sequence[str], limit: float = 1e3) -> 
 
 
 def _solve(Z: Array, z: Array, X: Array, y: Array, names: Sequence[str], whitener: Array | None) -> Fit:
+    """Least squares of Z = W X and z = W y; whitener: W, or its diagonal."""
     n, p = Z.shape
     scale = np.linalg.norm(Z, axis=0)
     q, r = np.linalg.qr(Z / scale)
@@ -175,7 +176,7 @@ def _solve(Z: Array, z: Array, X: Array, y: Array, names: Sequence[str], whitene
     v = z - Z @ beta
     s2 = float(v @ v) / (n - p)
     if whitener is not None:
-        gain = gain @ whitener
+        gain = gain * whitener if whitener.ndim == 1 else gain @ whitener
     fitted = X @ beta
     return Fit(tuple(names), beta, s2 * inverse @ inverse.T, math.sqrt(s2), n - p, fitted, y - fitted, gain)
 
@@ -191,7 +192,7 @@ def least_squares(X: Array, y: Array, names: Sequence[str], weights: Array | Non
     if weights.shape != y.shape or not np.all(np.isfinite(weights)) or np.any(weights <= 0):
         raise RegressionError("weights must be finite and positive, one for each datum")
     w = np.sqrt(weights)
-    return _solve(X * w[:, None], y * w, X, y, names, np.diag(w))
+    return _solve(X * w[:, None], y * w, X, y, names, w)
 
 
 def generalized_least_squares(X: Array, y: Array, names: Sequence[str], covariance: Array) -> Fit:
