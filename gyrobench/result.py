@@ -6,6 +6,7 @@ Numbers are in surface units (the unit stands beside them); nothing here compute
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -41,7 +42,8 @@ class Coefficient:
     truth: float | None = None  # simulated runs only
     z: float | None = None  # (estimate - truth) / u
     limit: Limit | None = None
-    verdict: str = NO_VERDICT  # pass | fail | inconclusive | no specification given
+    verdict: str = NO_VERDICT  # pass | fail | inconclusive | void | no specification given
+    no_value: str = ""  # why there is none: estimate, u and interval are then NaN
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
 
 
@@ -249,7 +251,8 @@ class Result(Displayed):
         if cls is SuiteResult:
             values["suite"] = SuiteComparison(**data["suite"])
         for c in values["coefficients"]:
-            c.interval = tuple(c.interval)
+            c.estimate, c.u = (math.nan if x is None else x for x in (c.estimate, c.u))
+            c.interval = tuple(math.nan if x is None else x for x in c.interval)
             c.limit = tuple(c.limit) if c.limit is not None else None
         return cls(**values)
 

@@ -45,8 +45,8 @@ echo = typer.echo
 
 
 def exit_on_fail(verdict: str, strict: bool) -> None:
-    """End the command with exit code 1 where a verdict fails and --strict is set."""
-    if strict and verdict == "fail":
+    """End the command with exit code 1 where a verdict is fail or void and --strict is set."""
+    if strict and verdict in ("fail", "void"):
         raise typer.Exit(1)
 
 

@@ -20,7 +20,6 @@ without a linear model; a warning says so.
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -33,13 +32,13 @@ from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import Step, sampled_step
+from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
 from gyrobench.system.sockets import socket
 from gyrobench.system.values import flatten
 from gyrobench.system.wiring import Assembly, Connection
 
 Array = NDArray[np.float64]
-SLOW = 1e-2  # rad/s: a pole nearer to the origin is an integrator of the model (an attitude, a time)
 PASSES = 3  # along the wires, to find the operating point
 
 
@@ -235,25 +234,6 @@ def _model(
     return LinearModel(
         A=a.tolist(), B=b.tolist(), C=c.tolist(), D=d.tolist(), inputs=inputs, outputs=outputs, states=states, step=step
     )
-
-
-def poles(model: LinearModel) -> list[complex]:
-    """Return the poles in the s plane, rad/s; of a discrete model ln(z) / step, without z = 0 (pure delays)."""
-    eigenvalues = np.linalg.eigvals(np.asarray(model.A, float)) if model.A else np.zeros(0)
-    if not model.step:
-        return [complex(p) for p in eigenvalues]
-    return [cmath.log(complex(z)) / model.step for z in eigenvalues if abs(z) > 1e-12]
-
-
-def unstable(model: LinearModel) -> list[complex]:
-    """Return the poles in the right half plane, the fastest growing first, but those nearer to 0 than 0.01 rad/s.
-
-    Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
-    at z = 1, by the third root of 1e-16.
-    """
-    slow = max(SLOW, 1e-5 / model.step) if model.step else SLOW
-    right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > slow and p.real > 1e-6 * abs(p)]
-    return sorted(right, key=lambda p: -p.real)
 
 
 def loops(

@@ -1,7 +1,8 @@
-"""Frequency responses of the linear models that a record holds: A, B, C, D and a step (s; 0: continuous)."""
+"""Frequency responses and poles of the linear models that a record holds: A, B, C, D and a step (s; 0: continuous)."""
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ from gyrobench.record.run_document import LinearModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+SLOW = 1e-2  # rad/s: a pole nearer to the origin is an integrator of the model (an attitude, a time)
 TOLERANCE = 0.05  # relative, of a crossover against the requested one
 
 
@@ -24,3 +26,22 @@ def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
     s = np.exp(s * model.step) if model.step else s
     states = np.linalg.solve(s[:, None, None] * np.eye(n) - a, np.broadcast_to(b, (s.size, *b.shape)).astype(complex))
     return np.asarray(c @ states + d)
+
+
+def poles(model: LinearModel) -> list[complex]:
+    """Return the poles in the s plane, rad/s; of a discrete model ln(z) / step, without z = 0 (pure delays)."""
+    eigenvalues = np.linalg.eigvals(np.asarray(model.A, float)) if model.A else np.zeros(0)
+    if not model.step:
+        return [complex(p) for p in eigenvalues]
+    return [cmath.log(complex(z)) / model.step for z in eigenvalues if abs(z) > 1e-12]
+
+
+def unstable(model: LinearModel) -> list[complex]:
+    """Return the poles in the right half plane, the fastest growing first, but those nearer to 0 than 0.01 rad/s.
+
+    Nor do those of a discrete model nearer than 1e-5 / step: rounding splits three integrators in a row, a triple pole
+    at z = 1, by the third root of 1e-16.
+    """
+    slow = max(SLOW, 1e-5 / model.step) if model.step else SLOW
+    right = [p for p in poles(model) if p.imag >= 0.0 and abs(p) > slow and p.real > 1e-6 * abs(p)]
+    return sorted(right, key=lambda p: -p.real)

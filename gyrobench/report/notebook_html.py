@@ -13,7 +13,7 @@ from typing import Any
 from gyrobench import notebook
 from gyrobench.record.record import Record
 from gyrobench.report.numbers import write_number
-from gyrobench.report.page_model import Cell, Column, Row, Table, text_cell
+from gyrobench.report.page_model import BulletList, Cell, Column, Row, Table, text_cell
 from gyrobench.result import NO_VERDICT, Result, SuiteResult
 
 THEME = {  # colour of the report -> that of the notebook, if it has one
@@ -27,7 +27,12 @@ THEME = {  # colour of the report -> that of the notebook, if it has one
     "green": "#009e73",
     "purple": "#cc79a7",
 }
-MARKS = {"pass": ("✓ ", "#00805d"), "fail": ("✗ ", "#c04a00"), "inconclusive": ("? ", "#8a6800")}
+MARKS = {
+    "pass": ("✓ ", "#00805d"),
+    "fail": ("✗ ", "#c04a00"),
+    "inconclusive": ("? ", "#8a6800"),
+    "void": ("× ", "#c04a00"),
+}
 MAX_ROWS = 6  # of a record's windows
 MAX_CHANNELS = 4  # drawn
 
@@ -100,7 +105,9 @@ def result_html(result: Result) -> str:
     verdict = f"Verdict: {result.verdict}." if result.verdict != NO_VERDICT else f"{NO_VERDICT.capitalize()}."
     head = [paragraph(result.title, strong=True), paragraph(" ".join([verdict, *result.summary[:1]]))]
     methods = [paragraph(f"Methods: {result.suite.consistency}.")] if isinstance(result, SuiteResult) else []
-    tables = [table_html(t) for t in coefficients(doc)]
+    blocks = coefficients(doc)
+    tables = [table_html(b) for b in blocks if isinstance(b, Table)]
+    tables += [warning_list(b.items) for b in blocks if isinstance(b, BulletList)]
     return fragment(*head, *methods, warning_list(result.warnings), *tables, figure_html(_main_figure(doc)))
 
 

@@ -26,7 +26,7 @@ class Cell:
     rest: str = ""
     full: str = ""  # repr of the full value
     pointer: str = ""  # where it stands in result.json
-    mark: str = ""  # pass | fail | inconclusive | warn | strong | ""
+    mark: str = ""  # pass | fail | inconclusive | void | warn | strong | ""
     number: bool = False
 
 

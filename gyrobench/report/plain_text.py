@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
@@ -26,11 +26,13 @@ def format_result(result: Result) -> str:
     rows = [head + (["truth", "z"] if truth else []) + (["verdict"] if judged else [])]
     for c in result.coefficients:
         lo, hi = (write_number(x, c.u).text for x in c.interval)
-        row = [c.name, write_number(c.estimate, c.u).text, write_number(c.u, c.u).text, f"{lo} … {hi}", c.unit]
+        estimate = "no value" if c.no_value else write_number(c.estimate, c.u).text
+        row = [c.name, estimate, write_number(c.u, c.u).text, "–" if c.no_value else f"{lo} … {hi}", c.unit]
         if truth:
             row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
         rows.append(row + ([c.verdict] if judged else []))
-    notes = [f"warning: {w}" for w in result.warnings]
+    notes = [s.replace("No", "no", 1) for s in no_values((c.name, c.no_value) for c in result.coefficients)]
+    notes += [f"warning: {w}" for w in result.warnings]
     if result.step_check:
         worst = result.step_check["worst"]
         notes.append(f"step check: halving the communication step changes no coefficient by more than {worst:.2g} u")
@@ -39,6 +41,15 @@ def format_result(result: Result) -> str:
     left = {0, 4} | ({len(rows[0]) - 1} if judged else set())
     agreement = _agreement(result) if isinstance(result, SuiteResult) else []
     return "\n".join([result.title, "", *align_columns(rows, left), "", *notes, *agreement])
+
+
+def no_values(coefficients: Iterable[tuple[str, str]]) -> list[str]:
+    """Return a sentence for each reason for which coefficients (name, reason; "" of those with a value) have none."""
+    names: dict[str, list[str]] = {}
+    for name, reason in coefficients:
+        if reason:
+            names.setdefault(reason, []).append(name)
+    return [f"No value of {', '.join(of)}: {reason}." for reason, of in names.items()]
 
 
 def _agreement(result: SuiteResult) -> list[str]:
@@ -72,4 +83,7 @@ def format_ranking(comparison: Mapping[str, Any]) -> str:
         value, u = (write_number(entry[k], entry["u"]).text for k in ("value", "u"))
         over = write_number(entry["over_best"], significant=3).text
         rows.append([str(place), comparison["runs"][entry["run"]]["name"], value, u, ranked["unit"], over])
-    return "\n".join([*align_columns(rows, {0, 1, 4}), ""])
+    for entry in ranked["void"]:
+        rows.append(["–", comparison["runs"][entry["run"]]["name"], "void", "–", ranked["unit"], "–"])
+    reasons = [f"{comparison['runs'][v['run']]['name']} has no rank: {v['reason']}" for v in ranked["void"]]
+    return "\n".join([*align_columns(rows, {0, 1, 4}), *reasons, ""])

@@ -6,23 +6,34 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report.page_model import Column, Row, Section, Table, Text, number_cell, text_cell
+from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 
 Json = dict[str, Any]
 
 
 def ranking(docs: Sequence[Json]) -> Json:
-    """``{"name", "unit", "meaning", "order": [{"run", "value", "u", "over_best", "apart"}]}``; {} when the runs name
-    no measure, or not the same one.
+    """Return ``{"name", "unit", "meaning", "order": [{"run", "value", "u", "over_best", "apart"}], "void": [{"run",
+    "reason"}]}``; {} when the runs name no measure, or not the same one.
 
-    apart: whether a run is farther from the one before it than the expanded uncertainty of their difference.
+    apart: whether a run is farther from the one before it than the expanded uncertainty of their difference.  void:
+    runs without a value of the measure, or with the verdict void; they have no rank.
     """
     (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
     if others or not name:
         return {}
     ranked = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
-    known = [(c["estimate"], k, c) for k, c in enumerate(ranked) if c is not None and c["estimate"] is not None]
-    if len(known) < 2 or len({c["unit"] for _, _, c in known}) > 1:
+    void = [
+        {"run": k, "reason": (c and c["no_value"]) or "another measure of the run has no value"}
+        for k, (doc, c) in enumerate(zip(docs, ranked, strict=True))
+        if doc["verdict"] == "void" or (c and c["no_value"])
+    ]
+    out = {v["run"] for v in void}
+    known = [
+        (c["estimate"], k, c)
+        for k, c in enumerate(ranked)
+        if k not in out and c is not None and c["estimate"] is not None
+    ]
+    if not known or len(known) + len(void) < 2 or len({c["unit"] for _, _, c in known}) > 1:
         return {}
     known.sort(key=lambda entry: entry[:2])
     best, _, first = known[0]
@@ -36,7 +47,7 @@ def ranking(docs: Sequence[Json]) -> Json:
         over = value / best if best else None
         order.append({"run": k, "value": value, "u": c["u"], "over_best": over, "apart": apart})
         before = c
-    return {"name": name, "unit": first["unit"], "meaning": first["meaning"], "order": order}
+    return {"name": name, "unit": first["unit"], "meaning": first["meaning"], "order": order, "void": void}
 
 
 def section(doc: Json, letters: Sequence[str]) -> Section:
@@ -63,6 +74,10 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
                 ]
             )
         )
+    for entry in ranked["void"]:
+        run = doc["runs"][entry["run"]]
+        known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"]), text_cell(run["instrument"])]
+        rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(3))]))
     unit = ranked["unit"] if ranked["unit"] != "1" else ""
     columns = [
         Column("rank"),
@@ -74,4 +89,9 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
     columns += [Column("u"), Column("ratio to the smallest"), Column("significantly different from the preceding run")]
     caption = f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first."
     note = "Noise reduction alone does not improve the rank: the measure is the deviation from the truth."
-    return Section("Ranking", "ranking", [Table(columns, rows, caption), Text(note, quiet=True)])
+    blocks: list[Any] = [Table(columns, rows, caption), Text(note, quiet=True)]
+    if ranked["void"]:
+        blocks.append(
+            BulletList([f"{letters[v['run']]} has no rank: {v['reason']}." for v in ranked["void"]], warn=True)
+        )
+    return Section("Ranking", "ranking", blocks)

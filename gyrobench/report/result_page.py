@@ -25,6 +25,7 @@ from gyrobench.report.page_model import (
     pictures,
     text_cell,
 )
+from gyrobench.report.plain_text import no_values
 from gyrobench.report.signature_section import signing
 from gyrobench.report.style import styled
 from gyrobench.report.tables import heading, how_tables, limit_text, unit_groups, words
@@ -167,7 +168,7 @@ def coefficients(doc: Json) -> list[Any]:
             cells = [
                 text_cell(c["name"], "strong"),
                 text_cell(c["meaning"]),
-                number_cell(doc, (*path, "estimate"), u),
+                text_cell("no value", "warn") if c["no_value"] else number_cell(doc, (*path, "estimate"), u),
                 number_cell(doc, (*path, "u"), u),
                 *([] if groups else [text_cell(c["unit"])]),
                 number_cell(doc, (*path, "interval", 0), u),
@@ -176,7 +177,7 @@ def coefficients(doc: Json) -> list[Any]:
             if truth:
                 cells += [number_cell(doc, (*path, "truth"), u), number_cell(doc, (*path, "z"), 0.1)]
             if limits:
-                verdict = c["verdict"] if c["limit"] is not None else "–"
+                verdict = c["verdict"] if c["limit"] is not None or c["no_value"] else "–"
                 cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
             rows.append(Row(cells))
     note = (
@@ -187,7 +188,9 @@ def coefficients(doc: Json) -> list[Any]:
         note += " Truth: true value in the simulation; z = (estimate − truth) / u."
     if not limits:
         note += " No specification was applied; conformity is not stated."
-    return [Table(columns, rows, f"Coefficients. {note}")] if rows else []
+    missing = no_values((c["name"], c["no_value"]) for c in doc["coefficients"])
+    table = [Table(columns, rows, f"Coefficients. {note}")] if rows else []
+    return [*table, BulletList(missing, warn=True)] if missing else table
 
 
 def _capital(text: str) -> str:

@@ -69,10 +69,10 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     )
     crosses = "The loop crosses over at {f_c:.4g} Hz with {PM:.3g}° of phase margin"
     limit = "; it becomes unstable at {lower limit:.3g} of its gain." if "lower limit" in found.estimates else "."
-    result.summary = found.tell(
+    sentences = found.tell(
         "A load leaves the platform {θ*:.4g}″ off; its stiffness at rest is {S:.5g} N·m/rad.", crosses + limit, DRIFTS
     )
-    result.summary += said
+    result.summary = result.summary or [*sentences, *said]
     return result
 
 
@@ -145,7 +145,7 @@ def _margins(found: LoopFindings, points: list[Point], loop: Loop | None) -> Non
     """Slope at the crossover, the lower gain limit, and the closed forms of the loop without step and delay."""
     values = margins.measured_values(points)
     pm = values.get("phase")
-    if pm is not None and pm[0] < ENOUGH:
+    if pm is not None and pm[0] < ENOUGH and not found.unstable:
         found.warnings.append(f"The phase margin is {pm[0]:.3g}°; more than {ENOUGH:g}° is wanted [GSP ch. 5].")
     if "crossover" in values and max(p.f for p in points) > 1.25 * values["crossover"][0]:
         f = values["crossover"][0]

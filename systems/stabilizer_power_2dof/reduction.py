@@ -99,7 +99,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         conventions=CONVENTIONS,
         specification=specification,
     )
-    result.summary = found.tell(
+    result.summary = result.summary or found.tell(
         "A load leaves the platform {α*:.4g}″ off; the gyro leans by M/K_m with K_m = {K_m:.4g} N·m/rad.",
         "The loop crosses over at {f_c:.3g} Hz with a phase margin of {PM:.3g}°; it is stable up to "
         "K_m = {K_m limit:.4g} N·m/rad.",

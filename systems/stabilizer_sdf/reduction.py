@@ -82,7 +82,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ],
         specification=specification,
     )
-    if ends is not None:
+    if ends is not None and not found.unstable:
         beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
         result.summary = [
             f"After {t[-1]:.4g} s of {p.M:g} N.m the platform leans by {ends.estimate:.4g} arcmin{beside}.",

@@ -91,7 +91,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         specification=specification,
     )
     result.ranked_by = "max"
-    result.summary = found.tell(
+    result.summary = result.summary or found.tell(
         "Erected to the dead zone in {t_zone:.3g} s.",
         "The acceleration leaned it by {lean:.3g}°.",
         "After the erection it was never more than {max:.3g} arcmin from the vertical.",

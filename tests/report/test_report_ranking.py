@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
 
 import pytest
 from simulated import tumble
 
 from gyrobench.report.comparison_page import comparison
+from gyrobench.report.notebook_html import comparison_html, result_html
+from gyrobench.report.plain_text import format_ranking
+from gyrobench.report.result_json import document, load
 
 
 def runs(*values, ranked_by="D_F", u=0.001):
@@ -46,3 +51,31 @@ def test_units_are_not_mixed():
     mixed = runs(1.0, 2.0)
     mixed[1][1].coefficients[0] = dataclasses.replace(mixed[1][1].coefficients[0], unit="rad/s")
     assert comparison(mixed)["ranking"] == {}
+
+
+def test_void_runs_are_listed_last_and_have_no_rank():
+    """An unstable run whose rest would be the smallest, and one that has no value of the ranked measure."""
+    mixed = runs(2.0, 0.1, 1.0, 3.0)
+    mixed[1][1].verdict = "void"
+    nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
+    mixed[3][1].coefficients[0] = dataclasses.replace(
+        mixed[3][1].coefficients[0], **nothing, verdict="void", no_value="unstable, pole at 1.59 Hz"
+    )
+    ranking = comparison(mixed)["ranking"]
+    assert [e["run"] for e in ranking["order"]] == [2, 0]
+    assert [v["run"] for v in ranking["void"]] == [1, 3]
+    text = format_ranking(comparison(mixed))
+    assert text.index("run 0") < text.index("run 1")
+    assert "run 3 has no rank: unstable, pole at 1.59 Hz" in text
+    assert "run 3" in comparison_html(comparison(mixed), "")
+
+
+def test_a_result_without_a_value_keeps_its_reason_on_disk():
+    r = tumble(windows=12)
+    nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
+    r.coefficients[0] = dataclasses.replace(r.coefficients[0], **nothing, verdict="void", no_value="unstable, pole")
+    again = load(json.dumps(document(r)))
+    assert math.isnan(again.coefficients[0].estimate) and again.coefficients[0].no_value == "unstable, pole"
+    assert document(again) == document(r)
+    html = result_html(again)
+    assert "no value" in html and f"No value of {r.coefficients[0].name}: unstable, pole." in html

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
-from gyrobench.linear.linear_model import LinearizationError, loops, poles, unstable
+from gyrobench.linear.linear_model import LinearizationError, loops
+from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.margins import model_response
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import RunError, Session, run
-from gyrobench.linear.linear_model import unstable
 from gyrobench.record.csv_reader import DataError
+from gyrobench.record.frequency_response import unstable
 from gyrobench.reduction.loops import margins as m
 from gyrobench.system.system import load_system
 from gyrobench.system.wiring import WiringError

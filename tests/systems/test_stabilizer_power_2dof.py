@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import ParameterRefusedError, RunError, Session
-from gyrobench.linear.linear_model import poles, unstable
 from gyrobench.record.csv_reader import DataError
+from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System, load_system

@@ -11,7 +11,7 @@ import pytest
 from gimballed import DEG, STILL, measures, session, table
 
 from gyrobench.engine.session import RunError, Session
-from gyrobench.linear.linear_model import unstable
+from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModels
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase

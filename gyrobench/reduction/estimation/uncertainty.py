@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from gyrobench.result import NO_VERDICT
 
 NORMAL = 1.959963984540054
+VERDICTS = ("void", "fail", "inconclusive", "pass")  # the worst one first
 DECISION_RULE = (
     "Guard band equal to U (coverage probability 95 %). Pass: the coverage interval lies within the limits. Fail: it "
     "lies entirely outside. Otherwise inconclusive."
@@ -30,22 +31,21 @@ def p_text(p: float) -> str:
 
 
 def assess_conformity(estimate: float, U: float, limit: tuple[float | None, float | None] | None) -> str:
-    """pass, fail, inconclusive or "no specification given" by :data:`DECISION_RULE`; None is an open side."""
+    """pass, fail, inconclusive, void (without a value) or "no specification given" by :data:`DECISION_RULE`; None is an
+    open side.
+    """
     if limit is None or limit == (None, None):
         return NO_VERDICT
     low = -math.inf if limit[0] is None else limit[0]
     high = math.inf if limit[1] is None else limit[1]
     if not math.isfinite(estimate) or not math.isfinite(U):
-        return "inconclusive"
+        return "void"
     if low + U <= estimate <= high - U:
         return "pass"
     return "fail" if estimate + U < low or estimate - U > high else "inconclusive"
 
 
 def worst_verdict(verdicts: Iterable[str]) -> str:
-    """fail before inconclusive before pass; "no specification given" when none was."""
+    """Return the first of :data:`VERDICTS` that was given; "no specification given" when none was."""
     given = set(verdicts)
-    for word in ("fail", "inconclusive", "pass"):
-        if word in given:
-            return word
-    return NO_VERDICT
+    return next((word for word in VERDICTS if word in given), NO_VERDICT)

@@ -38,6 +38,7 @@ from gyrobench.reduction.loops.loop_measures import (
     step,
     step_noise_std,
 )
+from gyrobench.reduction.loops.validity import why_void
 from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
@@ -63,6 +64,7 @@ class LoopFindings:
         self.tables: list[dict[str, Any]] = []
         self.warnings: list[str] = []
         self.allan: dict[str, Any] = {}
+        self.unstable = why_void(self.linear, self.gates)
         if self.linear.missing:
             self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
 
@@ -83,14 +85,18 @@ class LoopFindings:
         closed: float | None = None,
         truth: float | None = None,
         limits: Specification | None = None,
+        no_value: str = "",
     ) -> None:
-        """One row of the table of coefficients, in printed units; nothing for an estimate of None.
+        """One row of the table of coefficients, in printed units; nothing for an estimate of None without a reason.
 
-        u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.
+        u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.  no_value: why there is
+        no estimate; without a limit such a row says no more than that.
         """
-        if estimate is None or not math.isfinite(estimate):
+        if no_value:
+            estimate = u = math.nan
+        elif estimate is None or not math.isfinite(estimate):
             return
-        size = u if u is not None and math.isfinite(u) else 0.0
+        size = u if u is not None and (no_value or math.isfinite(u)) else 0.0
         half = uncertainty.NORMAL * size
         limit = (limits or {}).get(name)
         self.coefficients.append(
@@ -108,13 +114,23 @@ class LoopFindings:
                 z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
                 limit=limit,
                 verdict=uncertainty.assess_conformity(estimate, half, limit),
+                no_value=no_value,
             )
         )
+
+    def void(self, names: Sequence[str], reason: str) -> None:
+        """Take the values of coefficients away: their phase was unstable or unsettled."""
+        for k, c in enumerate(self.coefficients):
+            if c.name in names:
+                self.coefficients[k] = replace(
+                    c, estimate=math.nan, u=math.nan, interval=(math.nan, math.nan), u_a=None, z=None, verdict="void",
+                    no_value=reason,
+                )  # fmt: skip
 
     @property
     def estimates(self) -> dict[str, float]:
         """Return what was measured, in printed units."""
-        return {c.name: c.estimate for c in self.coefficients}
+        return {c.name: c.estimate for c in self.coefficients if not c.no_value}
 
     def tell(self, *texts: str) -> list[str]:
         """Return the sentences of which all was measured: "It crosses over at {f_c:.4g} Hz."."""
@@ -145,7 +161,7 @@ class LoopFindings:
         curves, rows = [], []
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
         at = [p.f for p in points]
-        shown = m.measured_margins(points)
+        shown = m.Margins() if self.unstable else m.measured_margins(points)
         rows.append(shown.row("measured"))
         for kind, label in NAMES.items():
             model = models.of(kind)
@@ -157,7 +173,7 @@ class LoopFindings:
             curves.append(_curve(label, span, dense))
             if limits.crossover is not None:
                 self._agreement(points, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
-            if kind == "discrete":
+            if kind == "discrete" and not self.unstable:
                 self._conditional(title, limits)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
         self.tables.append(
@@ -343,7 +359,12 @@ class LoopFindings:
         """The Result with all that was collected; limits of the specification are applied by coefficient name."""
         for c in self.coefficients if specification else ():
             c.limit = (specification or {}).get(c.name, c.limit)
-            c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
+            if c.verdict != "void":
+                c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
+        if self.unstable:
+            self.void([c.name for c in self.coefficients], self.unstable)
+            self.warnings.insert(0, f"The run has no value: {self.unstable}. Its figures show what it did, no measure.")
+            summary = [f"No value: {self.unstable}."]
         run = self.record.run
         result = LoopResult(
             system=run.system,
