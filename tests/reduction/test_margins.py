@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import control
@@ -41,6 +42,28 @@ def test_gain_margin_of_three_lags() -> None:
     found = margins(f, 2.0 / (1 + 2j * np.pi * f) ** 3)
     assert found.upper == pytest.approx(4.0, rel=1e-5)
     assert next(f for f, g in found.gains) == pytest.approx(math.sqrt(3) / (2 * math.pi), rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_margins_are_those_of_python_control(seed: int) -> None:
+    """Random loops with up to 3 integrators, resonances, a delay: the same crossings to 1e-6, in a tenth of the time."""
+    rng = np.random.default_rng(seed)
+    f = grid(0.05, 200.0)
+    s = 2j * np.pi * f
+    gain = rng.uniform(1.0, 1000.0) / s ** rng.integers(0, 4) * np.exp(-s * rng.uniform(0.0, 5e-3))
+    for _ in range(3):
+        n, d = 2 * np.pi * rng.uniform(0.3, 60.0, 2)
+        gain = gain * (s * s + 0.1 * n * s + n * n) / (s * s + rng.uniform(0.05, 2.0) * d * s + d * d)
+    start = time.process_time()
+    data = control.frd(gain, 2.0 * np.pi * f, smooth=True)
+    gm, pm, _, w_phase, w_gain, _ = control.stability_margins(data, returnall=True)
+    slow = time.process_time() - start
+    start = time.process_time()
+    found = margins(f, gain)
+    assert time.process_time() - start < 0.1 * slow
+    turn = 2.0 * math.pi
+    assert np.ravel(found.crossovers) == pytest.approx(np.column_stack([w_gain / turn, pm]).ravel(), rel=1e-6, abs=1e-5)
+    assert np.ravel(found.gains) == pytest.approx(np.column_stack([w_phase / turn, gm]).ravel(), rel=1e-6)
 
 
 def leadlag() -> control.TransferFunction:

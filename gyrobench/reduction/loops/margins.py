@@ -1,14 +1,14 @@
 """Frequency responses and stability margins, of linear models and of measured points alike.
 
-A model is what gyrobench.linear.linear_model writes into run.json.  Margins come from python-control on a dense
-frequency response, for models and for points interpolated between measured frequencies: what is compared is found in
-one way.
+A model is what gyrobench.linear.linear_model writes into run.json.  Margins are found on a dense frequency response,
+for models and for points interpolated between measured frequencies: what is compared is found in one way.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -104,17 +104,30 @@ COLUMNS = [
 
 
 def margins(f: Array, gain: Complex) -> Margins:
-    """Return margins of a loop gain given densely (some hundred points) over rising frequencies, by python-control."""
-    import control
+    """Return margins of a loop gain given densely (some hundred points) over rising frequencies.
 
-    data = control.frd(np.asarray(gain), 2.0 * np.pi * np.asarray(f), smooth=True)
-    gm, pm, _, w_phase, w_gain, _ = control.stability_margins(data, returnall=True)
+    Crossings are bracketed between neighbours and refined on the cubic spline through all points, as
+    control.stability_margins does with smooth frequency response data.  Two crossings between neighbours are not seen.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import brentq
+
+    w, L = 2.0 * np.pi * np.asarray(f, float), np.asarray(gain, complex)
+    curve = CubicSpline(w, np.column_stack([L.real, L.imag]))
+
+    def crossings(values: Array, of: Callable[[Array], float]) -> list[tuple[float, complex]]:
+        above = values >= 0.0
+        roots = []
+        for k in np.flatnonzero(above[1:] != above[:-1]):
+            w0 = brentq(lambda x: of(curve(x)), w[k], w[k + 1])
+            roots.append((float(w0), complex(*curve(w0))))
+        return roots
+
+    unity = crossings(np.abs(L) - 1.0, lambda z: math.hypot(z[0], z[1]) - 1.0)
+    real = [(w0, z) for w0, z in crossings(L.imag, lambda z: float(z[1])) if z.real < 0.0]
     return Margins(
-        [(float(w) / (2.0 * math.pi), float(p)) for w, p in zip(np.atleast_1d(w_gain), np.atleast_1d(pm), strict=True)],
-        [
-            (float(w) / (2.0 * math.pi), float(g))
-            for w, g in zip(np.atleast_1d(w_phase), np.atleast_1d(gm), strict=True)
-        ],
+        [(w0 / (2.0 * math.pi), (math.degrees(cmath.phase(z)) % 360.0) - 180.0) for w0, z in unity],
+        [(w0 / (2.0 * math.pi), 1.0 / abs(z)) for w0, z in real],
     )
 
 
