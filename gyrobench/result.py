@@ -161,6 +161,7 @@ class Result(Displayed):
     summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
     decision_rule: str = ""
     verdict: str = NO_VERDICT
+    withheld: list[str] = field(default_factory=list)  # why no "pass" (or "fail") is stated, sentences
     site: dict[str, Any] = field(default_factory=dict)
     instrument: str = ""
     simulated: bool = True

@@ -45,8 +45,8 @@ echo = typer.echo
 
 
 def exit_on_fail(verdict: str, strict: bool) -> None:
-    """End the command with exit code 1 where a verdict is fail or void and --strict is set."""
-    if strict and verdict in ("fail", "void"):
+    """End the command with exit code 1 where a verdict is void, fail or inconclusive and --strict is set."""
+    if strict and verdict in ("void", "fail", "inconclusive"):
         raise typer.Exit(1)
 
 
@@ -77,8 +77,9 @@ def root(
       gyrobench run tumble_single_axis
       gyrobench COMMAND --help
 
-    Exit codes: 0 done, 1 a verdict or a validation fails, 2 invalid request, configuration or data,
-    3 a run, its reduction or its report failed, 130 interrupted.
+    Exit codes: 0 done, 1 a validation fails or, with --strict, a verdict is void, fail or
+    inconclusive, 2 invalid request, configuration or data, 3 a run, its reduction or its report failed,
+    130 interrupted.
     """
 
 

@@ -228,10 +228,17 @@ class RunDocument(Document):
     data: DataFile | None = None
     days: list[Day] = Field(default_factory=list, description="of a record of several days")
     polarity: str = Field(default="", description="sign convention of measured data")
+    type_b: str = Field(default="", description="of measured data, none: no uncertainty of type B is declared")
     report: str = Field(default="", description="number of the laboratory's report")
     source: str = Field(default="", description="where measured data were published")
     made: str = ""
     note: str = ""
+
+    @property
+    def type_b_stated(self) -> bool:
+        """True where an uncertainty of type B (an option u_...) is given, or declared absent (type_b = none)."""
+        sizes = (v for n, v in self.options.items() if n.startswith("u_") and isinstance(v, int | float))
+        return self.type_b == "none" or any(v > 0.0 for v in sizes)
 
 
 class SuiteTestRun(Entry):

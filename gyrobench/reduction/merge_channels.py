@@ -68,6 +68,7 @@ def merge(
         warnings=[*_shared(labels, [r.warnings for r in parts]), *warnings],
         summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
         verdict=uncertainty.worst_verdict(r.verdict for r in parts),
+        withheld=_shared(labels, [r.withheld for r in parts]),
         simulated=any(r.simulated for r in parts),
     )
 

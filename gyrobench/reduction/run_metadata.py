@@ -16,10 +16,14 @@ from typing import Any, TypeVar
 from gyrobench import frames
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
+from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Result
 
 R = TypeVar("R", bound=Result)
+NO_TYPE_B = (
+    "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare type_b = none."
+)
 
 
 @dataclass(frozen=True)
@@ -88,8 +92,13 @@ def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[
 
 
 def finish(result: R, record: Record) -> R:
-    """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete."""
+    """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete.
+
+    Measured data without a statement of type B pass nothing: u is of type A alone.
+    """
     result.provenance = record.run.as_dict()
+    if record.run.measured and not record.run.type_b_stated:
+        uncertainty.withhold(result, [NO_TYPE_B], ["pass"])
     if not record.run.complete:
         stopped = record.run.stopped_at or 0.0
         result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before the end of its plan.")

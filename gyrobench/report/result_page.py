@@ -181,8 +181,8 @@ def coefficients(doc: Json) -> list[Any]:
                 cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
             rows.append(Row(cells))
     note = (
-        "u: combined standard uncertainty; estimates are rounded to its second significant digit. 95 % from, to: "
-        "limits of the coverage interval."
+        f"u: {_uncertainty(doc)}; estimates are rounded to its second significant digit. 95 % from, to: limits of the "
+        "coverage interval."
     )
     if truth:
         note += " Truth: true value in the simulation; z = (estimate − truth) / u."
@@ -191,6 +191,17 @@ def coefficients(doc: Json) -> list[Any]:
     missing = no_values((c["name"], c["no_value"]) for c in doc["coefficients"])
     table = [Table(columns, rows, f"Coefficients. {note}")] if rows else []
     return [*table, BulletList(missing, warn=True)] if missing else table
+
+
+def _uncertainty(doc: Json) -> str:
+    """Return what u is: combined, or of type A only, and why."""
+    run = doc["provenance"]
+    if any(c["u_a"] is None or c["u"] > c["u_a"] * (1.0 + 1e-9) for c in doc["coefficients"]):
+        return "combined standard uncertainty"
+    if not run.get("measured"):
+        return "standard uncertainty, type A only (no uncertainty of type B was set)"
+    why = "type B is declared absent" if run.get("type_b") == "none" else "no statement of type B"
+    return f"standard uncertainty, type A only: {why}"
 
 
 def _capital(text: str) -> str:

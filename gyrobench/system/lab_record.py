@@ -10,8 +10,9 @@ Comments named like an option set it; ``phase N`` names the attitude the rows wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,15 +24,26 @@ from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
-TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report")
+TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b")
 
 
-def explained(template: str) -> str:
-    """A template with a word, before its header, about what any record may say for its report."""
+def explained(template: str, options: Iterable[str] = ()) -> str:
+    """Return a template with words, before its header, about what any record may say for its report.
+
+    options: of the system; those of type B (u_...) are named.
+    """
     lines = template.splitlines()
     head = next((k for k, line in enumerate(lines) if not line.startswith("#")), 0)
-    note = f"# {', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them."
-    return "\n".join([*lines[:head], note, *lines[head:]]) + "\n"
+    names = ", ".join(n for n in options if n.startswith("u_"))
+    text = (
+        f"type B: {names} (standard uncertainties; gyrobench show has their meanings): those that apply, a comment "
+        "each or by --set; where there is none, 'type_b = none'. Without a statement no verdict is pass."
+    )
+    notes = [
+        *(wrap(text, 116, subsequent_indent="  ") if names else []),
+        f"{', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them.",
+    ]
+    return "\n".join([*lines[:head], *(f"# {note}" for note in notes), *lines[head:]]) + "\n"  # fmt: skip
 
 
 def read_record(
@@ -61,6 +73,7 @@ def read_record(
             problems.append(
                 f"'{name}' is not given: write '# {name} = {example}' in the file or --set {name}={example}"
             )
+    problems += _type_b_problems(system, said.get("type_b", ""))
     plan: list[PlanRow] = []
     if attitudes is not None:
         plan, unclear = _plan(windows["phase"], said, attitudes(system))
@@ -75,6 +88,13 @@ def read_record(
     run = measured_run(system, plan, {n: said[n] for n in texts if n in said})
     run.window_units = {c.name: c.unit for c in columns if c.name in windows}
     return Record(windows, {}, run)
+
+
+def _type_b_problems(system: System, said: str) -> list[str]:
+    given = [n for n in system.given if n.startswith("u_") and system[n]]
+    if said not in ("", "none"):
+        return [f"type_b = {said}: 'none' or nothing is expected; sizes are given by the options u_..."]
+    return [f"type_b = none, but {', '.join(given)} given: leave one of them out"] if said and given else []
 
 
 def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, str]) -> RunDocument:

@@ -23,7 +23,7 @@ def empty_record(test: System | Suite) -> str:
 
     if isinstance(test, Suite):
         raise UsageError(f"{test.name} compares runs: reduce each record by its own test, then give it their folders")
-    return explained(_measured_data(test).template)
+    return explained(_measured_data(test).template, test.options)
 
 
 def _measured_data(system: System) -> MeasuredData:

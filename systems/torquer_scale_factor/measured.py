@@ -25,5 +25,5 @@ COLUMNS = (
     Column("range_plus", "rad", "angle range with positive current", required=False),
     Column("range_minus", "rad", "angle range with negative current", required=False),
 )
-TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report")
+TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b")
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None, texts=TEXTS))

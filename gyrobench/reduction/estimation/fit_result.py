@@ -73,7 +73,7 @@ def linear_result(
             f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
             f"is {design.weakest}; errors of the model are amplified in it."
         )
-    return DriftTestResult(
+    result = DriftTestResult(
         system=system,
         title=title,
         method=method,
@@ -106,6 +106,13 @@ def linear_result(
         instrument=instrument,
         simulated=any(q.truth is not None for q in fit.quantities) if simulated is None else simulated,
     )
+    return uncertainty.withhold(result, _contradictions(fit))
+
+
+def _contradictions(fit: Findings) -> list[str]:
+    """Return why the coverage intervals do not hold what they state, as a sentence; nothing where they may."""
+    broken = "; ".join(f"{t.name} p < 0.001, {t.finding}" for t in fit.broken())
+    return [f"The residuals contradict the model or its noise ({broken})."] if broken else []
 
 
 def plus_minus(c: Coefficient) -> str:

@@ -304,10 +304,13 @@ class Findings:
         tests.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
         return tests
 
+    def broken(self) -> list[Test]:
+        """Return the tests with p < 0.001, but not that of autocorrelation that the noise model includes."""
+        return [t for t in self.tests if t.p is not None and t.p < 0.001 and (self.white or t.name != RAW)]
+
     def warnings(self) -> list[str]:
-        """Return a sentence for each test with p < 0.001, but not for autocorrelation that the noise model includes."""
-        loud = [t for t in self.tests if t.p is not None and t.p < 0.001 and (self.white or t.name != RAW)]
-        return [f"{t.name}: p < 0.001, {t.finding}. The stated u may be too small." for t in loud]
+        """Return a sentence for each of :meth:`broken`."""
+        return [f"{t.name}: p < 0.001, {t.finding}. The stated u may be too small." for t in self.broken()]
 
     def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
         """Return coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""

@@ -104,7 +104,7 @@ def combine_days(
     varying = [t.name.split(", ", 1)[1] for t in tests if t.p is not None and t.p < 0.05]
     variation = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
     first = parts[0]
-    return replace(
+    combined = replace(
         first,
         coefficients=coefficients,
         series=series,
@@ -123,8 +123,10 @@ def combine_days(
         summary=[
             f"{n} {what}s; {variation} from {what} to {what} by more than noise.", *_few(coefficients, table, what)
         ],
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients), withheld=[],
     )  # fmt: skip
+    reasons = [f"{what} {day}: {text}" for day, r in results.items() for text in r.withheld]
+    return uncertainty.withhold(combined, reasons)
 
 
 def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from typing import TypeVar
 
-from gyrobench.result import NO_VERDICT
+from gyrobench.result import NO_VERDICT, Result
 
+R = TypeVar("R", bound=Result)
 NORMAL = 1.959963984540054
 VERDICTS = ("void", "fail", "inconclusive", "pass")  # the worst one first
 DECISION_RULE = (
     "Guard band equal to U (coverage probability 95 %). Pass: the coverage interval lies within the limits. Fail: it "
-    "lies entirely outside. Otherwise inconclusive."
+    "lies entirely outside. Otherwise inconclusive, as where the residuals contradict what the interval rests on, and "
+    "in place of a pass of measured data without a statement of type B."
 )
 
 
@@ -49,3 +52,21 @@ def worst_verdict(verdicts: Iterable[str]) -> str:
     """Return the first of :data:`VERDICTS` that was given; "no specification given" when none was."""
     given = set(verdicts)
     return next((word for word in VERDICTS if word in given), NO_VERDICT)
+
+
+def withhold(result: R, reasons: Iterable[str], words: Collection[str] = ("pass", "fail")) -> R:
+    """Make the verdicts ``words`` of a result inconclusive for ``reasons`` (sentences), and return it.
+
+    A warning says so where there was such a verdict.  Without reasons nothing changes.
+    """
+    new = [r for r in reasons if r not in result.withheld]
+    result.withheld += new
+    judged = [c for c in result.coefficients if c.verdict in words]
+    if not result.withheld or not judged:
+        return result
+    for c in judged:
+        c.verdict = "inconclusive"
+    result.verdict = worst_verdict(c.verdict for c in result.coefficients)
+    names, why = ", ".join(c.name for c in judged), " ".join(new or result.withheld)
+    result.warnings.insert(0, f"Inconclusive instead of {' or '.join(words)}: {names}. {why}")
+    return result

@@ -205,7 +205,7 @@ def combine_methods(
         ],
         **_consistency(compared),
     )  # fmt: skip
-    return SuiteResult(
+    result = SuiteResult(
         system=system, title=title, method=method, sources=list(sources),
         conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
         coefficients=coefficients, tests=tests, decision_rule=uncertainty.DECISION_RULE,
@@ -215,6 +215,7 @@ def combine_methods(
         simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
         summary=_summary(comparison, compared), warnings=_warnings(results, compared, failed or {}),
     )  # fmt: skip
+    return uncertainty.withhold(result, [f"{label}: {text}" for label, r in results.items() for text in r.withheld])
 
 
 def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
