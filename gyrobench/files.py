@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and their digests."""
+"""Files that are written whole or not at all, their digests, and the files of an FMU."""
 
 from __future__ import annotations
 
@@ -32,3 +32,10 @@ def sha256(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def unzip_fmu(path: Path, folder: Path) -> None:
+    """Unzip what a run needs of an FMU: all but its sources and its documentation, which are most of its files."""
+    from fmpy import extract
+
+    extract(str(path), str(folder), include=lambda name: not name.startswith(("sources/", "documentation/")))

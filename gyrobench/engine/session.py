@@ -21,7 +21,7 @@ from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import ReferenceEngine, initial_state, initialize
 from gyrobench.engine.run_driver import EngineStopped, ProgressReport, run_to_end
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import sha256
+from gyrobench.files import sha256, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
 from gyrobench.system.parameters import defaults, resolve
@@ -126,10 +126,8 @@ class Session:
         return "native"
 
     def _load_instance(self, slot: str, path: Path, timeout: float) -> FmuInstance:
-        from fmpy import extract
-
         folder = self.folder / slot
-        extract(str(path), str(folder))
+        unzip_fmu(path, folder)
         if slot in self.isolate:
             from gyrobench.engine.isolated_instance import IsolatedInstance
 

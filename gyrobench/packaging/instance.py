@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Protocol
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.errors import GyrobenchError
+from gyrobench.files import unzip_fmu
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.loading import load_part
 
@@ -128,7 +129,8 @@ class Fmu:
         self._own = like is None
         if like is None:
             self.description = fmpy.read_model_description(str(path), validate=False)
-            self.folder = Path(fmpy.extract(str(path), tempfile.mkdtemp(prefix="gyrobench-")))
+            self.folder = Path(tempfile.mkdtemp(prefix="gyrobench-"))
+            unzip_fmu(path, self.folder)
         else:
             self.description, self.folder = like.description, like.folder
         self.three = self.description.fmiVersion.startswith("3")
