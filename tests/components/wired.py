@@ -94,9 +94,9 @@ class Wired:
         if "sampler" in self.parts and self.parts["sampler"].count > count:
             self.rows.append({key: getattr(self.parts["sampler"], key) for key in ROW})
 
-    def run(self, h: float, most: float) -> list[dict[str, float]]:
-        """Steps until the plan is done; the rows of the sampler."""
-        while self.parts["sequencer"].done == 0.0:
+    def run(self, h: float, most: float, rows: int | None = None) -> list[dict[str, float]]:
+        """Steps until the plan is done, or the sampler has given so many rows; its rows."""
+        while self.parts["sequencer"].done == 0.0 and len(self.rows) != rows:
             assert self.t < most, f"the plan is not done after {most} s"
             self.step(h)
         return self.rows
