@@ -21,9 +21,10 @@ class TableServo(AxisTable):
 
         L(s) = G K_g H_g C(s) / ( s [ (J s + D) (J_g s + C_g) + H_g2 ] (1 + lag s) ),   |L(j crossover)| = 1
 
-    Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w stay near zero; then the networks are preset
-    and the fine loop closes.  All linear terms are integrated exactly; load, limit and square law of the motor are
-    taken once in each internal step and stay out of the linearization.
+    Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w stay near zero, or u alone for so long that
+    w - omega_d must have been slow; then the networks are preset and the fine loop closes.  All linear terms
+    are integrated exactly; load, limit and square law of the motor are taken once in each internal step and stay out of
+    the linearization.
 
     Not modelled: stiction before breakaway, wobble, torsion between motor and plate, air bearing and slip-ring
     follower (their torque comes in by `torque`), carrier ripple, stops, drop-out from the fine loop.
@@ -66,7 +67,7 @@ class TableServo(AxisTable):
     capture_damping = Parameter(1.2, "1", "damping ratio while capturing, by the tachometer", above=0.0)
     capture_speed = Parameter(pi / 90.0, "rad/s", "speed limit while capturing (2 deg/s)", above=0.0)
     capture_angle = Parameter(8.0 * pi / 648000.0, "rad", "fine below this table angle from null (8 arcsec)", above=0.0)
-    capture_slow = Parameter(3e-5, "rad/s", "fine below this rate", above=0.0)
+    capture_slow = Parameter(3e-5, "rad/s", "fine below this rate, or this one against the drift", above=0.0)
     capture_hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
 
     encoder_amplitude = Parameter([0.0, 0.0, 0.0], "rad", "encoder error of orders 1, 2 and encoder_fine")
@@ -105,6 +106,7 @@ class TableServo(AxisTable):
 
     stage = Discrete(DRIVEN, "1", "0 kinematic, 1 capture, 2 fine")
     near_for = Discrete(0.0, "s", "time near null while capturing")
+    slow_for = Discrete(0.0, "s", "time near null and slow while capturing")
     wish = Discrete(0.0, "N.m", "demand of the compensator at the end of the step")
     slope = Discrete(0.0, "N.m/s", "its derivative for u = 0")
     load = Discrete(0.0, "N.m", "M_load without noise")
@@ -270,6 +272,7 @@ class TableServo(AxisTable):
             elif self.stage == DRIVEN:
                 self.stage = CAPTURE
                 self.near_for = 0.0
+                self.slow_for = 0.0
             self.motion.mode_last = self.mode
             self.motion.target_last = self.target
 
@@ -293,9 +296,13 @@ class TableServo(AxisTable):
         volt = self.polarity * self.u
         ready = 0.0
         if self.stage == CAPTURE:
-            near = fabs(self.u) < self.near and fabs(self.spin) < self.capture_slow
+            near = fabs(self.u) < self.near
+            slow = fabs(self.u) < self.near and fabs(self.spin) < self.capture_slow
             self.near_for = self.near_for + self.h if near else 0.0
-            if self.capture == 0.0 or (near and self.near_for >= self.capture_hold):
+            self.slow_for = self.slow_for + self.h if slow else 0.0
+            # w - omega_d is -u' over the sensitivity: its mean in near_for is at most 2 capture_angle / near_for
+            still = self.near_for >= maximum(2.0 * self.capture_angle / self.capture_slow, self.capture_hold)
+            if self.capture == 0.0 or (slow and self.slow_for >= self.capture_hold) or (near and still):
                 ready = 1.0
                 self.stage = FINE
         if self.stage != FINE or ready == 1.0:  # the networks at rest at 0, or preset to what they will see

@@ -29,8 +29,10 @@ def show_system(
     notes: list[str] = []
     paths, _ = resolve_parts(require_slots(system), parts, "native", Bench.find().folder, notes)
     assembly = assemble(system, paths, maps)
-    resolve(assembly, system, 1, defaults(assembly))  # refuses parameters that do not exist
+    parameters = resolve(assembly, system, 1, defaults(assembly))[1]  # refuses parameters that do not exist
     description = describe(assembly)
+    invalid = list(system.check()) or system.check_parameters(parameters)
+    description["notes"] += [f"a run is refused: {p}" for p in invalid]
     if picture is not None:
         from gyrobench.report import diagrams
 

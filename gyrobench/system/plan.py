@@ -22,7 +22,8 @@ class Phase:
     "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned.
     settle: s before the first window.  dwell: s of windows (hold, index, servo).  travel: rad of windows (rate).
     window: length of one window, s (hold, index, servo) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
-    target_y: as target, of the second axis of a table that has two.
+    target_y: as target, of the second axis of a table that has two.  expected: s that the travel of a servo phase is
+    expected to take.
     """
 
     label: str
@@ -34,12 +35,13 @@ class Phase:
     travel: float = 0.0
     window: float = 0.0
     target_y: float = 0.0
+    expected: float = 0.0
 
     def duration(self) -> float:
         """Time of the phase without the way to its target, s."""
         if self.mode == "rate" and self.target:
             return self.settle + self.travel / abs(self.target)
-        return self.settle + self.dwell
+        return self.settle + max(self.dwell, self.expected)
 
 
 @dataclass

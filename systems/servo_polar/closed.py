@@ -22,7 +22,10 @@ from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.servo_regression import BOOK
 from gyrobench.reduction.estimation import regression
 
+from .refusals import turned
+
 Array = NDArray[np.float64]
+WHOLE = 356.0  # degrees that count as a whole turn
 Amplitudes = Mapping[str, float]
 
 
@@ -78,11 +81,16 @@ def reduce(
 ) -> tuple[dict[str, float], dict[str, regression.Fit], str]:  # fmt: skip
     """Our coefficients by the formulas, the harmonic fit of each mount, and why not ("" when all is well).
 
-    start, end (rad), length (s): of the windows.  groups: attitude -> rows.
+    start, end (rad), length (s): of the windows.  groups: attitude -> rows.  Harmonics want a whole turn: least squares
+    over part of one would give them large and correlated errors.
     """
     rate = (end - start) / length
-    both = {m: amplitudes(start[rows], end[rows], rate[rows]) for m, rows in groups.items() if m.startswith("polar")}
+    mounts = {m: rows for m, rows in groups.items() if m.startswith("polar")}
+    parts = {m: turned(start[rows], end[rows]) for m, rows in mounts.items()}
+    both = {m: amplitudes(start[r], end[r], rate[r]) for m, r in mounts.items() if parts[m] >= WHOLE}
     fits = {m: fit for m, (_, fit) in both.items()}
+    if short := [f"{m} turned by {parts[m]:.4g}°" for m in mounts if m not in both]:
+        return {}, fits, f"harmonics want a whole turn; {', '.join(short)}"
     if set(both) != {"polar S", "polar N"}:
         return {}, fits, f"they need both mounts, there is {', '.join(both) or 'none'}"
     found = separate(both["polar S"][0], both["polar N"][0], latitude, g, earth_rate)

@@ -71,7 +71,10 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     truth = run_metadata.truth_of(run, drift.NAMES)
     fitted, reported = model.quantities(site, truth, book)
     shown = [_group(labels, p, phase, held, site, model) for p in labels]
-    found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
+    try:
+        found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
+    except ReductionError as error:
+        raise ReductionError([*error.problems, refusals.turned_words(held, phase, labels)]) from None
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)
@@ -149,13 +152,15 @@ def _composite(
     held: servo_regression.Held,
     site: run_metadata.Site,
 ) -> dict[str, composite.Composite | str]:
-    """Statistics of each phase: what the fit says to go with the angle is removed, in turns all but its constant."""
+    """Statistics of each phase: what the fit says to go with the angle is removed, in whole turns all but its constant,
+    in part of one all but its mean.
+    """
     fitted = found.y - found.est.residual
     out: dict[str, composite.Composite | str] = {}
     for p, label in labels.items():
         mine = phase == p
         constant = float(fitted[mine].mean())
-        if label in POLAR:
+        if label in POLAR and refusals.turned(held.angle_start[mine], held.angle_end[mine]) >= closed.WHOLE:
             constant = float(harmonic.fit(held.angle_start[mine], held.angle_end[mine], fitted[mine]).beta[0])
         d = found.est.residual[mine] + constant
         earth = float((held.axes[mine][0] @ (site.earth_rate * _pole(site)))[0])

@@ -13,6 +13,7 @@ from gyrobench.system.system import Option
 from .measured import MEASURED
 
 TURN = 2.0 * math.pi
+PATIENCE = 2.0  # a turn that nobody asked for may take this many times the time asked for
 
 
 class ServoPolar(ServoTest):
@@ -31,7 +32,7 @@ class ServoPolar(ServoTest):
         ServoTest.options
         | {
             "mounts": Option("S N", str, "mounts in their order: S (input axis against the pole), N (along it)"),
-            "turns": Option(1, int, "turns in each mount, at least", 1, 60),
+            "turns": Option(1, int, "turns in each mount, at least; 0: what the time gives", 0, 60),
             "time": Option(86400.0, "s", "time in each mount, at least", 1.0),
             "window": Option(600.0, "s", "length of a window", 1e-3),
             "dwell": Option(3600.0, "s", "length of each of the two dwells with the input axis east"),
@@ -40,6 +41,7 @@ class ServoPolar(ServoTest):
         }
         | type_b("wobble", "angle1", "angle2")
     )
+    shorter = "give that time, or turns=0 for as much of a turn as the time gives, or turns=1"
     measured_data = MEASURED
     channel_period = 60.0
 
@@ -55,10 +57,13 @@ class ServoPolar(ServoTest):
             window = self["dwell"] / max(1, round(self["dwell"] / self["window"]))
             holds = [Hold(f"x east, y {w}", self["dwell"], window, **common) for w in ("up", "down")]
         angle = 0.0
+        longest = math.inf if "turns" in self.given else PATIENCE * self["time"]
         for mount in self.mounts():
             travel = TURN * self["turns"]
             whole = travel * (1.0 + 1.2 * self["window"] / self["time"])  # the last window may be cut off
-            holds.append(Hold(mount, self["time"], self["window"], start=angle, travel=whole, **common))
+            holds.append(
+                Hold(mount, self["time"], self["window"], start=angle, travel=whole, longest=longest, **common)
+            )
             angle += travel if mount == "polar S" else -travel
         return holds
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
 from gyrobench.reduction.estimation import regression
+from gyrobench.system.families.servo_expectation import capture_problems
 
 from . import geometry
 
@@ -50,6 +51,15 @@ def locked(mount: int, latitude: float, time: float, earth_rate: float, rates: R
     if rates is None and time * earth_rate >= 2.0 * math.pi:
         return geometry.swing(mount, latitude)
     return float(np.max(np.abs(geometry.path(mount, latitude, time, 361, earth_rate, rates)[2])))
+
+
+def lock_by_drift(
+    mount: int, latitude: float, time: float, earth_rate: float, rates: Rates
+) -> tuple[float, float, float] | None:
+    """s, outer and inner angle (rad) at which drift brings a gyro too near to gimbal lock; None: not in ``time``."""
+    t, x, y = geometry.path(mount, latitude, time, 1441, earth_rate, rates)
+    near = np.flatnonzero(np.cos(y) < geometry.LEAST)
+    return (float(t[near[0]]), float(x[near[0]]), float(y[near[0]])) if near.size else None
 
 
 def best_pairs(
@@ -195,11 +205,26 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
 
     earth_rate = parameters.get("site.earth_rate", frames.EARTH_RATE)
     for m in dict.fromkeys(mounts):
-        a = locked(m, options["latitude"], options["time"], earth_rate, rates)
-        if math.cos(a) < geometry.LEAST:
+        lock = lock_by_drift(m, options["latitude"], options["time"], earth_rate, rates)
+        if lock is not None:
+            at, outer, inner = lock
             found.append(
-                f"mount {m}: gimbal lock: with the drift of this gyro its inner angle passes {math.degrees(a):.4g}°, "
-                f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; shorten the time, trim the gyro, or take "
-                "another mount"
+                f"mount {m}: gimbal lock: the drift of this gyro brings its inner angle to {math.degrees(inner):.3g}° "
+                f"after {at:,.0f} s ({at / 3600.0:.3g} h), the outer one then at {math.degrees(outer):.4g}°; "
+                f"±{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed: take a shorter time, trim the gyro, or "
+                "take another mount"
             )
-    return found
+    return found or _capture_problems(parameters, mounts, options["latitude"], earth_rate, rates)
+
+
+def _capture_problems(
+    parameters: Mapping[str, Any], mounts: Sequence[int], latitude: float, earth_rate: float, rates: Rates
+) -> list[str]:
+    """Drift with which the tables would not find the null of their pickoff."""
+    at: dict[str, dict[str, tuple[float, float]]] = {"outer": {}, "inner": {}}
+    for m in dict.fromkeys(mounts):
+        rows = geometry.base(m, latitude)
+        drifts, earth = rates(rows @ -frames.U), rows @ frames.earth_rate_local(latitude, earth_rate)
+        for k, slot in enumerate(at):
+            at[slot][f"mount {m}"] = drifts[k], float(earth[k])
+    return [p for slot, where in at.items() for p in capture_problems(parameters, where, slot)]

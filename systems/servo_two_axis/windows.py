@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from gyrobench import drift, frames
+from gyrobench.reduction.drift.window_regressors import reading_spline
 from gyrobench.reduction.run_metadata import Site
 
 from . import geometry
@@ -113,9 +113,8 @@ def track(windows: Mapping[str, Array], phase: NDArray[np.int_], base: Array) ->
     for rows in stretches(t0, t1, phase):
         knots = np.concatenate([t0[rows], t1[rows[-1:]]])
         at = (t0[rows] + t1[rows])[:, None] / 2.0 + (t1[rows] - t0[rows])[:, None] / 2.0 * NODES
-        k = 5 if knots.size > 5 else 3 if knots.size > 3 else 1
         for j, name in enumerate(("outer", "inner")):
             read = np.concatenate([windows[f"{name}_start"][rows], windows[f"{name}_end"][rows[-1:]]])
-            spline = make_interp_spline(knots - knots[0], read, k)
+            spline = reading_spline(knots - knots[0], read)
             angle[rows, :, j], rate[rows, :, j] = spline(at - knots[0]), spline(at - knots[0], 1)
     return Track(angle, rate, base, t0, t1)

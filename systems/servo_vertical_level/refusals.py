@@ -86,18 +86,20 @@ def unseen(attitudes: Sequence[str]) -> list[str]:
     return [*out, f"Not seen at all, and taken as zero at angles other than 0: {', '.join(found.lost)}."]
 
 
-def option_problems(attitudes: Sequence[str], earth: Mapping[str, float], time: float) -> list[str]:
-    """What is wrong with attitudes and times.  earth: rate along the input axis of the level attitudes, rad/s."""
+def option_problems(
+    attitudes: Sequence[str], rates: Mapping[str, float], time: float, what: str = "the Earth turns"
+) -> list[str]:
+    """What is wrong with attitudes and times.  rates: at which ``what`` the table of the level attitudes, rad/s."""
     known = (*VERTICAL, *LEVEL)
     unknown = [n for n in attitudes if n not in known]
     if unknown or not attitudes:
         return [f"attitude {', '.join(unknown) or 'none'}: there are {'; '.join(known)}"]
     found = []
-    for name, rate in earth.items():
+    for name, rate in rates.items():
         if abs(rate) * time / 2.0 > LIMIT:
             most = 2.0 * LIMIT / abs(rate)
             found.append(
-                f"{name}: the Earth turns the table by {math.degrees(abs(rate) * time):.3g}° in settle and dwell of "
+                f"{name}: {what} the table by {math.degrees(abs(rate) * time):.3g}° in settle and dwell of "
                 f"{time:g} s; 1° either side of level allows {most:.0f} s"
             )
     return found

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from gyrobench import frames
-from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL, on_servo_table
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
 from .measured import MEASURED
 
+DRIFTED = math.radians(0.1)  # a drift that turns a level table by less than this in half a dwell moves no start
 THREE = "x down; x up; x east, z down"
 SIX = "x down; x up; x east, y up; x east, y down; x east, z up; x east, z down"
 #: words for sets of attitudes
@@ -46,7 +50,11 @@ class ServoVerticalLevel(ServoTest):
         return [name.strip() for name in text.split(";") if name.strip()]
 
     def holds(self) -> list[Hold]:
-        """Each dwell begins so that what the Earth turns the table is half before and half after angle 0."""
+        """Each level dwell begins so that what the Earth turns the table is half before and half after angle 0; what
+        the drift turns it too, where that is more than DRIFTED.
+        """
+        from .refusals import LIMIT
+
         holds = []
         common = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"] / self["windows"]}
         for name in self.attitudes() * self["cycles"]:
@@ -54,13 +62,15 @@ class ServoVerticalLevel(ServoTest):
             if name in LEVEL:
                 half = self["settle"] + self["dwell"] / 2.0
                 start = self.earth(name) * half
+                drifted = float(self.expected().rates(name)[0][0]) * half
+                if abs(drifted) > DRIFTED or abs(start) + 2.0 * abs(drifted) > LIMIT:
+                    start -= drifted
             holds.append(Hold(name, start=start, **common))
         return [h for h in holds if h.attitude in SERVO_ATTITUDES]
 
     def earth(self, name: str) -> float:
         """Earth rate along the input axis, rad/s."""
-        local = frames.earth_rate_local(self["latitude"])
-        return float((on_servo_table(name, self["latitude"]) @ local)[0])
+        return float(self.expected().rates(name)[1][0])
 
     def check(self) -> list[str]:
         from .refusals import option_problems
@@ -68,6 +78,14 @@ class ServoVerticalLevel(ServoTest):
         names = self.attitudes()
         known = {n: self.earth(n) for n in names if n in LEVEL}
         return option_problems(names, known, self["settle"] + self["dwell"]) + super().check()
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        from .refusals import option_problems
+
+        names = [n for n in self.attitudes() if n in LEVEL]
+        rates = {n: float(self.expected().table_rate(n)[0]) for n in names}
+        problems = option_problems(names, rates, self["settle"] + self["dwell"], "the Earth and the drift turn")
+        return super().check_parameters(parameters) + (problems if names else [])
 
     def warnings(self) -> list[str]:
         from .refusals import unseen

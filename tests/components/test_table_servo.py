@@ -95,6 +95,24 @@ def test_capture_waits_for_its_time():
         assert track[np.argmax(track[:, 5] == 1.0), 0] == pytest.approx(max(hold, H), abs=1.1 * H)
 
 
+@pytest.mark.parametrize("degrees_per_hour", [20.0, -60.0])
+def test_capture_of_a_gyro_that_drifts(degrees_per_hour):
+    """Above capture_slow (6.2 deg/h) u alone tells: near null for 2 capture_angle / capture_slow = 2.585 s, in which
+    the mean rate against the drift is below capture_slow.  Before, the tachometer holds the float away from null by
+    H/C 2 damping omega_d / capture_rate; after it the table turns with the drift.
+    """
+    omega_d = math.radians(degrees_per_hour) / 3600.0
+    loop = Loop(h=1e-3, capture=1, gyro_parameters={"D_F": omega_d})
+    track = loop.run(2.5)
+    assert not track[:, 5].any()
+    assert abs(track[-1, 6]) == pytest.approx(4.0 / 3.0 * 2.4 * abs(omega_d) / (8.0 * math.pi), rel=1e-3)
+    track = loop.run(0.6)
+    fine = track[:, 5] == 1.0
+    assert fine[-1] and track[np.argmax(fine), 0] == pytest.approx(2.585, abs=0.01)
+    track = loop.run(1.0)
+    assert np.mean(track[500:, 2]) == pytest.approx(omega_d, rel=1e-6) and abs(track[-1, 6]) < 0.01 * ARCSEC
+
+
 # ------------------------------------------------------------------------------------------- load torques
 def settled(loop, duration=1.0):
     """Torque that the loop holds, from the static angle error of the gyro's pickoff."""

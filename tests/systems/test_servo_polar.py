@@ -15,6 +15,7 @@ from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rat
 from gyrobench import frames
 from gyrobench.engine.session import RunError, Session, run
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.system.parameters import resolve
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError
 
@@ -128,11 +129,73 @@ def test_dwells_that_are_missing_are_asked_for(day: Any) -> None:
         load_system(NAME).reduce(part)
 
 
-def test_less_than_a_turn_is_refused(day: Any) -> None:
-    keep = np.abs(day.windows["angle_end"]) < 5.0
-    part = type(day)({k: v[keep] for k, v in day.windows.items()}, {}, day.run)
-    with pytest.raises(ReductionError, match=r"\(polar S\) turned .* a whole turn is needed"):
-        load_system(NAME).reduce(part)
+def part_of(record: Any, degrees: float) -> Any:
+    """The record with what each mount turned by up to ``degrees``."""
+    w = record.windows
+    keep = np.zeros(w["phase"].size, dtype=bool)
+    for p in np.unique(w["phase"]):
+        mine = w["phase"] == p
+        keep |= mine & (np.abs(w["angle_end"] - w["angle_start"][mine][0]) < math.radians(degrees))
+    return type(record)({k: v[keep] for k, v in w.items()}, {}, record.run)
+
+
+@pytest.mark.parametrize("degrees", [340.0, 180.0, 120.0])
+def test_part_of_a_turn_is_enough_for_least_squares(day: Any, degrees: float) -> None:
+    """Rank and condition decide; the harmonics alone want a whole turn, and say so."""
+    result = load_system(NAME).reduce(part_of(day, degrees))
+    assert result.rank == 9
+    for c in result.coefficients:
+        assert c.closed is None and abs(c.estimate - c.truth) < 1e-6, c.name
+    assert [h["n"] for h in result.harmonics if h["n"] < 3] == []
+    assert any("harmonics want a whole turn; polar S turned by" in w for w in result.warnings)
+
+
+def test_too_little_of_a_turn_is_refused(day: Any) -> None:
+    with pytest.raises(
+        ReductionError, match=r"condition number [\d.]+ above 1000[^-]*- the mounts turned by polar S 27"
+    ):
+        load_system(NAME).reduce(part_of(day, 30.0))
+
+
+def test_large_unbalance(polar: Session) -> None:
+    """D_S of a full Earth rate: within a window the rate changes by percents, and the regressors follow it (an even
+    turn was 2e-3 deg/h off at D_S = 15 deg/h/g).  Drift and Earth rate are fifty times larger than in a real day.
+    """
+    values = {**DAY50, **QUIET, "gyro.J": 2e-7, "table.capture_rate": 200.0, "gyro.D_S": 50.0 * 15.0 * DPH}
+    for c in load_system(NAME).reduce(polar.run(values)).coefficients:
+        assert abs(c.estimate - c.truth) / 50.0 < 2e-8, c.name
+
+
+def test_length_of_the_plan_is_that_of_the_turn(polar: Session) -> None:
+    """Each mount lasts as long as drift and Earth rate take for the travel, to a window; D_S = 10 deg/h/g makes that
+    16 % more than 2 pi / W: mean of 1 / (1 - r cos theta) is 1 / sqrt(1 - r2), r = 10 0.698 / 15.04 = 0.46.
+    """
+    values = {**DAY50, **QUIET, "table.capture_rate": 200.0, "gyro.D_S": 500.0 * DPH}
+    system = polar.system.with_values(values)
+    resolve(polar.assembly, system, 1, polar.base)
+    record = polar.run(values)
+    t0, t1, phase = (record.windows[c] for c in ("t_start", "t_end", "phase"))
+    for number, planned in enumerate(system.plan().phases, 1):
+        if planned.travel > 0.0:
+            assert planned.expected > 1.1 * DAY50["time"]
+            assert t1[phase == number][-1] - t0[phase == number][0] == pytest.approx(planned.expected, abs=13.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        # 378 deg at W - 1.0 deg/h (D_F, D_I gamma s, ...): 26.9 h
+        (
+            {"time": "4h"},
+            r"polar S: to turn by 378° takes 9\d,\d{3} s .* not 14,400 s, and the whole plan 19\d,\d{3} s",
+        ),
+        # 30 deg/h/g * 0.698 = 20.9 deg/h against 15.04 + 1.0: the table stays where cos theta = -0.69, 133 deg
+        ({"gyro.D_S": "30deg/h"}, r"polar S: never turns by 363°: after 133° the drift .* equal to the Earth rate"),
+    ],
+)
+def test_length_or_standstill_is_foreseen(polar: Session, values: dict[str, Any], text: str) -> None:
+    with pytest.raises(InvalidConfigurationError, match=text):
+        polar.run(values)
 
 
 def test_table_that_does_not_follow_is_refused(day: Any) -> None:

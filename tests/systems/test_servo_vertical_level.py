@@ -126,6 +126,38 @@ def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], te
         bench.run(values)
 
 
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        # 30 + 0.3 deg/h (D_O = 0.1: y up is Y = -1, 29.9) for 610 s: 5.07 deg; 2 deg / 29.9 deg/h = 241 s
+        ({"gyro.D_F": "30deg/h"}, "x east, y up: the Earth and the drift turn the table by 5.07° .* allows 241 s"),
+        # 2 * 1.2 * 301 deg/h / (50 rad/s) = 14.4 arcsec
+        ({"gyro.D_F": "300deg/h", "dwell": 5.0}, "would not capture the gyro: a drift of 301 °/h .* keep it 14.4″"),
+    ],
+)
+def test_drift_that_ends_the_plan_is_foreseen(bench: Session, values: dict[str, Any], text: str) -> None:
+    with pytest.raises(InvalidConfigurationError, match=text):
+        bench.run({**SHORT, "dwell": 600.0, "settle": 10.0, **values})
+
+
+def test_ordinary_gyro_of_ten_degrees_an_hour(bench: Session) -> None:
+    """The loop closes above capture_slow; dwells start on the other side of level by what the drift turns the table,
+    10 deg/h 305 s = 0.85 deg.  D_OS comes in by the sine of that, at most 0.02 0.015 = 3e-4 deg/h at the ends, and is
+    taken for slow noise.
+    """
+    values = {**QUIET, "cycles": 1, "gyro.D_F": "10deg/h"}
+    record = bench.run(values)
+    windows, _ = held(record)
+    level = windows.axes[:, 0, 2] ** 2 < 0.5
+    ends = np.concatenate([windows.angle_start, windows.angle_end])[np.tile(level, 2)]
+    assert abs(np.max(ends) + np.min(ends)) < math.radians(0.02) and 0.8 < math.degrees(np.max(ends)) < 0.91
+    for c in load_system(NAME).reduce(record).coefficients:
+        assert abs(c.estimate - c.truth) < 6e-4, c.name
+    exact = bench.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0})
+    for c in load_system(NAME).reduce(exact).coefficients:
+        assert abs(c.estimate - c.truth) < 2e-6, c.name
+
+
 def test_beyond_a_degree_is_refused(bench: Session) -> None:
     record = bench.run({**SHORT, **QUIET})
     phase = next(r.phase for r in record.run.plan if r.label == "x east, z up")

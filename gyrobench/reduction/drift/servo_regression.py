@@ -4,9 +4,10 @@
 
 omega_d is the drift of gyrobench.drift in precession sign, omega_M that of Hu 1981 in torque sign (BOOK maps one to the
 other, CROSS-MAP).  A window says what the table turned from its first to its last reading, so the data are exact means,
-and neighbours share a reading.  Regressors are averaged over the window as the data are.
+and neighbours share a reading.  Regressors are averaged over the window as the data are, along a curve in time through
+the readings: the rate of a gyro with a large unbalance changes within a window.
 
-Not modelled: change of the rate inside a window beyond an even turn, and J/H times the angular acceleration of the case
+Not modelled: J/H times the angular acceleration of the case
 about the output axis, which the gyro cannot tell from a rate: (J/H) theta' (c omega_E,z - s omega_E,y), with the Earth
 rate along y and z at angle 0; 5e-7 deg/h at most, nothing with the table axis along the pole.
 """
@@ -62,7 +63,7 @@ class Held:
     def seen(self, local: Array) -> Array:
         """Return a vector in ENU in gyro axes at the 12 nodes of each window: (n, 12, 3)."""
         v = self.axes @ local
-        a = window_regressors.Turning(self.angle_start, self.angle_end, self.t_start, self.t_end, self.axes).nodes()
+        a = window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
         c, s = np.cos(a), np.sin(a)
         x, y, z = (v[:, k, None] for k in range(3))
         out: Array = np.stack([np.broadcast_to(x, a.shape), c * y + s * z, c * z - s * y], axis=-1)

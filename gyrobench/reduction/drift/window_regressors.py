@@ -1,9 +1,10 @@
 """What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rates along its
 axes.
 
-During a window the table turns evenly from angle_start to angle_end.  Averages are Gauss-Legendre sums over the
-angle, exact to rounding for windows up to a radian; no harmonic is damped by the averaging [AVG-SINC] because the
-regressors are averaged like the data.  Not modelled: change of the table rate inside a window.
+During a window a driven table turns evenly from angle_start to angle_end, one that its gyro holds along a curve through
+the readings.  Averages are Gauss-Legendre sums over the time, exact to rounding for windows up to a radian; no harmonic
+is damped by the averaging [AVG-SINC] because the regressors are averaged like the data.  Not modelled: change of the
+rate of a driven table inside a window.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
 
 from gyrobench import drift
 from gyrobench.frames import G0, pole
 
 Array = NDArray[np.float64]
-_NODES, _WEIGHTS = leggauss(12)
+NODES, _WEIGHTS = leggauss(12)
 _WEIGHTS = _WEIGHTS / 2.0
 
 
@@ -36,8 +38,33 @@ class Turning:
         """Angles (n, 12) at which a window is averaged."""
         half = (self.angle_end - self.angle_start) / 2.0
         middle = (self.angle_end + self.angle_start) / 2.0
-        out: Array = middle[:, None] + half[:, None] * _NODES
+        out: Array = middle[:, None] + half[:, None] * NODES
         return out
+
+
+def reading_spline(times: Array, readings: Array) -> BSpline:
+    """Return the curve through successive readings, of fifth order where there are enough of them."""
+    n = times.size
+    return make_interp_spline(times, readings, 5 if n > 5 else 3 if n > 3 else 1)
+
+
+def held_nodes(angle_start: Array, angle_end: Array, t_start: Array, t_end: Array) -> Array:
+    """Angles (n, 12) at the nodes in time of windows of a table that turns as its gyro lets it, not evenly.
+
+    Windows that share their readings follow one curve through them, :func:`reading_spline`; one that stands alone is
+    taken as an even turn.
+    """
+    length = t_end - t_start
+    apart = np.abs(t_start[1:] - t_end[:-1]) > 1e-6 * length[1:]
+    apart |= np.abs(angle_start[1:] - angle_end[:-1]) > 1e-3 * np.abs(angle_end[1:] - angle_start[1:])
+    out = np.empty((length.size, NODES.size))
+    for rows in np.split(np.arange(length.size), np.flatnonzero(apart) + 1):
+        first, last = rows[0], rows[-1]
+        knots = np.concatenate([t_start[rows], t_end[last : last + 1]]) - t_start[first]
+        curve = reading_spline(knots, np.concatenate([angle_start[rows], angle_end[last : last + 1]]))
+        middle = (knots[1:] + knots[:-1]) / 2.0
+        out[rows] = curve(middle[:, None] + length[rows, None] / 2.0 * NODES)
+    return out
 
 
 def misread(turning: Turning, n: int, size: float) -> list[Turning]:

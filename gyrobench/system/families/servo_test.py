@@ -8,6 +8,8 @@ it.  [LOOP-TABLE-SERVO, MEAS-SERVO]
 
 from __future__ import annotations
 
+import contextlib
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,10 +18,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gyrobench import drift, frames
 from gyrobench.attitudes import SERVO_ATTITUDES
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.servo_expectation import Expected, capture_problems
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.part_values import PartValues
@@ -46,7 +50,7 @@ TRACKING = {
 @dataclass(frozen=True)
 class Hold:
     """A phase in which the gyro holds the table: attitude, start angle (rad), s of settling, dwell and windows, rad
-    that must be turned at least.
+    that must be turned at least, s that this may take.
     """
 
     attitude: str
@@ -55,6 +59,7 @@ class Hold:
     settle: float
     start: float = 0.0
     travel: float = 0.0
+    longest: float = math.inf
 
 
 def stand_parameters(directions: Iterable[tuple[int, int]]) -> dict[str, Any]:
@@ -99,9 +104,23 @@ class ServoTest(TableTest):
             mount="standard uncertainty of the input axis against the table axis",
         )
     )
+    shorter: ClassVar[str] = "ask for less travel"  # what to do where a travel takes too long
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, "stand.base", "stand.mounts")
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "table.rumble")
     channels: ClassVar[tuple[str, ...]] = ("table.angle", "gyro.u", "gyro.drift")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.gyro_drift: dict[str, float] = {}  # of the gyro in the slot, which parameters() has seen
+        self.earth_rate = frames.EARTH_RATE  # of the site, likewise
+
+    def expected(self) -> Expected:
+        """Return what the table is expected to turn with: the Earth, and the drift of the gyro once it is known."""
+        g = self["gravity"] or frames.G0
+        if not self["gravity"]:
+            with contextlib.suppress(ValueError):  # of values that check() has still to refuse
+                g = frames.normal_gravity(self["latitude"], self["height"])
+        return Expected(self["latitude"], self.earth_rate, g / frames.G0, self.gyro_drift)
 
     @abstractmethod
     def holds(self) -> Sequence[Hold]:
@@ -109,16 +128,19 @@ class ServoTest(TableTest):
 
     def plan(self) -> Plan:
         """Each hold after a phase that brings the table to its start angle with the float caged."""
-        phases = []
+        phases, expected = [], self.expected()
         for h in self.holds():
+            known = h.attitude in SERVO_ATTITUDES  # check() says where not
+            travel = expected.travel_time(h.attitude, h.start, h.travel) if known else 0.0
             to = {"label": f"{h.attitude}: to the start", "mode": "index", "target": h.start, "settle": 1.0}
             phases.append(Phase(face=FACE, dwell=0.1, window=0.1, **to))  # type: ignore[arg-type]
-            phases.append(
-                Phase(h.attitude, "servo", FACE, settle=h.settle, dwell=h.dwell, travel=h.travel, window=h.window)
-            )
+            times = {"settle": h.settle, "dwell": h.dwell, "expected": travel if math.isfinite(travel) else 0.0}
+            phases.append(Phase(h.attitude, "servo", FACE, travel=h.travel, window=h.window, **times))
         return Plan(phases, {FACE: ON_TABLE})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
+        self.gyro_drift = {n: float(parts[f"gyro.{n}"]) for n in drift.NAMES if f"gyro.{n}" in parts}
+        self.earth_rate = float(parts["site.earth_rate"]) if "site.earth_rate" in parts else frames.EARTH_RATE
         names = (p.label.partition(":")[0] for p in self.plan().phases)
         return {
             **super().parameters(parts),
@@ -139,7 +161,28 @@ class ServoTest(TableTest):
                 f"table.index_rate = {rate:g} rad/s: the cage holds the float up to cage.i_max gyro.k = "
                 f"{limit * parameters['gyro.k']:.3g} rad/s; index more slowly"
             )
-        return problems
+        return problems or self._hold_problems(parameters)
+
+    def _hold_problems(self, parameters: Mapping[str, Any]) -> list[str]:
+        """Return what drift and Earth rate make of the holds: no capture, a turn that never ends or takes too long."""
+        expected, rates, problems = self.expected(), {}, []
+        for h in self.holds():
+            omega_d, earth = expected.rates(h.attitude, h.start)
+            rates[h.attitude] = float(omega_d[0]), float(earth[0])
+            time = expected.travel_time(h.attitude, h.start, h.travel)
+            if math.isinf(time):
+                at = math.degrees(expected.rest_angle(h.attitude, h.start, h.travel) - h.start)
+                problems.append(
+                    f"{h.attitude}: never turns by {math.degrees(h.travel):.4g}°: after {at:.3g}° the drift of this "
+                    f"gyro is equal to the Earth rate and the table stays; {self.shorter}"
+                )
+            elif time > h.longest:
+                problems.append(
+                    f"{h.attitude}: to turn by {math.degrees(h.travel):.4g}° takes {time:,.0f} s with the drift and "
+                    f"Earth rate expected, not {h.dwell:,.0f} s, and the whole plan {self.plan().duration():,.0f} s; "
+                    f"{self.shorter}"
+                )
+        return list(dict.fromkeys(problems)) or capture_problems(parameters, rates)
 
 
 def laboratory_data(template: str, known: Sequence[str]) -> MeasuredData:
