@@ -6,7 +6,8 @@
     1,0,60,0,2.5,0.1432
 
 The first line that is not a comment is the header: ``name [unit]`` for each column, no unit for pure numbers.  Lines
-``# key = value`` give circumstances.  Comma, semicolon or tab separates; the decimal sign is a point.
+``# key = value`` give circumstances.  Comma, semicolon or tab separates; the decimal sign is a point or, where a
+semicolon or a tab separates, a comma.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
@@ -25,7 +26,10 @@ import numpy as np
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
 
-MAX_LISTED = 8  # problems of one kind listed before "and n more"
+MAX_LISTED = 8  # row numbers listed before "and n more"
+SCANNED = 50  # lines below the header that tell the decimal sign
+DECIMAL_POINT = re.compile(r"[-+]?\d*\.\d+([eE][-+]?\d+)?")
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
 class DataError(GyrobenchError):
@@ -57,6 +61,7 @@ WINDOW_COLUMNS = (
     Column("std", "A", "standard deviation of the samples", required=False),
     Column("n", "1", "number of samples", required=False, whole=True),
     Column("flagged", "1", "suspect samples", required=False, whole=True),
+    Column("temperature", "K", "mean temperature", required=False),
 )
 
 
@@ -67,7 +72,73 @@ def read_lines(file: Path) -> list[str]:
         return data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         row = data[: error.start].count(b"\n") + 1
-        raise DataError(file, [f"row {row}: not UTF-8 text; save the table as CSV (UTF-8)"]) from None
+        raise DataError(file, [_not_utf8(row)]) from None
+
+
+@dataclass(frozen=True)
+class Factor:
+    """SI = factor value + offset."""
+
+    factor: float
+    offset: float
+
+    def to_si(self, values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return values * self.factor + self.offset if self.offset else values * self.factor
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands above the rows of a CSV file, and how they are written."""
+
+    names: list[str]  # of the columns, with units
+    comments: dict[str, str]
+    line: int  # number of the header line, from 1
+    delimiter: str
+    decimal_comma: bool
+
+
+def read_head(file: Path) -> Head:
+    """Return header and comments of a file of any length.  Raises DataError for none, and for text not in UTF-8."""
+    comments: dict[str, str] = {}
+    with Path(file).open("rb") as lines:
+        for number, data in enumerate(lines, 1):
+            try:
+                line = data.decode("utf-8-sig" if number == 1 else "utf-8").rstrip("\r\n")
+            except UnicodeDecodeError:
+                raise DataError(file, [_not_utf8(number)]) from None
+            if line.lstrip().startswith("#"):
+                _comment(line, comments)
+            elif line.strip():
+                delimiter, names = _split_header(line)
+                below = (next(lines, b"").decode("ascii", "replace") for _ in range(SCANNED))
+                cells = (c.strip() for text in below for c in text.split(delimiter))
+                return Head(names, comments, number, delimiter, delimiter != "," and _decimal_comma(cells))
+    raise DataError(file, ["no header line"])
+
+
+def _comment(line: str, into: dict[str, str]) -> None:
+    key, sign, value = line.lstrip("# \t").partition("=")
+    if sign:
+        into[key.strip()] = value.strip()
+
+
+def _split_header(line: str) -> tuple[str, list[str]]:
+    delimiter = max(",;\t", key=line.count)
+    return delimiter, [h.strip() for h in next(csv.reader([line], delimiter=delimiter))]
+
+
+def _decimal_comma(cells: Iterable[str]) -> bool:
+    """True where numbers have decimal commas and none has a point: 1,234 beside 0.5 may be a thousand and more."""
+    found = False
+    for c in cells:
+        if DECIMAL_POINT.fullmatch(c):
+            return False
+        found = found or DECIMAL_COMMA.fullmatch(c) is not None
+    return found
+
+
+def _not_utf8(row: int) -> str:
+    return f"row {row}: not UTF-8 text; save the table as CSV (UTF-8)"
 
 
 def read_measured(
@@ -84,31 +155,27 @@ def read_measured(
     table: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
         if line.lstrip().startswith("#"):
-            key, sign, value = line.lstrip("# \t").partition("=")
-            if sign:
-                meta[key.strip()] = value.strip()
+            _comment(line, meta)
         elif line.strip():
             table.append((number, line))
     if not table:
         raise DataError(file, ["no header line"])
-    head = table[0][1]
-    delimiter = max(",;\t", key=head.count)
-    header = [h.strip() for h in next(csv.reader([head], delimiter=delimiter))]
+    delimiter, header = _split_header(table[0][1])
     rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
+    if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
+        rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
     expected = {c.name: c for c in columns}
-    factors, problems = _header(header, expected)
-    incomplete = [f"row {n}: {len(r)} cells, the header has {len(header)}" for n, r in rows if len(r) != len(header)]
-    if len(incomplete) > MAX_LISTED:
-        incomplete = [*incomplete[:MAX_LISTED], f"and {len(incomplete) - MAX_LISTED} more rows"]
-    problems += incomplete
+    places, problems = header_places(header, expected)
+    if short := [(n, len(r)) for n, r in rows if len(r) != len(header)]:
+        problems.append(f"{_rows([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
     if not rows:
         problems.append("no rows below the header")
     if problems:
         raise DataError(file, problems)
     columns_si = {}
-    for name, (k, factor, offset) in factors.items():
+    for name, (k, factor) in places.items():
         values, invalid = _numbers(name, [(n, r[k]) for n, r in rows], expected[name].whole)
-        columns_si[name] = values if expected[name].whole else values * factor + offset if offset else values * factor
+        columns_si[name] = values if expected[name].whole else factor.to_si(values)
         problems += invalid
     if not problems:
         problems += _repeats(columns_si, [n for n, _ in rows], time)
@@ -117,9 +184,9 @@ def read_measured(
     return columns_si, meta
 
 
-def _header(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str, tuple[int, float, float]], list[str]]:
-    """Return place, factor and offset of each expected column, and the problems of the header."""
-    places: dict[str, tuple[int, float, float]] = {}
+def header_places(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str, tuple[int, Factor]], list[str]]:
+    """Return place and factor of each expected column, and the problems of the header."""
+    places: dict[str, tuple[int, Factor]] = {}
     problems = []
     for k, text in enumerate(header):
         match = re.fullmatch(r"([^\[\]]+?)\s*(?:\[(.*)\])?", text)
@@ -141,7 +208,7 @@ def _header(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str
         if u.exponents != units.unit(column.unit).exponents:
             problems.append(f"column '{name}': wrong unit [{unit}]: units that fit: {fits}")
             continue
-        places[name] = (k, u.factor, u.offset)
+        places[name] = (k, Factor(u.factor, u.offset))
     known = {t.split("[")[0].strip() for t in header}
     for c in expected.values():
         if c.required and c.name not in known:
@@ -151,36 +218,53 @@ def _header(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str
     return places, problems
 
 
+def _rows(numbers: list[int]) -> str:
+    """Return row numbers as "row 3" or "rows 3, 4 and 58 more (60 rows)"."""
+    if len(numbers) == 1:
+        return f"row {numbers[0]}"
+    text = "rows " + ", ".join(map(str, numbers[:MAX_LISTED]))
+    more = len(numbers) - MAX_LISTED
+    return text + (f" and {more} more ({len(numbers)} rows)" if more > 0 else "")
+
+
 def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.ndarray[Any, Any], list[str]]:
-    values, problems = [], []
+    values: list[float] = []
+    invalid: dict[str, list[tuple[int, str]]] = {}  # what is wrong -> rows and cells
     for n, text in cells:
         try:
             x = float(text)
         except ValueError:
             x = math.nan
         if not math.isfinite(x):
-            comma = "; the decimal sign is a point" if re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text) else ""
-            problems.append(f"row {n}, column '{name}': '{text}' is not a finite number{comma}")
+            comma = "; the decimal sign is a point" if DECIMAL_COMMA.fullmatch(text) else ""
+            invalid.setdefault(f"is not a finite number{comma}", []).append((n, text))
         elif whole and x != math.floor(x):
-            problems.append(f"row {n}, column '{name}': {text} must be an integer")
+            invalid.setdefault("must be an integer", []).append((n, text))
         values.append(x)
-    if len(problems) > MAX_LISTED:
-        problems = [*problems[:MAX_LISTED], f"column '{name}': and {len(problems) - MAX_LISTED} more"]
+    problems = []
+    for what, where in invalid.items():
+        cell = where[0][1] if what.startswith("must") else f"'{where[0][1]}'"
+        others = "" if len({text for _, text in where}) == 1 else f" (row {where[0][0]}, and others alike)"
+        problems.append(f"{_rows([n for n, _ in where])}, column '{name}': {cell} {what}{others}")
     array = np.array(values)
     return (array.astype(np.int64) if whole and not problems else array), problems
 
 
 def _repeats(columns: Mapping[str, np.ndarray[Any, Any]], numbers: list[int], time: str | None) -> list[str]:
-    problems: list[str] = []
     first_row: dict[tuple[float, ...], int] = {}
+    twice = []
     for n, row in zip(numbers, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
         if row in first_row:
-            problems.append(f"row {n}: the same as row {first_row[row]}")
+            twice.append((n, first_row[row]))
         first_row.setdefault(row, n)
-    if time is not None and time in columns and not problems:
-        t = columns[time]
-        for k in np.flatnonzero(np.diff(t) <= 0.0)[:MAX_LISTED]:
-            problems.append(
-                f"row {numbers[k + 1]}: {time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {numbers[k]})"
-            )
-    return problems
+    if twice:
+        return [f"{_rows([n for n, _ in twice])}: the same as row {twice[0][1]}" + (" and others" * (len(twice) > 1))]
+    if time is None or time not in columns:
+        return []
+    t = columns[time]
+    back = np.flatnonzero(np.diff(t) <= 0.0)
+    if not back.size:
+        return []
+    k = int(back[0])
+    first = f"{time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {numbers[k]})"
+    return [f"{_rows([numbers[j + 1] for j in back.tolist()])}: {first}" + (", and others alike" * (back.size > 1))]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import DataError, read_lines
+from gyrobench.record.csv_reader import DataError, read_head, read_lines
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import Day, RecordError
 
@@ -71,10 +71,10 @@ def read_runs(file: Path, system: str) -> Record | None:
 
     Raises DataError for folders that are not runs of ``system``, a run named twice, or fewer than two.
     """
+    if read_head(file).names != ["run"]:
+        return None
     lines = [t.strip() for t in read_lines(file)]
     lines = [t for t in lines if t and not t.startswith("#")]
-    if not lines or lines[0].strip('"') != "run":
-        return None
     names = [t.strip('"') for t in lines[1:]]
     problems = [f"{n}: named twice" for n in sorted({n for n in names if names.count(n) > 1})]
     if len(names) < 2:

@@ -94,11 +94,14 @@ def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[
 def finish(result: R, record: Record) -> R:
     """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete.
 
-    Measured data without a statement of type B pass nothing: u is of type A alone.
+    Measured data without a statement of type B pass nothing: u is of type A alone.  What was left out of measured time
+    series is a warning too.
     """
     result.provenance = record.run.as_dict()
-    if record.run.measured and not record.run.type_b_stated:
-        uncertainty.withhold(result, [NO_TYPE_B], ["pass"])
+    if record.run.measured:
+        result.warnings[:0] = record.run.notes
+        if not record.run.type_b_stated:
+            uncertainty.withhold(result, [NO_TYPE_B], ["pass"])
     if not record.run.complete:
         stopped = record.run.stopped_at or 0.0
         result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before the end of its plan.")

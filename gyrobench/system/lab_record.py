@@ -5,7 +5,8 @@
     # phase 1 = static 3
     phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA]
 
-Comments named like an option set it; ``phase N`` names the attitude the rows with this number were taken in.
+Comments named like an option set it; ``phase N`` names the attitude the rows with this number were taken in.  A file
+with the column ``time`` instead of t_start and t_end holds time series, see :mod:`gyrobench.system.lab_series`.
 """
 
 from __future__ import annotations
@@ -17,13 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError, read_measured
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError, read_head, read_measured
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
+from gyrobench.system.lab_series import is_time_series, windows_of_series
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
+SERIES = """\
+Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
+#   `voltage` of a pickoff), one `angle` for its two, and `flag`; `phase` is 0 while moving or settling.  Without the
+#   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length."""
 TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b")
 
 
@@ -43,6 +49,8 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
         *(wrap(text, 116, subsequent_indent="  ") if names else []),
         f"{', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them.",
     ]
+    if "t_start" in lines[-1] and "mean" in lines[-1]:
+        notes.append(SERIES)
     return "\n".join([*lines[:head], *(f"# {note}" for note in notes), *lines[head:]]) + "\n"  # fmt: skip
 
 
@@ -58,7 +66,12 @@ def read_record(
     phases.  columns, time: as of read_measured; where windows are expected, std, n and flagged are filled in.  texts:
     comments that are kept as they are.  Raises DataError, and InvalidValueError for an option that does not fit.
     """
-    windows, comments = read_measured(data, columns, time)
+    head = read_head(data)
+    windows: dict[str, np.ndarray[Any, Any]] = {}
+    series, left_out = is_time_series(head, columns), ""
+    comments = head.comments
+    if not series:
+        windows, comments = read_measured(data, columns, time)
     said = {**comments, **values}
     for name in values:
         if name not in system.options and name not in texts and not (attitudes and name.startswith("phase ")):
@@ -74,9 +87,12 @@ def read_record(
                 f"'{name}' is not given: write '# {name} = {example}' in the file or --set {name}={example}"
             )
     problems += _type_b_problems(system, said.get("type_b", ""))
+    if series and not problems:
+        named = attitudes(system) if attitudes else None
+        windows, said, left_out = windows_of_series(system, data, head, columns, said, named)
     plan: list[PlanRow] = []
     if attitudes is not None:
-        plan, unclear = _plan(windows["phase"], said, attitudes(system))
+        plan, unclear = _plan(windows.get("phase", np.empty(0)), said, attitudes(system))
         problems += unclear
     if problems:
         raise DataError(data, problems)
@@ -87,6 +103,7 @@ def read_record(
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
     run = measured_run(system, plan, {n: said[n] for n in texts if n in said})
     run.window_units = {c.name: c.unit for c in columns if c.name in windows}
+    run.notes = [left_out] if left_out else []
     return Record(windows, {}, run)
 
 

@@ -52,10 +52,12 @@ def reduce_measured(
     reader = _measured_data(system).read
     file = find_specification(spec)
     limits = load_limits(file)
-    text = data.read_bytes()
     record = reader(system, data, values)
-    record.run.data = DataFile(file=data.name, sha256=hashlib.sha256(text).hexdigest())
-    identity = hashlib.sha256(text + repr(sorted(values.items())).encode()).hexdigest()[:8]
+    with data.open("rb") as content:
+        digest = hashlib.file_digest(content, "sha256")
+    record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
+    digest.update(repr(sorted(values.items())).encode())
+    identity = digest.hexdigest()[:8]
     folder = None if in_memory else out or Bench.find().out / system.name / f"measured-{identity}"
 
     def save() -> None:

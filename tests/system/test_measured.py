@@ -57,6 +57,21 @@ def test_findings(tmp_path: Path, old: str, new: str, words: str) -> None:
         read(tmp_path, GOOD.replace(old, new))
 
 
+def test_a_fault_of_many_rows_is_one_line(tmp_path: Path) -> None:
+    head, first, *_ = GOOD.split("\n")[2:]
+    rows = [first.replace("1;0;1", f"1;{60 * k};{k + 1}").replace("0.25", "bad") for k in range(60)]
+    with pytest.raises(DataError) as error:
+        read(tmp_path, "\n".join([head, *rows]))
+    (said,) = error.value.problems
+    assert said.startswith("rows 2, 3, 4, 5, 6, 7, 8, 9 and 52 more (60 rows), column 'mean'") and "'bad'" in said
+
+
+def test_decimal_commas(tmp_path: Path) -> None:
+    """Beside a decimal point a comma is none: it may separate thousands."""
+    columns, _ = read(tmp_path, GOOD.replace(".", ","))
+    assert columns["mean"] == pytest.approx([2.5e-4, -5e-4]) and columns["angle_end"] == pytest.approx([0.1, 0.2])
+
+
 def test_empty_files(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no header line"):
         read(tmp_path, "# nothing\n")

@@ -1,0 +1,165 @@
+"""Time series of a laboratory: averaged as the sampler does, whatever the file looks like; phases by number, motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.engine.session import Session
+from gyrobench.record import time_series
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.record import Record
+from gyrobench.system.system import System, load_system
+
+TUMBLE = "tumble_single_axis"
+RATE = 0.08  # rad/s: a turn in 79 s
+PLAN: dict[str, Any] = {"rate": RATE, "windows": 24, "dwell": 20.0, "settle": 2.0}
+HEAD = "# latitude = 45.75deg\n# k = 17.2deg/h/mA\n# attitude = E U -N\n"
+
+
+def load(name: str, values: Mapping[str, Any] | None = None) -> System:
+    return load_system(name).with_values(values or {})
+
+
+@pytest.fixture(scope="module")
+def run() -> Record:
+    """A tumble of 210 s with every sample of angle, current and phase."""
+    system = load(TUMBLE)
+    system.channels = ("sequencer.phase", "sequencer.gate", "table.angle", "rebalance.i_read")
+    system.channel_period = system.step
+    with Session(system) as session:
+        return session.run(PLAN)
+
+
+def exported(run: Record, file: Path, phase: bool, cut: slice = slice(None), **comments: str) -> Path:
+    c = {n: v[cut] for n, v in run.channels.items()}
+    columns = [c["time"], np.degrees(c["table.angle"]), c["rebalance.i_read"] * 1e3]
+    names = ["time [s]", "angle [deg]", "current [mA]"]
+    said = {"latitude": "45.75deg", "k": f"{run.run.parameters['gyro.k']!r}", "rate": f"{RATE} rad/s", **comments}
+    said |= {n: f"{PLAN[n]}" for n in ("windows", "dwell", "settle")}
+    if phase:
+        columns.append(np.where(c["sequencer.gate"] > 0.0, c["sequencer.phase"], 0.0))
+        names.append("phase")
+        said |= {f"phase {row.phase}": row.face for row in run.run.plan}
+    head = [f"# {k} = {v}" for k, v in said.items()]
+    np.savetxt(file, np.column_stack(columns), "%.17g", ",", header="\n".join([*head, ",".join(names)]), comments="")
+    return file
+
+
+def test_series_of_a_run_give_its_windows_and_its_result(run: Record, tmp_path: Path) -> None:
+    system = load(TUMBLE, PLAN)
+    expected = {c.name: c for c in system.reduce(run).coefficients}
+    read = load(TUMBLE).read_measured(exported(run, tmp_path / "phases.csv", True), {})
+    for name in ("phase", "n", "flagged"):
+        assert np.array_equal(read.windows[name], run.windows[name])
+    for name in ("t_start", "t_end", "angle_start", "angle_end", "mean"):
+        np.testing.assert_allclose(read.windows[name], run.windows[name], rtol=1e-11, atol=1e-14)
+    np.testing.assert_allclose(read.windows["std"], run.windows["std"], rtol=1e-6)
+    for c in load(TUMBLE).reduce(read).coefficients:
+        assert abs(c.estimate - expected[c.name].estimate) < 1e-6 * expected[c.name].u
+    # by the motion alone windows begin some samples aside, in other noise
+    found = load(TUMBLE).read_measured(exported(run, tmp_path / "motion.csv", False), {})
+    assert [row.face for row in found.run.plan] == ["static 3", "mount 1", "static 4", "mount 2"]
+    assert np.array_equal(found.windows["phase"], run.windows["phase"])
+    assert np.max(np.abs(found.windows["t_start"] - run.windows["t_start"])) < 0.1
+    for c in load(TUMBLE).reduce(found).coefficients:
+        assert abs(c.estimate - expected[c.name].estimate) < 0.5 * expected[c.name].u
+
+
+@pytest.mark.parametrize(
+    ("comments", "cut", "words"),
+    [
+        ({"phase 1": "mount 1", "phase 2": "static 3"}, slice(None), r"phase 1 'mount 1.* \(turning at .*rest at 0°"),
+        ({"dwell": "15s"}, slice(None), r"phase 1 'static 3' is expected \(17 s long\), but the table is at rest"),
+        ({"rate": "0.1 rad/s"}, slice(None), "phase 2 'mount 1, against the Earth' is expected"),
+        ({}, slice(0, 110_000), "phase 3 'static 4' is not there"),
+        ({"phase 1": "static 3", "phase 2": "mount 1"}, slice(None), "after the last phase of the plan, 2, the table"),
+        ({"phase 1": "lying"}, slice(None), "phase lying is not in the plan; it has static 3, mount 1"),
+    ],
+)  # fmt: skip
+def test_motion_that_does_not_fit_the_plan(
+    run: Record, tmp_path: Path, comments: dict[str, str], cut: slice, words: str
+) -> None:
+    file = exported(run, tmp_path / "motion.csv", False, slice(cut.start, cut.stop, 10))
+    if cut.stop:
+        file = exported(run, tmp_path / "motion.csv", False, slice(0, cut.stop, 10))
+    text = file.read_text("utf-8")
+    for name, value in comments.items():
+        text = "\n".join(line for line in text.split("\n") if not line.startswith(f"# {name} ="))
+        text = f"# {name} = {value}\n{text}"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=words):
+        load(TUMBLE).read_measured(file, {})
+
+
+def fixed(
+    tmp_path: Path, rows: list[str], head: str = "time [s],current [mA]", more: str = "# window = 2s\n"
+) -> Record:
+    (tmp_path / "series.csv").write_text(HEAD + more + "\n".join([head, *rows, ""]), encoding="utf-8-sig")
+    return load("fixed_position").read_measured(tmp_path / "series.csv", {})
+
+
+def ramp(seconds: int = 20) -> list[list[str]]:
+    """4 samples a second of i = t mA: windows of 2 s have the means 1, 3, 5 ..."""
+    return [[f"{0.25 * k:.2f}", f"{0.25 * k:.2f}"] for k in range(4 * seconds + 1)]
+
+
+def test_windows_by_hand_in_any_dialect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mean 1 mA, std of 0.25, 0.5 .. 2 = 0.25 sqrt(8 9/12) mA; also with commas, tabs and in blocks of few rows."""
+    plain = fixed(tmp_path, [",".join(r) for r in ramp()])
+    np.testing.assert_allclose(plain.windows["mean"], np.arange(1.0, 20.0, 2.0) * 1e-3, rtol=1e-14)
+    np.testing.assert_allclose(plain.windows["std"], 0.25e-3 * math.sqrt(6.0), rtol=1e-12)
+    assert plain.windows["t_end"].tolist() == [2.0 * k for k in range(1, 11)] and plain.run.notes == []
+    german = fixed(tmp_path, [";".join(r).replace(".", ",") for r in ramp()], "time [s];current [mA]")
+    tabs = fixed(tmp_path, ["\t".join(r) for r in ramp()], "time [s]\tcurrent [mA]")
+    monkeypatch.setattr(time_series, "BLOCK", 100)
+    blocks = fixed(tmp_path, [",".join(r) for r in ramp()])
+    for other in (german, tabs, blocks):
+        for name, values in plain.windows.items():
+            np.testing.assert_allclose(other.windows[name], values, rtol=1e-12)
+
+
+@pytest.mark.parametrize("block", [1 << 20, 100])
+def test_gaps_are_counted_and_their_windows_dropped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    """Rows at 3.00 (empty) and 7.25 (NaN) and all of 10.5 .. 14.5 are missing: windows 2, 4, 6, 7 and 8 of 10.
+
+    Of window 8, from 14 s, the rows from 14.75 s are there: a mean of these would not be one of the window.
+    """
+    monkeypatch.setattr(time_series, "BLOCK", block)
+    rows = ramp()
+    rows[12][1], rows[29][1] = "", "nan"
+    read = fixed(tmp_path, [",".join(r) for k, r in enumerate(rows) if not 42 <= k <= 58])
+    assert read.windows["t_start"].tolist() == [0.0, 4.0, 8.0, 16.0, 18.0]
+    np.testing.assert_allclose(read.windows["mean"], [1e-3, 5e-3, 9e-3, 17e-3, 19e-3], rtol=1e-14)
+    (said,) = read.run.notes
+    assert "time series: 3 (2 rows without a value left out); 5 of 10 windows hold a gap and were dropped" in said
+
+
+def test_what_is_wrong_is_said_once_with_its_count(tmp_path: Path) -> None:
+    rows = ramp()
+    wrong = [[t, "bad" if k > 20 else i] for k, (t, i) in enumerate(rows)]
+    with pytest.raises(DataError, match=r"column 'current': 60 cells are not a number, the first: 'bad'") as error:
+        fixed(tmp_path, [",".join(r) for r in wrong])
+    assert len(error.value.problems) == 1
+    with pytest.raises(DataError, match=r"3 rows have not the 2 cells of the header; the first: '0.00,0.00,9'"):
+        fixed(tmp_path, [",".join(r) + (",9" if k < 3 else "") for k, r in enumerate(rows)])
+    with pytest.raises(DataError, match=r"time does not increase in 1 rows; the first: 1 s after 1\.25 s"):
+        fixed(tmp_path, [",".join(r) for r in (*rows[:4], rows[5], rows[4], *rows[6:])])
+    with pytest.raises(DataError, match="column 'current': no unit"):
+        fixed(tmp_path, [",".join(r) for r in rows], "time [s],current")
+    with pytest.raises(DataError, match="no window is complete"):
+        fixed(tmp_path, [",".join(r) for r in rows], more="# window = 30s\n")
+
+
+def test_servo_phases_want_their_column(tmp_path: Path) -> None:
+    file = tmp_path / "servo.csv"
+    file.write_text("# latitude = 45deg\ntime [s],angle [deg]\n0,0\n1,0.1\n2,0.2\n", encoding="utf-8")
+    with pytest.raises(DataError, match="not recognised by the motion of the table: add a column 'phase'"):
+        load("servo_vertical_level").read_measured(file, {})
