@@ -11,7 +11,7 @@ from gyrobench.commands import console
 from gyrobench.commands.arguments import apply_values
 from gyrobench.commands.progress_display import ProgressDisplay
 from gyrobench.report import FORMATS
-from gyrobench.report.plain_text import format_ranking, format_result
+from gyrobench.report.plain_text import format_result, format_summary
 from gyrobench.result import NO_VERDICT
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -77,7 +77,7 @@ def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> No
     if comparison.note:
         console.print_note(f"note: {comparison.note}")
     paths = comparison.write(out or comparison_folder(runs))
-    console.print_report_files(paths, None if as_json else format_ranking(comparison.document))
+    console.print_report_files(paths, None if as_json else format_summary(comparison.document))
 
 
 def _print_outcome(outcome: RunOutcome | SuiteOutcome, as_json: bool) -> str:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report import plots, ranking_section, responses
+from gyrobench.report import comparison_summary, plots, ranking_section, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
+    BulletList,
     Cell,
     CollapsedBlocks,
     Column,
@@ -37,7 +38,8 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
     """Return the content of ``comparison.json``.
 
     Differences are run minus baseline; their standard uncertainty takes the runs as independent and the
-    larger coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty.
+    larger coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty,
+    ``beyond_chance`` when it would among all of them.
     Raises ValueError for fewer than two results, repeated names or an unknown baseline.
     """
     names = [name for name, _ in results]
@@ -51,7 +53,7 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
     facts = [_facts(doc) for doc in docs]
     keys = list(dict.fromkeys(k for f in facts for k in f))
     rows = [row for key in keys for row in _spread(key, [f.get(key) for f in facts])]
-    content = {
+    content: Json = {
         "baseline": baseline,
         "runs": [
             {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")} | {"name": name}
@@ -70,6 +72,8 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
             for name in dict.fromkeys(r["name"] for doc in docs for r in doc["responses"])
         ],
     }
+    comparison_summary.mark_beyond_chance(content["measures"])
+    content["summary"] = comparison_summary.sentences(content, letters(len(docs)))
     return {"schema": SCHEMA, "report_id": content_hash(content), **content}
 
 
@@ -139,7 +143,8 @@ def page(doc: Json) -> Page:
     titles = dict.fromkeys(run["title"] for run in runs)
     with styled():
         sections = [
-            ranking_section.section(doc, [_letter(k) for k in range(len(runs))]),
+            Section("Summary", "summary", [BulletList(doc["summary"])]),
+            ranking_section.section(doc, letters(len(runs))),
             Section("Differing settings", "differs", [_runs(doc), *_differing(doc)]),
             Section("Coefficients", "coefficients", [*_estimates(doc), *_differences(doc)]),
             Section(
@@ -154,7 +159,7 @@ def page(doc: Json) -> Page:
 
 def side_tables(doc: Json) -> list[Table]:
     """Return the tables that stand side by side: runs, ranking, estimates and differences."""
-    ranked = ranking_section.section(doc, [_letter(k) for k in range(len(doc["runs"]))]).blocks
+    ranked = ranking_section.section(doc, letters(len(doc["runs"]))).blocks
     blocks = [_runs(doc), *ranked, *_estimates(doc), *_differences(doc)]
     return [b for b in blocks if isinstance(b, Table)]
 
@@ -169,6 +174,11 @@ def side_figure(doc: Json, key: str) -> str:
 
 def _letter(k: int) -> str:
     return LETTERS[k] if k < len(LETTERS) else f"R{k + 1}"
+
+
+def letters(count: int) -> list[str]:
+    """Return what the runs of a comparison are called: A, B, C ..."""
+    return [_letter(k) for k in range(count)]
 
 
 def _runs(doc: Json) -> Table:

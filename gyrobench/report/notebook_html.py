@@ -180,5 +180,6 @@ def comparison_html(doc: dict[str, Any], note: str) -> str:
     from gyrobench.report.comparison_page import side_figure, side_tables
 
     head = [paragraph("Comparison; the first run is the baseline", strong=True), warning_list([note] if note else [])]
+    head += [paragraph(sentence) for sentence in doc["summary"]]
     figure = figure_html(side_figure(doc, f"nb{doc['report_id']}"))
     return fragment(*head, *map(table_html, side_tables(doc)), figure)

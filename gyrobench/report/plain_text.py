@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
+from gyrobench.report.ranking_section import place_text
 from gyrobench.result import NO_VERDICT, Result, SuiteResult
 
 
@@ -73,16 +74,23 @@ def format_comparison(comparison: Mapping[str, Any]) -> str:
     return "\n".join([*table, "", note, *([format_ranking(comparison)] if comparison["ranking"] else [])])
 
 
+def format_summary(comparison: Mapping[str, Any]) -> str:
+    """Return the opening sentences of a comparison and its ranking."""
+    return "\n".join([*comparison["summary"], "", format_ranking(comparison)]).rstrip() + "\n"
+
+
 def format_ranking(comparison: Mapping[str, Any]) -> str:
     """Return the runs of a comparison in the order of the measure that ranks them; empty where none does."""
     ranked = comparison["ranking"]
     if not ranked:
         return ""
     rows = [["", "run", ranked["name"], "u", "unit", "ratio to the smallest"]]
-    for place, entry in enumerate(ranked["order"], 1):
+    for entry in ranked["order"]:
         value, u = (write_number(entry[k], entry["u"]).text for k in ("value", "u"))
         over = write_number(entry["over_best"], significant=3).text
-        rows.append([str(place), comparison["runs"][entry["run"]]["name"], value, u, ranked["unit"], over])
+        rows.append(
+            [place_text(ranked, entry), comparison["runs"][entry["run"]]["name"], value, u, ranked["unit"], over]
+        )
     for entry in ranked["void"]:
         rows.append(["–", comparison["runs"][entry["run"]]["name"], "void", "–", ranked["unit"], "–"])
     reasons = [f"{comparison['runs'][v['run']]['name']} has no rank: {v['reason']}" for v in ranked["void"]]

@@ -12,11 +12,12 @@ Json = dict[str, Any]
 
 
 def ranking(docs: Sequence[Json]) -> Json:
-    """Return ``{"name", "unit", "meaning", "order": [{"run", "value", "u", "over_best", "apart"}], "void": [{"run",
-    "reason"}]}``; {} when the runs name no measure, or not the same one.
+    """Return ``{"name", "unit", "meaning", "order": [{"run", "place", "value", "u", "over_best", "apart"}], "void":
+    [{"run", "reason"}]}``; {} when the runs name no measure, or not the same one.
 
-    apart: whether a run is farther from the one before it than the expanded uncertainty of their difference.  void:
-    runs without a value of the measure, or with the verdict void; they have no rank.
+    place: runs that cannot be told from the first of their place share it.  apart: whether a run is farther from that
+    one than the expanded uncertainty of their difference; None for the first of all.  void: runs without a value of the
+    measure, or with the verdict void; they have no rank.
     """
     (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
     if others or not name:
@@ -38,16 +39,23 @@ def ranking(docs: Sequence[Json]) -> Json:
     known.sort(key=lambda entry: entry[:2])
     best, _, first = known[0]
     order: list[Json] = []
-    before: Json | None = None
-    for value, k, c in known:
+    leader, place = first, 1
+    for count, (value, k, c) in enumerate(known, 1):
         apart = None
-        if before is not None and None not in (c["u"], before["u"]):
-            U = max(c["k"], before["k"]) * math.hypot(c["u"], before["u"])
-            apart = value - before["estimate"] > U
+        if count > 1 and None not in (c["u"], leader["u"]):
+            U = max(c["k"], leader["k"]) * math.hypot(c["u"], leader["u"])
+            apart = value - leader["estimate"] > U
+        if apart or (apart is None and value > leader["estimate"]):
+            leader, place = c, count
         over = value / best if best else None
-        order.append({"run": k, "value": value, "u": c["u"], "over_best": over, "apart": apart})
-        before = c
+        order.append({"run": k, "place": place, "value": value, "u": c["u"], "over_best": over, "apart": apart})
     return {"name": name, "unit": first["unit"], "meaning": first["meaning"], "order": order, "void": void}
+
+
+def place_text(ranked: Json, entry: Json) -> str:
+    """Return "1", or "1 =" where several runs share the place."""
+    shared = sum(e["place"] == entry["place"] for e in ranked["order"]) > 1
+    return f"{entry['place']} =" if shared else str(entry["place"])
 
 
 def section(doc: Json, letters: Sequence[str]) -> Section:
@@ -56,28 +64,26 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
     if not ranked:
         return Section("Ranking", "ranking", [])
     rows = []
-    for place, entry in enumerate(ranked["order"]):
+    for index, entry in enumerate(ranked["order"]):
         run = doc["runs"][entry["run"]]
-        path = ("ranking", "order", place)
-        apart = {None: "–", True: "yes", False: "no"}[entry["apart"]]
+        path = ("ranking", "order", index)
         rows.append(
             Row(
                 [
-                    text_cell(str(place + 1), "strong"),
+                    text_cell(place_text(ranked, entry), "strong"),
                     text_cell(letters[entry["run"]]),
                     text_cell(run["name"]),
                     text_cell(run["instrument"]),
                     number_cell(doc, (*path, "value"), entry["u"]),
                     number_cell(doc, (*path, "u"), entry["u"]),
                     number_cell(doc, (*path, "over_best"), significant=3),
-                    text_cell(apart),
                 ]
             )
         )
     for entry in ranked["void"]:
         run = doc["runs"][entry["run"]]
         known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"]), text_cell(run["instrument"])]
-        rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(3))]))
+        rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(2))]))
     unit = ranked["unit"] if ranked["unit"] != "1" else ""
     columns = [
         Column("rank"),
@@ -86,8 +92,11 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
         Column("instrument"),
         Column(ranked["name"], unit),
     ]
-    columns += [Column("u"), Column("ratio to the smallest"), Column("significantly different from the preceding run")]
-    caption = f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first."
+    columns += [Column("u"), Column("ratio to the smallest")]
+    caption = (
+        f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first, runs that cannot be told "
+        "apart (=) share a rank."
+    )
     note = "Noise reduction alone does not improve the rank: the measure is the deviation from the truth."
     blocks: list[Any] = [Table(columns, rows, caption), Text(note, quiet=True)]
     if ranked["void"]:

@@ -196,7 +196,8 @@ def coefficients(doc: Json) -> list[Any]:
 def _uncertainty(doc: Json) -> str:
     """Return what u is: combined, or of type A only, and why."""
     run = doc["provenance"]
-    if any(c["u_a"] is None or c["u"] > c["u_a"] * (1.0 + 1e-9) for c in doc["coefficients"]):
+    valued = [c for c in doc["coefficients"] if c["u"] is not None]
+    if any(c["u_a"] is None or c["u"] > c["u_a"] * (1.0 + 1e-9) for c in valued):
         return "combined standard uncertainty"
     if not run.get("measured"):
         return "standard uncertainty, type A only (no uncertainty of type B was set)"

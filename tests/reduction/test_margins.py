@@ -46,7 +46,7 @@ def test_gain_margin_of_three_lags() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_margins_are_those_of_python_control(seed: int) -> None:
-    """Random loops with up to 3 integrators, resonances, a delay: the same crossings to 1e-6, in a tenth of the time."""
+    """Random loops with up to 3 integrators, resonances, a delay: the same crossings to 1e-6, ten times as fast."""
     rng = np.random.default_rng(seed)
     f = grid(0.05, 200.0)
     s = 2j * np.pi * f

@@ -33,6 +33,33 @@ def test_order_and_what_lies_apart():
     assert [e["run"] for e in ranking["order"]] == [1, 2, 0]
     assert [e["apart"] for e in ranking["order"]] == [None, False, True]
     assert [e["over_best"] for e in ranking["order"]] == pytest.approx([1.0, 1.25, 2.0])
+    assert [e["place"] for e in ranking["order"]] == [1, 1, 3]
+    text = format_ranking(comparison(runs(0.02, 0.01, 0.0125)))
+    assert text.splitlines()[1].split()[:2] == ["1", "="]
+    assert text.splitlines()[-1].startswith("3")
+
+
+def test_ties_are_told_from_the_first_of_their_place():
+    """0.010, 0.012, 0.014: each is near the one before it, but the third is apart from the first, U = 0.0028."""
+    order = comparison(runs(0.010, 0.012, 0.014))["ranking"]["order"]
+    assert [e["place"] for e in order] == [1, 1, 3]
+
+
+def test_a_comparison_opens_with_what_chance_does_not_explain():
+    """Three differences of D_F and those of the other measures, which are the same in all runs: 0.1 of U = 0.0028."""
+    doc = comparison(runs(0.01, 0.0101, 0.05))
+    a_b, a_c, *others = doc["summary"]
+    assert a_b.startswith("B (run 1) agrees with A (run 0) in all")
+    assert "C (run 2) differs from A (run 0) in D_F (" in a_c and "by +0.0400 ± 0.0028" in a_c
+    assert "The smallest D_F" in others[-1] and "A (run 0), B (run 1) share the first place" in others[-1]
+
+
+def test_a_difference_of_a_little_more_than_u_is_no_opening():
+    """3.1 u of one in 18 differences: beyond its own U = 2 sqrt 2 u, within Bonferroni's 2.99/1.96 of it."""
+    doc = comparison(runs(0.01, 0.01 + 1.1 * 2.0 * math.sqrt(2.0) * 0.001))
+    assert "agrees" in doc["summary"][0] and "1 more difference exceeds its own U" in doc["summary"][1]
+    d = doc["measures"][0]["differences"][1]
+    assert d["significant"] and not d["beyond_chance"]
 
 
 def test_a_best_of_zero_has_no_ratio():
