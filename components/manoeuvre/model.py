@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import Number, asin, atan2, clip, cos, index, pi, sin, sqrt
+from gyrobench.component.math import Number, asin, atan2, clip, cos, cross, index, pi, sin, sqrt, vector
 
 NONE = [0.0] * 99
 
@@ -21,13 +21,13 @@ class Manoeuvre(Component):
         omega = C (0, w cos(lat), w sin(lat) + turn) + (pitch, roll, yaw)        f = C (a + (0, 0, gravity))
 
     angle is (pitch, roll, heading) in the order heading, pitch, roll [CONV-GIMBALS]: v = R2(roll) R1(pitch)
-    R3(heading) v_ENU, pitch within +-90 deg.  Rates begin and end at once; alpha is 0 (between the jumps it is small).
+    R3(heading) v_ENU, pitch within +-90 deg.  Rates begin and end at once: alpha is their derivative between the jumps.
 
     Not modelled: flight mechanics (bank and turn are given apart), transport rate, change of speed by acceleration.
     Source: our own.
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -49,7 +49,7 @@ class Manoeuvre(Component):
 
     angle = Output("rad", "pitch about x, roll about y, heading about z", shape=(3,))
     omega = Output("rad/s", "inertial rate, vehicle axes", shape=(3,))
-    alpha = Output("rad/s2", "angular acceleration, vehicle axes (0: see there)", shape=(3,))
+    alpha = Output("rad/s2", "angular acceleration, vehicle axes, without the jumps", shape=(3,))
     f = Output("m/s2", "specific force, vehicle axes", shape=(3,))
 
     q = State([1.0, 0.0, 0.0, 0.0], "1", "rotation from vehicle to ENU axes")
@@ -71,9 +71,16 @@ class Manoeuvre(Component):
 
     def open(self) -> Number:
         """Return the factor by which the row acts, 0 while the gate is closed."""
-        on = 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
         f = self.frequency[index(clip(self.phase - 1.0, 0.0, 98.0))]
-        return on * sin(2.0 * pi * f * (self.t - self.opened)) if f > 0.0 else on
+        return self.gated() * (sin(2.0 * pi * f * (self.t - self.opened)) if f > 0.0 else 1.0)
+
+    def opening(self) -> Number:
+        """Return its derivative, 1/s."""
+        w = 2.0 * pi * self.frequency[index(clip(self.phase - 1.0, 0.0, 98.0))]
+        return self.gated() * w * cos(w * (self.t - self.opened))
+
+    def gated(self) -> Number:
+        return 1.0 if self.gate > 0.5 and self.phase > 0.5 and self.phase < 99.5 else 0.0
 
     def flow(self) -> None:
         k = clip(self.phase - 1.0, 0.0, 98.0)
@@ -122,10 +129,14 @@ class Manoeuvre(Component):
         north = across * sin(heading) + ahead * cos(heading)
         rate_n = self.earth_rate * cos(self.latitude)
         rate_u = self.earth_rate * sin(self.latitude) + on * self.turn[index(k)]
+        rises = self.opening()
+        own = vector([self.pitch[index(k)], self.roll[index(k)], self.yaw[index(k)]])
+        given = vector([0.0, 0.0, 0.0])  # the rate of the ENU axes and the turn; rate against the Earth
+        rel = vector([0.0, 0.0, 0.0])
         for j in range(3):
-            self.omega[j] = c[j][1] * rate_n + c[j][2] * rate_u
+            given[j] = c[j][1] * rate_n + c[j][2] * rate_u
+            rel[j] = on * (c[j][2] * self.turn[index(k)] + own[j])
             self.f[j] = c[j][0] * east + c[j][1] * north + c[j][2] * self.gravity
-            self.alpha[j] = 0.0
-        self.omega[0] = self.omega[0] + on * self.pitch[index(k)]
-        self.omega[1] = self.omega[1] + on * self.roll[index(k)]
-        self.omega[2] = self.omega[2] + on * self.yaw[index(k)]
+            self.alpha[j] = rises * (c[j][2] * self.turn[index(k)] + own[j])
+        self.omega = given + on * own
+        self.alpha = self.alpha - cross(rel, given)

@@ -24,14 +24,15 @@ class PlatformFourGimbal(RateServoGimbals):
     beyond that of `release`.  Refused: g2 at its stop; a servo with gain 0 or 2 within 5 deg of pitch 90 deg, unless
     allow_vertical = 1; a release while |g2| > 5 deg.
 
-    `theta_dot`, `theta_4_dot`, `omega`, `alpha` are those at the end of the step, under the inputs held during it.
+    `theta_dot`, `theta_4_dot`, `omega`, `alpha` are those at the end of the step, under the inputs given for
+    it; within it the base turns at omega_b + alpha_b (t - end of the step).
 
     Not modelled: gimbal inertia against base motion (isolation is perfect but for limits), friction, back EMF, dynamics
-    of the fourth servo, reaction of the gyros; alpha_b is not used (alpha is the difference of omega over the step).
+    of the fourth servo, reaction of the gyros (alpha is the difference of omega over the step).
     Source: GSP ch. 5, section 5.2.2, fig. 5-14..5-17; equations of PLATFORM-4GIMBAL, axes of CONV-GIMBALS.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     k = Parameter(30.0, "1/s", "servo of the fourth gimbal", above=0.0)
     gain = Parameter(0, int, "its gain, 0: capped secant of pitch, 1: sign of cos(pitch), 2: constant 1", min=0, max=2)
@@ -89,7 +90,7 @@ class PlatformFourGimbal(RateServoGimbals):
         sr = sin(self.q[ROLL])
         top = self.rate_max
         # rates of the fourth gimbal, its own axes; then e in the axes of the inner roll gimbal without inner rates
-        b = about_y(cos(self.q4), sin(self.q4), self.omega_b)
+        b = about_y(cos(self.q4), sin(self.q4), self.base_rate())
         b[Y] = b[Y] + r4
         e = about_y(cr, sr, about_x(cos(self.q[PITCH]), sin(self.q[PITCH]), b))
         mid = clip(self.s[ROLL] - e[Y], -top, top)

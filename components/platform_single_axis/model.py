@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.blocks.platform import about_x, contact_moved, contact_torque, motor_current, motor_slope
+from gyrobench.component.blocks.platform import about_x, contact_moved, contact_torque, left, motor_current, motor_slope
 from gyrobench.component.math import Number, clip, cos, fabs, sin, sqrt, vector
 
 
@@ -10,12 +10,13 @@ class PlatformSingleAxis(Component):
 
     w inertial rate about x, theta joint angle, n reducer ratio, S = w - omega_b1 the rate against the base:
 
-        p' = n k_t i + M_load + M_gyro + M_bearing + M_unbalance + n (n - 1) J_motor alpha_b1
-        w  = (p - h_gyro) / (J + n2 J_motor)      theta' = S      attitude' = w
+        p' = n k_t i + M_load + M_gyro + M_bearing + M_unbalance
+        w  = (p - h_gyro + n (n - 1) J_motor omega_b1) / (J + n2 J_motor)    theta' = S      attitude' = w
         L i' = v - R i - k_e n S                  |v| <= v_max, |i| <= i_max;   L = 0: i without lag
 
-    p is the momentum of platform and gyro, so that a gyro wired by h_gyro = H sin b couples without delay in p; a gyro
-    wired by M_gyro acts as a torque.  +v turns the platform towards +x.  Unbalance -(u x f)_x, u = mass times offset.
+    p is the momentum of platform, motor and gyro, so that a gyro wired by h_gyro = H sin b couples without delay in p;
+    a gyro wired by M_gyro acts as a torque.  +v turns the platform towards +x.  Unbalance -(u x f)_x, u = mass times
+    offset.
 
     Bearing: viscous friction and an elastic contact that slips (Prandtl element): the contact torque is the spring
     stiction / presliding times the angle from an anchor, with damping 0.5; beyond stiction the anchor is dragged along
@@ -23,11 +24,12 @@ class PlatformSingleAxis(Component):
     whatever the rate, and nothing in it is faster than sqrt(stiction / presliding / J).
 
     Not modelled: backlash and elasticity of the reducer, Stribeck curve, cogging, iron losses, end stops, motion of the
-    platform against its bearing about y and z, base motion within a communication step (held).
+    platform against its bearing about y and z.  Within a communication step the rate of the base is
+    omega_b + alpha_b (t - end of the step).
     Source: Xia 2008, section 4.1; GSP ch. 5, eq. 5-7, 5-24; defaults of PLATFORM-1AXIS.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -81,6 +83,8 @@ class PlatformSingleAxis(Component):
     anchor = Discrete(0.0, "rad", "where the contact is free of torque")
     slipping = Discrete(0.0, "1", "0 sticking, else the sense of slip")
     heavy = Discrete(0.0, "1", "1: there is unbalance")
+    geared = Discrete(0.0, "kg.m2", "n (n - 1) J_motor")
+    f_before = Discrete([0.0, 0.0, 0.0], "m/s2", "f_b at the end of the communication step before")
 
     def start(self) -> None:
         short = self.stiction > 0.0 and self.stiction < self.friction
@@ -102,10 +106,12 @@ class PlatformSingleAxis(Component):
         self.heavy = 1.0 if self.unbalance[0] != 0.0 or self.unbalance[1] != 0.0 else 0.0
         self.angle = self.theta_0
         self.anchor = self.theta_0
-        self.p = self.inertia * (self.omega_b[0] + self.theta_dot_0) + self.h_gyro
+        self.geared = self.ratio * (self.ratio - 1.0) * self.J_motor
+        self.p = self.inertia * (self.omega_b[0] + self.theta_dot_0) - self.geared * self.omega_b[0] + self.h_gyro
+        self.f_before = self.f_b
 
-    def rate(self) -> Number:
-        return (self.p - self.h_gyro) / self.inertia
+    def rate(self, base: Number) -> Number:
+        return (self.p - self.h_gyro + self.geared * base) / self.inertia
 
     def current(self, slip: Number) -> Number:
         emf = self.k_e * self.ratio * slip
@@ -123,14 +129,15 @@ class PlatformSingleAxis(Component):
     def unbalanced(self) -> Number:
         if self.heavy == 0.0:
             return 0.0
-        f = about_x(cos(self.angle), sin(self.angle), self.f_b)
+        f_b = self.f_b - left(self.t, self.step_start, self.step_end) * (self.f_b - self.f_before)
+        f = about_x(cos(self.angle), sin(self.angle), f_b)
         return self.unbalance[1] * f[1] - self.unbalance[0] * f[2]
 
     def flow(self) -> None:
-        w = self.rate()
-        slip = w - self.omega_b[0]
+        base = self.omega_b[0] + (self.t - self.step_end) * self.alpha_b[0]
+        w = self.rate(base)
+        slip = w - base
         m = self.ratio * self.k_t * self.current(slip) + self.M_load + self.M_gyro
-        m = m + self.ratio * (self.ratio - 1.0) * self.J_motor * self.alpha_b[0]
         self.der.p = m + self.bearing(slip) + self.unbalanced()
         self.der.angle = slip
         self.der.turned = w
@@ -141,17 +148,19 @@ class PlatformSingleAxis(Component):
     def tick(self) -> None:
         self.i = clip(self.i, -self.i_max, self.i_max)
         if self.L == 0.0:
-            self.flowed = self.current(self.rate() - self.omega_b[0])
+            self.flowed = self.current(self.rate(self.omega_b[0]) - self.omega_b[0])
         if self.spring > 0.0:
-            slip = self.rate() - self.omega_b[0]
+            slip = self.rate(self.omega_b[0]) - self.omega_b[0]
             moved = contact_moved(
                 self.spring, self.rub, self.presliding, self.reach, self.angle, slip, self.anchor, self.slipping
             )
             self.anchor = moved[0]
             self.slipping = moved[1]
+        if self.t >= self.step_end:
+            self.f_before = self.f_b
 
     def outputs(self) -> None:
-        w = self.rate()
+        w = self.rate(self.omega_b[0])
         slip = w - self.omega_b[0]
         c = cos(self.angle)
         s = sin(self.angle)
@@ -159,7 +168,7 @@ class PlatformSingleAxis(Component):
         self.theta_dot = slip
         turned = about_x(c, s, self.omega_b)
         self.omega = vector([w, turned[1], turned[2]])
-        self.alpha[0] = self.der.p / self.inertia
+        self.alpha[0] = (self.der.p + self.geared * self.alpha_b[0]) / self.inertia
         self.alpha[1] = c * self.alpha_b[1] + s * self.alpha_b[2] + slip * turned[2]
         self.alpha[2] = c * self.alpha_b[2] - s * self.alpha_b[1] - slip * turned[1]
         self.f = about_x(c, s, self.f_b)

@@ -18,12 +18,14 @@ from gyrobench.component.blocks.platform import (
     gimbal_x,
     gimbal_y,
     gimbal_z,
+    left,
     motor_current,
     motor_slope,
+    moved_base,
     rigid,
     with_unbalance,
 )
-from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt
+from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt, vector
 
 ONES = [1.0, 1.0, 1.0]
 
@@ -42,16 +44,19 @@ class PlatformThreeAxis(Component):
     u = mass times offset of a body in its own axes.  Rates of the platform [PLATFORM-3AXIS-KIN]:
     omega = T1 omega_A + T3 omega_b.
 
+    omega_b, alpha_b are those of the end of the communication step; within it both follow Hermite's cubic through them
+    and those of the step before.
+
     Bearings as in platform_single_axis: viscous friction and a contact that sticks, elastic to break-away.  The pitch
     gimbal stops at +-pitch_stop on a spring with damping 0.5; `lock` is 1 beyond lock_angle, where sec(pitch) is large.
     A pitch of 90 deg is refused.
 
     Not modelled: elastic gimbals and shafts, products of inertia, rotors of geared motors (direct drive: their inertia
-    belongs to the gimbals), stops of roll and azimuth, base motion within a communication step (held).
+    belongs to the gimbals), stops of roll and azimuth.
     Source: Xia 2008, section 5.1, eq. 5.1.1-5.1.7; the dynamics are our own model (PLATFORM-3AXIS-DYN).
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -110,6 +115,9 @@ class PlatformThreeAxis(Component):
     heavy = Discrete(0.0, "1", "1: there is unbalance")
     bump = Discrete(0.0, "N.m.s/rad", "damping of the pitch stop")
     pitch = Discrete(0.0, "rad", "pitch, for messages")
+    rate_before = Discrete(NONE, "rad/s", "omega_b at the end of the communication step before")
+    rise_before = Discrete(NONE, "rad/s2", "alpha_b then")
+    f_before = Discrete(NONE, "m/s2", "f_b then")
 
     def start(self) -> None:
         self.refuse(not rigid(self.I_r), "I_r is not of a rigid body: no moment may exceed the sum of the others")
@@ -145,6 +153,12 @@ class PlatformThreeAxis(Component):
         self.pitch = self.theta_0[PITCH]
         beyond = fabs(self.pitch) > self.pitch_stop
         self.refuse(beyond, "theta_0[1] = {pitch} rad must be within the pitch stop, +-{pitch_stop} rad")
+        self.hand_over()
+
+    def hand_over(self) -> None:
+        self.rate_before = self.omega_b
+        self.rise_before = self.alpha_b
+        self.f_before = self.f_b
 
     def flow(self) -> None:
         self.der.q = self.dq
@@ -176,8 +190,17 @@ class PlatformThreeAxis(Component):
         sf = sin(self.q[PITCH])
         ca = cos(self.q[AZ])
         sa = sin(self.q[AZ])
+        wb = vector(self.omega_b)
+        ab = vector(self.alpha_b)
+        y = left(self.t, self.step_start, self.step_end)
+        if y > 0.0:
+            step = self.step_end - self.step_start
+            for k in range(3):
+                m = moved_base(y, step, self.rate_before[k], self.rise_before[k], self.omega_b[k], self.alpha_b[k])
+                wb[k] = m[0]
+                ab[k] = m[1]
         # rates (row 0) and, with q'' = 0, accelerations (row 1) of roll gimbal, pitch gimbal, inner element
-        r = gimbal_y(cr, sr, self.dq[ROLL], 0.0, self.omega_b, self.alpha_b)
+        r = gimbal_y(cr, sr, self.dq[ROLL], 0.0, wb, ab)
         g = gimbal_x(cf, sf, self.dq[PITCH], 0.0, r[0], r[1])
         p = gimbal_z(ca, sa, self.dq[AZ], 0.0, g[0], g[1])
         # torques each body needs, passed outwards
@@ -185,7 +208,7 @@ class PlatformThreeAxis(Component):
         nf = euler_torque(self.I_f, g[1], g[0])
         nr = euler_torque(self.I_r, r[1], r[0])
         if self.heavy == 1.0:
-            fr = about_y(cr, sr, self.f_b)
+            fr = about_y(cr, sr, self.f_b - y * (self.f_b - self.f_before))
             ff = about_x(cf, sf, fr)
             n = with_unbalance(n, self.unbalance[2], about_z(ca, sa, ff))
             nf = with_unbalance(nf, self.unbalance[1], ff)
@@ -223,6 +246,8 @@ class PlatformThreeAxis(Component):
                 )  # fmt: skip
                 self.anchor[k] = moved[0]
                 self.slipping[k] = moved[1]
+        if self.t >= self.step_end:
+            self.hand_over()
 
     def outputs(self) -> None:
         self.theta = self.q

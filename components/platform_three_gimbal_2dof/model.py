@@ -25,14 +25,15 @@ class PlatformThreeGimbal2dof(RateServoGimbals):
     Below |cos m| = 1e-3 the run is refused; with allow_lock = 1 the rate along the normal of the ring plane is given up
     and outer and inner gimbal share the rest: the platform is dragged along.
 
-    `theta_dot`, `omega`, `alpha` are those at the end of the step, under the inputs held during it (0 at the start).
+    `theta_dot`, `omega`, `alpha` are those at the end of the step, under the inputs given for it (0 at the
+    start); within it the base turns at omega_b + alpha_b (t - end of the step).
 
     Not modelled: gimbal inertia against base motion (isolation is perfect but for lock and limits), friction, back EMF,
-    gimbal stops, reaction of the gyros; alpha_b is not used (alpha is the difference of omega over the step).
+    gimbal stops, reaction of the gyros (alpha is the difference of omega over the step).
     Source: GSP ch. 5, section 5.2.1, fig. 5-12, 5-13; equations of PLATFORM-3GIMBAL-2DOF, axes of CONV-GIMBALS.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     mount = Parameter(0, int, "outer gimbal, 0: roll, 1: pitch", min=0, max=1)
     allow_lock = Parameter(0, int, "1: continues in gimbal lock, 0: ends the run", min=0, max=1)
@@ -71,7 +72,7 @@ class PlatformThreeGimbal2dof(RateServoGimbals):
 
     def flow(self) -> None:
         top = self.rate_max
-        e = self.inner_gimbal(self.omega_b)  # base rate there; rate w that comes out
+        e = self.inner_gimbal(self.base_rate())  # base rate there; rate w that comes out
         up = self.s[AZ] - e[Z]
         if self.mount == 0.0:
             cf = cos(self.q[PITCH])

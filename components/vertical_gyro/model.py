@@ -32,7 +32,7 @@ class VerticalGyro(Component):
     Source: GSP ch. 5, section 5.3.1 (text; no equations); VERTICAL-GYRO, PLATFORM-4GIMBAL.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -48,6 +48,7 @@ class VerticalGyro(Component):
 
     omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate of the vehicle, vehicle axes")
     f = Input([0.0, 0.0, 9.80665], "m/s2", "specific force of the vehicle, vehicle axes")
+    alpha = Input([0.0, 0.0, 0.0], "rad/s2", "derivative of omega, vehicle axes")
     T_x = Input(0.0, "N.m", "erection torque about x of the inner element")
     T_y = Input(0.0, "N.m", "erection torque about y of the inner element")
 
@@ -103,13 +104,14 @@ class VerticalGyro(Component):
             r = self.in_ring()
             sense = sign(r[1]) if self.reversal else 1.0
             self.der.g4 = clip(self.k_ring * sense * asin(r[0]), -self.ring_rate, self.ring_rate)
+        w = self.omega + (self.t - self.step_end) * self.alpha  # omega is that of the end of the communication step
         x = self.inner_x()
         y = cross(self.n, x)
         to_x = self.T_x / self.H + self.drift[0] + self.noise.white
         to_y = self.T_y / self.H + self.drift[1] + self.noise.white_y
-        self.der.n[0] = to_x * x[0] + to_y * y[0] - self.omega[1] * self.n[2] + self.omega[2] * self.n[1]
-        self.der.n[1] = to_x * x[1] + to_y * y[1] - self.omega[2] * self.n[0] + self.omega[0] * self.n[2]
-        self.der.n[2] = to_x * x[2] + to_y * y[2] - self.omega[0] * self.n[1] + self.omega[1] * self.n[0]
+        self.der.n[0] = to_x * x[0] + to_y * y[0] - w[1] * self.n[2] + w[2] * self.n[1]
+        self.der.n[1] = to_x * x[1] + to_y * y[1] - w[2] * self.n[0] + w[0] * self.n[2]
+        self.der.n[2] = to_x * x[2] + to_y * y[2] - w[0] * self.n[1] + w[1] * self.n[0]
 
     @sampled(every=1)
     def tick(self) -> None:

@@ -13,6 +13,9 @@ Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut
     ``A = df/dx`` (exact when f is linear in x) or by RK4 with declared substeps;
 3.  the ``@sampled`` methods whose turn it is run, with ``self.t`` at the end of the internal step.
 
+``self.t``, ``self.h`` are the present time and h; ``self.step_start``, ``self.step_end`` are t and t + H, which a part
+needs that follows an input through the communication step instead of holding it.
+
 After the last one ``outputs`` is evaluated and all is checked to be finite but large discrete arrays (memories).
 """
 
@@ -25,6 +28,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.component.composition import (
     EQUATIONS,
+    TIMES,
     ArraySlot,
     ComponentError,
     Derivatives,
@@ -71,6 +75,8 @@ class Component:
 
     t = 0.0
     h = 0.0
+    step_start = 0.0
+    step_end = 0.0
 
     if TYPE_CHECKING:  # names that blocks declare
 
@@ -222,7 +228,7 @@ class Component:
             setattr(self, d.name, floats(d.start))
             if isinstance(d, State):
                 setattr(self.der, d.name, floats(full(0.0, d.shape)))
-        self.t = self.h = 0.0
+        self.t = self.h = self.step_start = self.step_end = 0.0
         self._tick = 0
         self._running = False
         self._dirty = True
@@ -235,8 +241,7 @@ class Component:
             "part": f"{type(self).__name__} {self.version}",
             "v": [self._at(s) for s in self.layout],
             "noise": [getattr(self.noise, n.name) for n in self.noises],
-            "t": self.t,
-            "h": self.h,
+            **{n: getattr(self, n) for n in TIMES},
             "tick": self._tick,
             "running": self._running,
             "dirty": self._dirty,
@@ -251,14 +256,16 @@ class Component:
             self._put(s, x)
         for n, x in zip(self.noises, state["noise"], strict=True):
             setattr(self.noise, n.name, x)
-        self.t, self.h, self._tick = state["t"], state["h"], state["tick"]
+        for time in TIMES:
+            setattr(self, time, state[time])
+        self._tick = state["tick"]
         self._running, self._dirty = state["running"], state["dirty"]
         self._phi, self._phi_h = [list(r) for r in state["phi"]], state["phi_h"]
 
     # ------------------------------------------------------------------ running
     def initialize(self, t0: float = 0.0) -> None:
         """Check parameters and inputs, run ``start`` and ``outputs``.  Raises ComponentError."""
-        self.t = t0
+        self.t = self.step_start = self.step_end = t0
         for s in self.layout:
             if s.section in ("parameter", "input", "state"):
                 x = self._at(s)
@@ -296,6 +303,7 @@ class Component:
         n = max(1, math.ceil(step / largest - 1e-9))
         h = step / n
         self.h = h
+        self.step_start, self.step_end = t, t + n * h
         for k in range(n):
             self.t = t + k * h
             self._tick += 1

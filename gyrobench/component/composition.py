@@ -17,6 +17,7 @@ from gyrobench.component.vectors import copied
 from gyrobench.errors import GyrobenchError
 
 EQUATIONS = ("start", "flow", "outputs")
+TIMES = ("t", "h", "step_start", "step_end")  # present, internal step, start and end of the communication step
 Function = Callable[..., Any]
 
 
@@ -49,7 +50,7 @@ class Block:
     A declaration ``x`` of a block that stands in a part as ``name`` is the part's ``name_x``; ``suffixes`` gives
     another ending, or none.  Keywords of the constructor replace declarations: by another one of the same kind, by a
     start value, or by the name of a declaration of the part, which is then shared.  Equations of a block know its own
-    names (and ``self.t``, ``self.h``, ``self.der``, ``self.noise``); the part calls its procedures by
+    names (and the times, ``self.der``, ``self.noise``); the part calls its procedures by
     ``self.name.procedure(...)``.  In the text of a refusal ``{self}`` is the name under which the block stands.
     """
 
@@ -107,7 +108,7 @@ class View:
             return getattr(part, placed.names[name])
         if name in placed.blocks:
             return part._view(placed.blocks[name])
-        if name in ("t", "h"):
+        if name in TIMES:
             return getattr(part, name)
         if name in ("der", "noise"):
             return _Names(getattr(part, name), placed.names)

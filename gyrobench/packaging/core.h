@@ -286,7 +286,7 @@ static void initialize(Part *p, double t0) {
     static const char *const words[] = {">=", "<=", ">", "<"};
     const double *a = value(p);
     int i, k = 0;
-    p->n.v.t = t0;
+    p->n.v.t = p->n.v.step_start = p->n.v.step_end = t0;
     for (i = 0; i < DX0; i++) { /* parameters, inputs, (outputs), states */
         const char *what = i < U0 ? "parameter" : i < Y0 ? "input" : "state";
         if (i < Y0 || i >= X0) {
@@ -331,6 +331,8 @@ static void do_step(Part *p, double t, double step) {
     n = p->kept.n;
     h = p->kept.h;
     p->n.v.h = h;
+    p->n.v.step_start = t;
+    p->n.v.step_end = t + n * h;
     for (k = 0; k < n; k++) {
         p->n.v.t = t + k * h;
         p->n.v.tick = p->n.v.tick + 1.0;

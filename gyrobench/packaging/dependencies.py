@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 from gyrobench.component import Discrete, Input, Output, State
+from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
 from gyrobench.packaging.source import Code, Source
 
@@ -163,7 +164,7 @@ def followed(source: Source) -> list[str] | None:
         return None
     read = set().union(*(read_names(code, source) for _, code in source.equations["outputs"]))
     declared = source.cls.declarations
-    if any(n in ("t", "h") or n.startswith(("der.", "noise.")) or isinstance(declared.get(n), State) for n in read):
+    if any(n in TIMES or n.startswith(("der.", "noise.")) or isinstance(declared.get(n), State) for n in read):
         return None
     changing = written(source)
     return [n for n in declared if n in read & changing] + [

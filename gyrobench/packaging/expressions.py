@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gyrobench.component import State
+from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
 from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells, words
 from gyrobench.packaging.source import Code, SubsetError, gives_value, local, member, returns
@@ -132,7 +133,7 @@ class Expressions:
         name = self.code.flat(e.attr)
         d = self.declared.get(name)
         if source == "self":
-            if e.attr in ("t", "h"):
+            if e.attr in TIMES:
                 return Place(e.attr, "self", e.attr)
             if d is not None:
                 return Place(member(name), "self", name, d.shape)

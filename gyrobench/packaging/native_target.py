@@ -37,7 +37,7 @@ def _struct(cls: type[Component]) -> str:
         lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
     if cls.noises:
         lines.append(f"    struct {{ double {', '.join(member(n.name) for n in cls.noises)}; }} noise; /* samples */")
-    lines.append("    double t, h, tick; /* time, internal step, count of internal steps */")
+    lines.append("    double t, h, step_start, step_end, tick; /* times as in component.py; count of internal steps */")
     return "\n".join(["typedef struct {", *lines, "} Vars;"])
 
 

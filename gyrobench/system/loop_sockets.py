@@ -22,7 +22,7 @@ def _platform(*shape: int) -> tuple[Connector, ...]:
         inp("M_load", "N.m", f"disturbance torque about the motor axis{axes}", *shape),
         inp("M_gyro", "N.m", "torque of the gyros on the platform, platform axes", *shape, optional=True),
         inp("omega_b", "rad/s", "inertial rate of the base, base axes", 3),
-        inp("alpha_b", "rad/s2", "angular acceleration of the base, base axes", 3),
+        inp("alpha_b", "rad/s2", "angular acceleration of the base, base axes", 3, optional=True),
         inp("f_b", "m/s2", "specific force of the base, base axes", 3, optional=True),
         out("theta", "rad", f"joint angle{axes}", *shape),
         out("theta_dot", "rad/s", f"joint rate{axes}", *shape),
@@ -135,6 +135,7 @@ LOOPS: tuple[Socket, ...] = (
         (
             inp("omega", "rad/s", "inertial rate of the vehicle, vehicle axes", 3),
             inp("f", "m/s2", "specific force of the vehicle, vehicle axes", 3),
+            inp("alpha", "rad/s2", "angular acceleration of the vehicle, vehicle axes", 3, optional=True),
             inp("T_x", "N.m", "erection torque about x of the inner element"),
             inp("T_y", "N.m", "erection torque about y of the inner element"),
             out("pitch", "rad", "pitch of the vehicle as measured"),

@@ -37,7 +37,7 @@ class VerticalGyroBench(LoopTest):
     }
     wires = f"""
         {FLOWN}
-        motion -> gyro: omega f
+        motion -> gyro: omega alpha f
         gyro -> erection: e_x e_y f_inner turn
         erection -> gyro: T_x T_y
     """

@@ -81,7 +81,7 @@ def test_reducer_under_an_accelerated_base():
     p = made(J=2.0, ratio=5.0, J_motor=0.02, **BARE)
     for k in range(1000):
         p.set("alpha_b[1]", 0.3)
-        p.set("omega_b[1]", 0.3e-3 * k)
+        p.set("omega_b[1]", 0.3e-3 * (k + 1))  # at the end of the step
         p.do_step(k * 1e-3, 1e-3)
     assert p.alpha[0] == pytest.approx(5 * 4 * 0.02 * 0.3 / (2.0 + 25 * 0.02), rel=1e-12)
     assert p.omega[0] == pytest.approx(p.alpha[0] * 1.0, rel=1e-9)

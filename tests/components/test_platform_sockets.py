@@ -30,3 +30,13 @@ def test_another_socket_is_refused(tmp_path):
     description = fmpy.read_model_description(str(build("platform_three_axis", out=tmp_path, bench=BENCH)))
     with pytest.raises(SocketMismatchError, match="theta_4"):
         fit(SOCKETS["FourGimbalPlatform"], description, slot="platform")
+
+
+@pytest.mark.parametrize(
+    ("part", "socket"), [("platform_single_axis", "PlatformAxis"), ("platform_four_gimbal", "FourGimbalPlatform")]
+)
+def test_a_platform_without_acceleration_of_the_base_fits(part, socket, tmp_path):
+    """A foreign model may make do with the rate of the base."""
+    description = fmpy.read_model_description(str(build(part, out=tmp_path, bench=BENCH)))
+    description.modelVariables = [v for v in description.modelVariables if not v.name.startswith("alpha_b")]
+    fit(SOCKETS[socket], description, slot=part)

@@ -71,6 +71,27 @@ def with_unbalance(n: Vector, u: Vector, f: Vector) -> Vector:
     return vector([x, y, z])
 
 
+# --------------------------------------------------------------------------------------- base motion
+# Sources run first: what a part is given for a communication step belongs to the end of that step.  Held over it, the
+# base would turn half a step ahead of joints that are integrated.  A master that hands over the values of the beginning
+# of the step moves the base one step late.
+def left(t: Number, start: Number, end: Number) -> Number:
+    """Return the share of the communication step that is still to come, 0 at its end and outside it."""
+    return (end - t) / (end - start) if t < end else 0.0
+
+
+def moved_base(y: Number, step: Number, before: Number, rise: Number, now: Number, slope: Number) -> Vector:
+    """Return (rate, acceleration) where a share y of the step is left, from both at its ends: Hermite's cubic.
+
+    Its acceleration integrates to the change of the rate: a body free of torques keeps its inertial rate whatever the
+    step, and where the rate jumps too.
+    """
+    bend = 3.0 * (before - now) + step * (2.0 * slope + rise)
+    kink = 2.0 * (now - before) - step * (slope + rise)
+    rate = now - y * (step * slope - y * (bend + y * kink))
+    return vector([rate, slope - y * (2.0 * bend + 3.0 * y * kink) / step])
+
+
 # ---------------------------------------------------------------------------------------------- motors
 def motor_current(
     i: Number, i_max: Number, v: Number, v_max: Number, emf: Number, resistance: Number, inductance: Number
@@ -134,7 +155,8 @@ class RateServoGimbals(Component):
         lag s' = rate_gain v + M_load / drag - s
 
     The parts write the derivatives of q and turned, and declare omega, alpha, f, attitude and saturated; alpha is the
-    mean derivative of omega over the step.
+    mean derivative of omega over the step.  Within a communication step the rate of the base is
+    omega_b + alpha_b (t - end of the step).
     """
 
     integrator = "rk4"
@@ -149,7 +171,7 @@ class RateServoGimbals(Component):
     v = Input(NONE, "V", "voltages of the servos, A order")
     M_load = Input(NONE, "N.m", "disturbance torques about the motor axes, A order")
     omega_b = Input(NONE, "rad/s", "inertial rate of the base, base axes")
-    alpha_b = Input(NONE, "rad/s2", "its derivative; not used")
+    alpha_b = Input(NONE, "rad/s2", "its derivative")
     f_b = Input([0.0, 0.0, 9.80665], "m/s2", "specific force, base axes")
 
     theta = Output("rad", "joint angles, A order", shape=(3,))
@@ -165,6 +187,10 @@ class RateServoGimbals(Component):
     def start(self) -> None:
         self.refuse(self.step > self.lag, "step = {step} s must be <= lag = {lag} s")
         self.q = self.theta_0
+
+    def base_rate(self) -> Vector:
+        """Return the inertial rate of the base at the present instant."""
+        return vector(self.omega_b + (self.t - self.step_end) * self.alpha_b)
 
     def flow(self) -> None:
         self.der.s = (self.rate_gain * self.v + self.M_load / self.drag - self.s) / self.lag
