@@ -1,9 +1,10 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
-from gyrobench.component.math import Number, asin, atan2, clip, cos, cross, index, pi, sin, sqrt, vector
+from gyrobench.component.math import Number, asin, atan2, clip, cos, cross, index, pi, sign, sin, sqrt, vector
 
 NONE = [0.0] * 99
+VERTICAL = 1e-24  # square of the cosine of a pitch that counts as 90 deg
 
 
 class Manoeuvre(Component):
@@ -21,7 +22,8 @@ class Manoeuvre(Component):
         omega = C (0, w cos(lat), w sin(lat) + turn) + (pitch, roll, yaw)        f = C (a + (0, 0, gravity))
 
     angle is (pitch, roll, heading) in the order heading, pitch, roll [CONV-GIMBALS]: v = R2(roll) R1(pitch)
-    R3(heading) v_ENU, pitch within +-90 deg.  Rates begin and end at once: alpha is their derivative between the jumps.
+    R3(heading) v_ENU, pitch within +-90 deg; roll is 0 at +-90 deg.  Rates begin and end at once: alpha is their
+    derivative between the jumps.
 
     Not modelled: flight mechanics (bank and turn are given apart), transport rate, change of speed by acceleration.
     Source: our own.
@@ -119,9 +121,14 @@ class Manoeuvre(Component):
         c[2][0] = 2.0 * (x * z + w * y)
         c[2][1] = 2.0 * (y * z - w * x)
         c[2][2] = 1.0 - 2.0 * (x * x + y * y)
-        heading = atan2(-c[1][0], c[1][1])
-        self.angle[0] = asin(clip(c[1][2], -1.0, 1.0))
-        self.angle[1] = atan2(-c[0][2], c[2][2])
+        if c[1][0] * c[1][0] + c[1][1] * c[1][1] > VERTICAL:
+            heading = atan2(-c[1][0], c[1][1])
+            self.angle[0] = asin(clip(c[1][2], -1.0, 1.0))
+            self.angle[1] = atan2(-c[0][2], c[2][2])
+        else:  # roll and heading turn about the same axis: roll is 0; no derivative of either exists
+            heading = atan2(c[0][1], c[0][0])
+            self.angle[0] = 0.5 * pi * sign(c[1][2])
+            self.angle[1] = 0.0
         self.angle[2] = heading
         ahead = on * self.forward[index(k)]
         across = on * (self.right[index(k)] - self.speed * self.turn[index(k)])

@@ -256,6 +256,30 @@ def test_lock_without_the_ring_ends_the_run():
         run(pair, 10.0)
 
 
+def test_acceleration_of_a_manoeuvre_is_the_derivative_of_its_rate():
+    """A wobble about all axes in a turn over the turning Earth: central difference over two steps of 1 ms."""
+    first = row(turn=0.2, pitch=0.3, roll=-0.5, yaw=0.4, frequency=0.7)
+    vehicle = Manoeuvre(start_angle=[0.3, -0.2, 1.0], earth_rate=0.1, **first)
+    vehicle.gate = 1.0
+    vehicle.initialize()
+    rates, told = [], []
+    for k in range(1200):
+        vehicle.do_step(k * 1e-3, 1e-3)
+        rates.append(list(vehicle.omega))
+        told.append(list(vehicle.alpha))
+    difference = (np.array(rates)[2:] - np.array(rates)[:-2]) / 2e-3
+    np.testing.assert_allclose(np.array(told)[1:-1], difference, atol=2e-5)
+    assert np.abs(told).max() > 2.0
+
+
+def test_manoeuvre_that_starts_at_the_vertical_can_be_linearized():
+    vehicle = Manoeuvre(start_angle=[90.0 * DEG, 0.0, 0.4])
+    vehicle.initialize()
+    assert vehicle.angle == pytest.approx([90.0 * DEG, 0.0, 0.4])
+    derivatives, outputs = vehicle.tangent({"q[1]": 1.0})
+    assert np.all(np.isfinite(derivatives)) and np.all(np.isfinite(outputs))
+
+
 def test_no_apparent_vertical():
     pair = bench()
     pair.parts["vehicle"].gravity = 4.0

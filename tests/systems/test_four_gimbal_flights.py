@@ -42,6 +42,12 @@ def test_roll_to_90_then_yaw(bench: Session, law: str) -> None:
     assert c["ring 4 travel"] == pytest.approx(90.0, rel=1e-3)
 
 
+def test_a_flight_from_the_launcher_has_a_linear_model(bench: Session) -> None:
+    """At pitch 90 deg, where roll and heading are not told apart, the loops are linearized as elsewhere."""
+    record = bench.run({**QUIET, "flight": "launch", "law": "sign"})
+    assert set(record.run.linear.loops) == {"pitch", "roll", "azimuth"} and not record.run.linear.missing
+
+
 @pytest.mark.parametrize(
     ("flight", "law"), [("roll", "secant"), ("roll", "sign"), ("roll", "constant"), ("loop", "sign")]
 )
