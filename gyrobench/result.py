@@ -115,7 +115,8 @@ class Response:
     kind: "loop" (open loop gain: Bode plot with margins), "ratio" (a gain against frequency), "step" (against time),
     "time" (several quantities against time: all of them in curves, y is the one that runs are compared by).
     x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
-    of a gain (u rad of its phase too), in y_unit of a step; None: not known.  curves: {"label", "x", "y", "phase"}.
+    of a gain (u rad of its phase too), in y_unit of a step; None: not known.  counts: false for a point too noisy to be
+    used, []: all count.  curves: {"label", "x", "y", "phase"}.
     """
 
     name: str
@@ -130,6 +131,7 @@ class Response:
     phase: list[float] = field(default_factory=list)
     u: list[float | None] = field(default_factory=list)
     coherence: list[float] = field(default_factory=list)
+    counts: list[bool] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list)
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from gyrobench.report.page_model import CollapsedBlocks, Column, Picture, Row, Table, number_cell, pictures
+from gyrobench.report.page_model import CollapsedBlocks, Column, Picture, Row, Table, number_cell, pictures, text_cell
 from gyrobench.report.plots import finite, short
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 
@@ -37,6 +37,11 @@ def _points(doc: Json, k: int) -> Table:
         Row([number_cell(doc, ("responses", k, n, i), significant=digits.get(n, 6)) for n in shown])
         for i in range(len(r["x"]))
     ]
+    if r["counts"]:
+        columns["counts"] = ("counts", "")
+        shown.append("counts")
+        for row, counts in zip(rows, r["counts"], strict=True):
+            row.cells.append(text_cell("yes" if counts else "no"))
     caption = f"Points of the {r['name']}. u: standard uncertainty of the gain, relative, and of the phase in radians."
     return Table([Column(*columns[n]) for n in shown], rows, caption, small=True)
 
@@ -69,17 +74,28 @@ def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = (
     top = axes[0, 0]
     for i, (label, r) in enumerate(named):
         colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
-        x, y, u = finite(r["x"], r["y"], [0.0 if v is None else v for v in r["u"] or [0.0] * len(r["x"])])
-        style: dict[str, Any] = {"color": colour, "markersize": 3.6, "markeredgewidth": 0, "label": label, "zorder": 3}
+        counts = r["counts"] or [True] * len(r["x"])
+        near = _nearest(r["phase"], first) if phases and r["phase"] else [0.0] * len(r["x"])
         line = "-" if len(named) > 1 else ""
-        bars = [20.0 * math.log10(1.0 + 1.96 * v) for v in u]
-        top.errorbar(x, _db(y), yerr=bars, fmt=MARKERS[i % len(MARKERS)] + line, elinewidth=0.9, linewidth=0.8, **style)
-        if phases and r["phase"]:
-            bars = [math.degrees(1.96 * v) for v in u]
-            near = _nearest(r["phase"], first)
-            axes[1, 0].errorbar(
-                x, near, yerr=bars, fmt=MARKERS[i % len(MARKERS)] + line, elinewidth=0.9, linewidth=0.8, **style
+        for chosen, shade in ((True, colour), (False, MUTED)):
+            pick = [k for k, c in enumerate(counts) if c is chosen]
+            relative = [0.0 if not r["u"] or r["u"][k] is None else r["u"][k] for k in pick]
+            x, y, u, phase = finite(
+                [r["x"][k] for k in pick], [r["y"][k] for k in pick], relative, [near[k] for k in pick]
             )
+            if not x:
+                continue
+            style: dict[str, Any] = {
+                "color": shade,
+                "markersize": 3.6,
+                "markeredgewidth": 0,
+                "zorder": 3 if chosen else 2,
+            }
+            style |= {"label": label if chosen else "too noisy to count", "elinewidth": 0.9, "linewidth": 0.8}
+            shape = MARKERS[i % len(MARKERS)] + (line if chosen else "")
+            top.errorbar(x, _db(y), yerr=[20.0 * math.log10(1.0 + 1.96 * v) for v in u], fmt=shape, **style)
+            if phases and r["phase"]:
+                axes[1, 0].errorbar(x, phase, yerr=[math.degrees(1.96 * v) for v in u], fmt=shape, **style)
     for (colour, dashes), curve in zip(LINES, curves, strict=False):
         top.plot(curve["x"], _db(curve["y"]), dashes, color=colour, linewidth=1.0, label=curve["label"])
         if phases:
@@ -99,7 +115,7 @@ def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = (
         fig.align_ylabels(axes[:, 0])
     axes[-1, 0].set_xlabel(axis_label("frequency", "Hz"))
     _frequency_axis(axes[-1, 0])
-    if len(named) + len(curves) > 1:
+    if len(named) + len(curves) > 1 or not all(all(r["counts"]) for _, r in named):
         fig.legend(*top.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=2.2)
     return svg(fig, key)
 

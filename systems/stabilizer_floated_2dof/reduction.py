@@ -143,7 +143,7 @@ def _command(found: LoopFindings, gate: Gate) -> None:
 
 def _margins(found: LoopFindings, points: list[Point], loop: Loop | None) -> None:
     """Slope at the crossover, the lower gain limit, and the closed forms of the loop without step and delay."""
-    values = margins.measured_values(points)
+    values = margins.measured_values(points, found.excluded["stabilizer"])
     pm = values.get("phase")
     if pm is not None and pm[0] < ENOUGH and not found.unstable:
         found.warnings.append(f"The phase margin is {pm[0]:.3g}°; more than {ENOUGH:g}° is wanted [GSP ch. 5].")

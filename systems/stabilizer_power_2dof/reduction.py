@@ -151,7 +151,7 @@ def _inverse(M: float, change: float, u: float) -> tuple[float | None, float]:
 
 def _limits(found: LoopFindings, points: list[Point], K_m: float, gyro: Mapping[str, float]) -> None:
     """The phase of L passes -180 degrees at the undamped nutation frequency, where its gain tells the limit of K_m."""
-    values = margins.measured_values(points)
+    values = margins.measured_values(points, found.excluded["stabilizer"])
     if "upper" not in values:
         return
     factor, u = values["upper"]

@@ -167,7 +167,7 @@ def test_combination() -> None:
     (0.0, (-1.0, 1.0), "pass"), (0.9, (-1.0, 1.0), "pass"), (0.95, (-1.0, 1.0), "inconclusive"),
     (1.05, (-1.0, 1.0), "inconclusive"), (1.2, (-1.0, 1.0), "fail"), (-1.2, (-1.0, None), "fail"),
     (99.0, (-1.0, None), "pass"), (0.0, None, "no specification given"), (0.0, (None, None), "no specification given"),
-    (math.nan, (-1.0, 1.0), "inconclusive"),
+    (math.nan, (-1.0, 1.0), "void"),
 ])  # fmt: skip
 def test_verdicts(estimate: float, limit: tuple[float | None, float | None] | None, expected: str) -> None:
     assert uncertainty.assess_conformity(estimate, 0.1, limit) == expected

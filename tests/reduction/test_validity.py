@@ -55,7 +55,10 @@ def test_noise_is_no_limit_cycle(seed: int) -> None:
 def test_a_limit_cycle_under_noise_is_found_unless_the_linear_model_has_it(seed: int) -> None:
     """A sine of 7.3 Hz of twice the rms of the noise."""
     y = np.sin(2 * np.pi * 7.3 * T) + np.random.default_rng(seed).normal(size=T.size) / math.sqrt(8.0)
-    reason = why_void(LinearModels(missing="-"), [hold(loop__e=y)])
+    gate = hold(loop__e=y)
+    reason = why_void(LinearModels(missing="-"), [gate])
+    rounding = Gate(gate.row, gate.t, slice(1, T.size), slice(0, 0), {"loop.e": np.concatenate([[1.0], 1e-12 * y[1:]])})
+    assert why_void(LinearModels(missing="-"), [rounding]) == ""
     assert reason.startswith("not settled: loop.e oscillates by ±") and "at 7.3 Hz (limit cycle)" in reason
     assert why_void(LinearModels(missing="-"), [hold("ride", loop__e=y)]) == ""  # there the base moves
     assert why_void(pole(2j * math.pi * 7.3), [hold(loop__e=y)]) == ""  # a nutation that nothing damps

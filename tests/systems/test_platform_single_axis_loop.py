@@ -115,3 +115,33 @@ def test_ride_by_a_recorded_profile(tmp_path):
     _, _, plain = reduced(**QUIET)
     assert recorded["platform error"].estimate == pytest.approx(plain["platform error"].estimate, rel=0.1)
     assert "drift" not in recorded
+
+
+def test_no_crossover_out_of_noise():
+    """Thirty times the noise at 15 Hz: 58.5 Hz was stated where the linear model has 15.4; now no value, and why."""
+    noisy = {"crossover": 15.0, "reading_noise": 3e-3}
+    for seed in (1, 2):
+        record = run(load_system(NAME), values={**SHORT, **noisy}, seed=seed)
+        result = load_system(NAME).reduce(record)
+        f_c = result["f_c"]
+        assert f_c.closed == pytest.approx(15.4, abs=0.1)
+        assert f_c.no_value or abs(f_c.estimate - f_c.closed) < 2.0 * f_c.u
+        (bode,) = (r for r in result.responses if r.kind == "loop")
+        assert not all(bode.counts) and len(bode.counts) == 8
+        assert any("too noisy at" in w and "do not count" in w for w in result.warnings)
+
+
+def test_dry_friction_leaves_no_crossover_and_the_result_says_why():
+    _, result, found = reduced(**QUIET, **{"platform.friction": 0.5, "platform.stiction": 0.8})
+    for name in ("f_c", "PM"):
+        assert "friction" in found[name].no_value and "describing function" in found[name].no_value
+        assert math.isnan(found[name].estimate)
+    assert result.verdict != "void"  # the other measures stand
+
+
+def test_measured_and_computed_margins_that_differ_are_named_with_the_cause():
+    """Little friction: the loop slips and loses phase that the linear model, stuck in the contact, still has."""
+    _, result, found = reduced(**QUIET, **{"platform.friction": 0.05})
+    (said,) = (w for w in result.warnings if "was measured to cross" in w)
+    assert abs(found["PM"].estimate - found["PM"].closed) > 5.0
+    assert "friction" in said and f"{found['PM'].closed:.3g}°" in said

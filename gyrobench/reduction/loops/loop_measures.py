@@ -145,19 +145,26 @@ def response(t: Array, x: Array, y: Array, f: float) -> Point:
     if not abs(whole) > 1e-12 * float(np.max(np.abs(x)) or 1.0):
         raise ReductionError(f"{f:g} Hz: the reference signal has no component at this frequency")
     value = phasor(t, y, f) / whole
-    n = min(SEGMENTS, periods)
-    if n < 2:
+    if periods < 2:
         return Point(f, value, None, 1.0)
-    edges = [t[0] + (periods * k // n) / f for k in range(n + 1)]
-    pairs = []
-    for a, b in pairwise(edges):
-        s = slice(int(np.searchsorted(t, a - 0.5 * dt)), int(np.searchsorted(t, b - 0.5 * dt)))
-        pairs.append((phasor(t[s], x[s], f), phasor(t[s], y[s], f)))
-    xs, ys = (np.array(c) for c in zip(*pairs, strict=True))
+    xs, ys = segment_phasors(t, f, x, y)
+    n = xs.size
     power = float(np.sum(np.abs(xs) ** 2) * np.sum(np.abs(ys) ** 2))
     coherence = float(np.abs(np.sum(ys * np.conj(xs))) ** 2) / power if power > 0.0 else 0.0
     scatter = float(np.sum(np.abs(ys / xs - value) ** 2)) / (2.0 * n * (n - 1))
     return Point(f, value, math.sqrt(scatter) / abs(value) if value else None, coherence)
+
+
+def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.complex128]]:
+    """Return the phasors of each signal in up to 8 segments of whole periods."""
+    dt = float(t[1] - t[0])
+    periods = int((t[-1] - t[0] + dt) * f + 1e-6)
+    n = min(SEGMENTS, periods)
+    edges = [t[0] + (periods * k // n) / f for k in range(n + 1)]
+    parts = [
+        slice(int(np.searchsorted(t, a - 0.5 * dt)), int(np.searchsorted(t, b - 0.5 * dt))) for a, b in pairwise(edges)
+    ]
+    return [np.array([phasor(t[s], y[s], f) for s in parts]) for y in signals]
 
 
 # ------------------------------------------------------------------------------------------- steps

@@ -38,6 +38,15 @@ from gyrobench.reduction.loops.loop_measures import (
     step,
     step_noise_std,
 )
+from gyrobench.reduction.loops.open_loop import (
+    Twin,
+    disagreement,
+    excluded_words,
+    friction_of,
+    limits_hit,
+    open_loop_point,
+    why_no_crossover,
+)
 from gyrobench.reduction.loops.validity import why_void
 from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
@@ -64,6 +73,7 @@ class LoopFindings:
         self.tables: list[dict[str, Any]] = []
         self.warnings: list[str] = []
         self.allan: dict[str, Any] = {}
+        self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
         if self.linear.missing:
             self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
@@ -146,48 +156,80 @@ class LoopFindings:
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
         test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
-        the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.
+        the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns the points
+        that count.
         """
-        points = [response(g.t, g[inside], g[test] - g[inside], g.f) for g in self.of("test", axis, "sine")]
-        if not points:
+        sines = sorted(self.of("test", axis, "sine"), key=lambda g: g.f)
+        if not sines:
             return []
-        points.sort(key=lambda p: p.f)
+        points, counts = map(list, zip(*(open_loop_point(g, inside, test) for g in sines), strict=True))
+        counts = [c and not self.unstable for c in counts]
+        sure = [p for p, c in zip(points, counts, strict=True) if c]
         title = name or f"open loop, {loop}"
         models = self.linear.loops.get(loop, LinearPair())
         caption = (
             f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % error bars; lines: "
             "linear models."
         )
+        if not all(counts):
+            caption += " Grey: too noisy to count, or of an unstable run."
         curves, rows = [], []
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
-        at = [p.f for p in points]
-        shown = m.Margins() if self.unstable else m.measured_margins(points)
+        at = [p.f for p in sure]
+        shown = m.measured_margins(sure)
+        computed: dict[str, m.Margins] = {}
         rows.append(shown.row("measured"))
         for kind, label in NAMES.items():
             model = models.of(kind)
             if model is None:
                 continue
             dense = model_response(model, span)[:, 0, 0]
-            limits = m.margins(span, dense)
+            limits = computed[kind] = m.margins(span, dense)
             rows.append(limits.row(label))
             curves.append(_curve(label, span, dense))
             if limits.crossover is not None:
-                self._agreement(points, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
+                self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
             if kind == "discrete" and not self.unstable:
                 self._conditional(title, limits)
         self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
+        self.responses[-1].counts = counts
         self.tables.append(
             {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
              "rows": rows}
         )  # fmt: skip
         key = "" if loop == "stabilizer" else f" {loop}"
-        values = m.measured_values(points)
+        self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
+        values = m.measured_values(sure, self.excluded[loop])
+        closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
+        twin = None
+        if "phase" in values and models.discrete is not None:
+            twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
+        widened = dict(values)
+        if twin is not None:
+            widened["crossover"], widened["phase"] = twin.widened(values["crossover"], values["phase"])
+        none = "" if "phase" in values or self.unstable else why_no_crossover(sure, len(points), self.record.run)
+        for name, what, unit, value, closed in (
+            (f"f_c{key}", "gain crossover frequency", "Hz", widened.get("crossover", (None,)), closest[1]),
+            (f"PM{key}", "phase margin", "°", widened.get("phase", (None,)), closest[2]),
+        ):
+            self.measure(name, what, unit, *value, closed=closed, no_value=none)
+        noisy = "" if self.unstable else excluded_words(title, points, counts)
+        self.warnings += [noisy] if noisy else []
         if "phase" in values:
-            closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
-            self.measure(f"f_c{key}", "gain crossover frequency", "Hz", *values["crossover"], closed=closest[1])
-            self.measure(f"PM{key}", "phase margin", "°", *values["phase"], closed=closest[2])
             self._missed(title, *values["crossover"], self.linear.wanted.get(loop) if self.linear.missing else None)
-        return points
+        if twin is not None and twin.contradicts(values["crossover"], values["phase"]):
+            causes = self._causes(sines, noisy)
+            self.warnings.append(disagreement(title, values["crossover"], values["phase"], twin, causes))
+        return sure
+
+    def _causes(self, sines: Sequence[Gate], noisy: str) -> list[str]:
+        """Return what may set measured and computed margins apart."""
+        limited, friction = limits_hit(sines), friction_of(self.record.run)
+        causes = [f"a limit was active in {limited}"] if limited else []
+        causes += (
+            [f"dry friction ({friction}), which the linear model takes for an elastic contact"] if friction else []
+        )
+        return causes + (["noise: the points left out leave the range between the others open"] if noisy else [])
 
     def _missed(self, title: str, crossover: float, u: float, wanted: float | None) -> None:
         """Warn of a crossover that is not the one asked for, where no linear model said so before the run."""

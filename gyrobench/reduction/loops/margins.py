@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Point
 
 Array = NDArray[np.float64]
@@ -155,44 +156,88 @@ def measured_margins(points: Sequence[Point]) -> Margins:
     return margins(f, interpolate_response(points, f))
 
 
-def measured_values(points: Sequence[Point]) -> dict[str, tuple[float, float]]:
+def measured_values(points: Sequence[Point], excluded: Sequence[float] = ()) -> dict[str, tuple[float, float]]:
     """Return what measured points say of the loop's limits: name -> (value, standard uncertainty).
 
     crossover (Hz) and phase (degrees) of the smallest phase margin; upper and f_upper, lower and f_lower: the factors
-    on the gain to the next limits, and their frequencies (Hz).  Missing where the range of the points has none.  The
-    uncertainty holds that of the nearest points and the difference of two interpolations between them.
+    on the gain to the next limits, and their frequencies (Hz).  Missing where the range of the points has none, where
+    the gain (the phase) cannot be told from 1 (-180 degrees) up to an end of that range, and where a frequency of
+    ``excluded``, at which a measurement did not count, lies beside the limit.
+
+    The uncertainty holds that of the points (as far as the gain cannot be told from 1 within 1.96 u the crossover may
+    lie, and the phase turns over that range) and the difference of two interpolations between them.
     """
     if len(points) < 4:
         return {}
     f = grid(min(p.f for p in points), max(p.f for p in points))
-    shown, other = margins(f, interpolate_response(points, f)), margins(f, interpolate_response(points, f, spline=True))
+    curve, spline = interpolate_response(points, f), interpolate_response(points, f, spline=True)
+    shown, other = margins(f, curve), margins(f, spline)
+    u = _relative_u(points, f)
+    size, turn = np.log(np.abs(curve)), np.unwrap(np.angle(curve))
     values: dict[str, tuple[float, float]] = {}
     if shown.crossovers:
         cross, phase = min(shown.crossovers, key=lambda c: abs(c[1]))
-        u, fall, turn = _around(points, cross)
-        twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
-        u_f = u / abs(fall) if fall else 0.0
-        values["crossover"] = cross, math.hypot(cross * u_f, twin[0] - cross)
-        values["phase"] = phase, math.hypot(math.degrees(math.hypot(u, turn * u_f)), twin[1] - phase)
+        inside = _undecided(f, size, u, cross)
+        if _bounded(inside, points, excluded, cross):
+            twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
+            values["crossover"] = cross, math.hypot(_spread(f, f, inside, cross), twin[0] - cross)
+            own = math.hypot(float(np.interp(cross, f, u)), _spread(f, turn, inside, cross))
+            values["phase"] = phase, math.hypot(math.degrees(own), twin[1] - phase)
     for name, factor in (("upper", shown.upper), ("lower", shown.lower)):
         if factor is None:
             continue
         at = next(x for x, g in shown.gains if g == factor)
-        u, fall, turn = _around(points, at)
-        same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
-        u_f = u / abs(turn) if turn else 0.0
-        values[name] = factor, math.hypot(factor * math.hypot(u, fall * u_f), same[1] - factor)
-        values[f"f_{name}"] = at, math.hypot(at * u_f, same[0] - at)
+        beyond = turn - float(np.interp(at, f, turn))
+        inside = _undecided(f, beyond, u, at)
+        if _bounded(inside, points, excluded, at):
+            same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
+            own = math.hypot(float(np.interp(at, f, u)), _spread(f, size, inside, at))
+            values[name] = factor, math.hypot(factor * own, same[1] - factor)
+            values[f"f_{name}"] = at, math.hypot(_spread(f, f, inside, at), same[0] - at)
     return values
 
 
-def _around(points: Sequence[Point], f: float) -> tuple[float, float, float]:
-    """Return the relative uncertainty of the two points nearest to f, and d ln|L| and d arg L over d ln f there."""
-    u = max((p.u or 0.0) for p in sorted(points, key=lambda p: abs(math.log(p.f / f)))[:2])
-    near = np.clip([0.99 * f, 1.01 * f], min(p.f for p in points), max(p.f for p in points))
-    gain = interpolate_response(points, near)
-    span = math.log(near[1] / near[0])
-    return u, math.log(abs(gain[1]) / abs(gain[0])) / span, float(np.angle(gain[1] / gain[0])) / span
+def unity_range(points: Sequence[Point]) -> tuple[float, float] | None:
+    """Return the range (Hz) over which the gain of measured points cannot be told from 1; None where it always can."""
+    f = grid(min(p.f for p in points), max(p.f for p in points))
+    near = np.abs(np.log(np.abs(interpolate_response(points, f)))) < NORMAL * _relative_u(points, f)
+    return (float(f[near][0]), float(f[near][-1])) if np.any(near) else None
+
+
+def _relative_u(points: Sequence[Point], f: Array) -> Array:
+    """Return the relative uncertainty of the points over frequency; of the larger one of two neighbours."""
+    known = sorted(points, key=lambda p: p.f)
+    u = np.array([p.u or 0.0 for p in known])
+    k = np.clip(np.searchsorted([p.f for p in known], f), 1, u.size - 1)
+    return np.asarray(np.maximum(u[k - 1], u[k]))
+
+
+def _undecided(f: Array, value: Array, u: Array, at: float) -> tuple[float, float]:
+    """Return the range of frequencies at which a value cannot be told from 0 within U; it holds ``at``."""
+    near = f[np.abs(value) < NORMAL * u]
+    low, high = float(np.min(near, initial=at)), float(np.max(near, initial=at))
+    if low < at < high:
+        return low, high
+    slope = abs(float(np.interp(at * 1.01, f, value) - np.interp(at * 0.99, f, value))) / 0.02
+    half = NORMAL * float(np.interp(at, f, u)) / slope if slope else 0.0  # finer than the grid
+    return min(low, at * (1.0 - half)), max(high, at * (1.0 + half))
+
+
+def _bounded(
+    inside: tuple[float, float], points: Sequence[Point], excluded: Sequence[float], at: float
+) -> bool:  # fmt: skip
+    """Return whether a range ends inside that of the points, without an excluded one in it or up to the next point."""
+    known = [p.f for p in points]
+    low = max((x for x in known if x <= min(at, inside[0])), default=None)
+    high = min((x for x in known if x >= max(at, inside[1])), default=None)
+    return low is not None and high is not None and not any(low < x < high for x in excluded)
+
+
+def _spread(f: Array, value: Array, inside: tuple[float, float], at: float) -> float:
+    """Return the standard uncertainty of a value over frequency from the range in which ``at`` may lie at 95 %."""
+    at_ends = np.interp(inside, f, value)
+    between = value[(f >= inside[0]) & (f <= inside[1])]
+    return float(np.max(np.abs(np.append(between, at_ends) - np.interp(at, f, value)))) / NORMAL
 
 
 def deviation(points: Sequence[Point], model: Complex, up_to: float) -> tuple[float, float]:

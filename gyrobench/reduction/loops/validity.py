@@ -28,6 +28,7 @@ LINE = 0.5  # share of the variance that one sine must explain in every eighth
 EVEN = 0.2  # relative scatter of its amplitude: that of narrow-band noise is 0.52 (Rayleigh)
 STEADY = 0.7  # length of the mean of its unit phasors; 1: the same phase throughout, about 0.35 for noise
 PERIODS = 24  # in a hold, 3 in an eighth; slower is a drift
+ROUNDING = 1e-9  # of a signal's largest value in the record: what is smaller at rest is rounding
 AT_LIMIT = 0.1  # share of a hold with a limit active
 UNDAMPED = 0.01  # damping ratio of a pole below which an oscillation at rest is the linear system's own
 
@@ -67,7 +68,9 @@ def _growing(linear: LinearModels) -> complex | None:
 def _at_rest(gate: Gate, linear: LinearModels) -> str:
     for name in gate.channels:
         if name.endswith(".e"):
-            reason = _restless(gate.t, gate[name], linear)
+            whole = gate.channels[name]
+            moves = float(np.ptp(gate[name])) > ROUNDING * float(np.max(np.abs(whole)))
+            reason = _restless(gate.t, gate[name], linear) if moves else ""
             if reason:
                 return f"not settled: {name} {reason}"
     for name in (n for n in gate.channels if n.endswith(".saturated")):
