@@ -25,7 +25,7 @@ def jitter(y: np.ndarray, n: int) -> np.ndarray:
 
 
 def level(y: np.ndarray, stretches: int = 10) -> UncertainValue:
-    """Root mean square of a ride: a sine and noise.  u from the scatter of the mean squares of ten stretches."""
+    """Root mean square of a ride by a sine, with noise.  u from the scatter of the mean squares of ten stretches."""
     squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
     whole = math.sqrt(float(np.mean(y * y)))
     u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0
@@ -67,7 +67,8 @@ def _ride(found: LoopFindings) -> list[str]:
     if ride is None:
         return []
     two = round(2.0 / (ride.f or SLOW) / float(ride.t[1] - ride.t[0]))
-    error, rate = level(jitter(ride[ANGLE], two)), level(ride[RATE] - ride[RATE].mean())
+    size = level if ride.f else rms  # a recorded motion is random
+    error, rate = size(jitter(ride[ANGLE], two)), size(ride[RATE] - ride[RATE].mean())
     meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)

@@ -10,8 +10,10 @@ import numpy as np
 from gyrobench import drift as static
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
+from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.rides import share, still
 from gyrobench.result import LoopResult, Specification
 
 AXES = ("pitch", "roll", "azimuth")
@@ -105,17 +107,15 @@ def _ride(found: LoopFindings) -> str:
     if gate is None:
         return ""
     left = [still(gate.t, gate[name]) for name in ANGLES]
-    base = [still(gate.t, gate[f"motion.angle[{k}]"]) for k in (1, 2, 3)]
     for axis, y in zip(XYZ, left, strict=True):
-        found.measure(f"error {axis}", "attitude in the ride, rms about mean and slope", "″", float(np.std(y)) / ARCSEC)
-    share = float(np.sqrt(np.sum(np.var(left, axis=1)) / np.sum(np.var(base, axis=1))))
-    found.measure("ride", "platform over base, rms of all axes", "dB", 20.0 * math.log10(share))
-    return f"In the ride the platform takes over {20.0 * math.log10(share):.1f} dB of the base's motion."
-
-
-def still(t: Any, y: Any) -> Any:
-    """y without its mean and slope: a drift is the gyro's, not the loop's."""
-    return y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
+        error = rms(y)
+        meaning = "attitude in the ride, rms about mean and slope"
+        found.measure(f"error {axis}", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
+    taken = share(left, [still(gate.t, gate[f"motion.angle[{k}]"]) for k in (1, 2, 3)])
+    found.measure("ride", "platform over base, rms of all axes", "dB", taken.value, taken.u)
+    if not math.isfinite(taken.value):
+        return ""
+    return f"In the ride the platform takes over {taken.value:.1f} ± {taken.u:.1g} dB of the base's motion."
 
 
 def _loads(found: LoopFindings) -> None:

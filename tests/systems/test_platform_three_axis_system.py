@@ -157,9 +157,10 @@ def test_ride_by_a_recorded_profile(tmp_path):
     path = tmp_path / "roll.csv"
     path.write_text("\n".join(lines) + "\n")
     record = run(NAME, values={**IDEAL, "profile": str(path), "hold": 20.0})
-    found = {c.name: c.estimate for c in load_system(NAME).reduce(record).coefficients}
+    found = {c.name: c for c in load_system(NAME).reduce(record).coefficients}
     assert np.ptp(record.channels["motion.angle[2]"]) == pytest.approx(math.radians(10.0), rel=0.01)
-    assert -120.0 < found["ride"] < -60.0
+    assert -120.0 < found["ride"].estimate < -60.0
+    assert all(0.0 < found[name].u < 0.2 * abs(found[name].estimate) for name in ("ride", "error y"))
     path.write_text("\n".join(lines[:50] + lines[90:]) + "\n")
     with pytest.raises(DataError, match=r"a gap of 4\.1 s after time = 4\.8 s"):
         run(NAME, values={"profile": str(path)})
