@@ -317,7 +317,8 @@ def test_engines_and_isolation_give_the_same_record(gyrobench: Call, tmp_path: P
 
 def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--out", "c")
-    assert (code, out) == (0, "c/comparison.json\nc/comparison.html\nc/comparison.pdf\n")
+    assert code == 0 and out.startswith("B (b) ") and "Set differently: " in out.splitlines()[-5]
+    assert out.endswith("\n\nc/comparison.json\nc/comparison.html\nc/comparison.pdf\n")
     code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--json")
     assert code == 0 and json.loads(out)
     code, _, err = gyrobench("compare", runs / "a", runs / "a")
