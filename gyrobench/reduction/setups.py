@@ -47,16 +47,20 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True)
 class SiteSetup(Setup):
-    """A test at a site: latitude rad, gravity m/s2, earth_rate rad/s."""
+    """A test at a site: latitude rad, gravity m/s2, earth_rate rad/s.  nuisances: set-up effects that may be in the
+    data are weighed (gyrobench.reduction.estimation.nuisances).
+    """
 
     latitude: float
     gravity: float
     earth_rate: float = frames.EARTH_RATE
+    nuisances: bool = True
 
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
         site = Site.of(run)
-        place = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
+        place: dict[str, Any] = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
+        place["nuisances"] = choice(run, "nuisances", ("auto", "none"), "auto") == "auto"
         return super().of(run, specification, **{**place, **own})
 
     @property
@@ -124,14 +128,15 @@ class TumbleSetup(RebalanceSetup):
     """A tumble on a table whose axis lies along the pole; matrices with rows = axes.
 
     base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate" or
-    "dwell" (None: by the direction of the second gyro axis).  tilt: small angles of the gyro are estimated too.
+    "dwell" (None: by the direction of the second gyro axis).  tilt: small angles of the gyro are estimated with the
+    coefficients (True), taken as zero (False), or among the nuisances, which the data weigh (None).
     """
 
     faces: Mapping[int, Array]
     base: Array = field(default_factory=lambda: np.empty((0, 0)))  # empty: table axis on the pole
     labels: Mapping[int, str] = field(default_factory=dict)
     modes: Mapping[int, str] | None = None
-    tilt: bool = False
+    tilt: bool | None = None
     u_angle1: float = 0.0
     u_angle2: float = 0.0
 
@@ -149,7 +154,7 @@ class TumbleSetup(RebalanceSetup):
             "faces": {p: faces[row.face] for p, row in plan.items()},
             "labels": {p: row.label for p, row in plan.items()},
             "modes": {p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
-            "tilt": bool(run.options.get("tilt", False)),
+            "tilt": TILTS[choice(run, "tilt", tuple(TILTS), "auto")],
         }
         return cls.of(run, specification, **of_run, **own)
 
@@ -202,6 +207,18 @@ class TumbleSetup(RebalanceSetup):
                     f"{where}{2 * math.pi / largest:.2g} windows a turn, at least 5 are needed for two harmonics"
                 )
         return problems
+
+
+#: option tilt -> TumbleSetup.tilt
+TILTS = {"auto": None, "yes": True, "no": False, "true": True, "false": False}
+
+
+def choice(run: RunDocument, option: str, known: tuple[str, ...], default: str) -> str:
+    """Return an option that is one of some words.  Raises ReductionError."""
+    word = str(run.options.get(option, default)).lower()
+    if word not in known:
+        raise ReductionError(f"{option} = {word}: unknown; available: {', '.join(known)}")
+    return word
 
 
 def scale_factor_problems(k: float, name: str = "k") -> list[str]:

@@ -48,7 +48,7 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
 
     current (n,) in A with the sign of the precession convention.
     """
-    names, X = found.est.names, found.X
+    names, X = found.est.names[: found.X.shape[1]], found.X
     rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
 
     def geometry(base: Array, turned: window_regressors.Turning) -> Array:
@@ -105,7 +105,7 @@ def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findi
         x, y, z = (v[..., k] for k in range(3))
         return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
 
-    names = found.est.names
+    names = found.est.names[: found.X.shape[1]]
     terms = tuple(n for n in names if n != TILT)
     up = np.broadcast_to(setup.base @ np.array([0.0, 0.0, -setup.gravity / frames.G0]), (*theta.shape, 3))
     earth = setup.base @ (setup.earth_rate * frames.pole(setup.latitude))

@@ -6,7 +6,10 @@ Every window is a row; regressors are averaged over the window as the current is
 The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The closed
 formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
 
-Not modelled: change of the drift with time, torquer nonlinearity (a line of the budget), independent mount errors.
+Misalignment of the input axis, a trend in time, temperature and constants that differ from mount to mount are weighed
+by the data (gyrobench.reduction.estimation.nuisances).
+
+Not modelled: change of the drift with time other than linear, torquer nonlinearity (a line of the budget).
 """
 
 from __future__ import annotations
@@ -23,9 +26,10 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation import noise_mixture_fit, regression
+from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
@@ -37,6 +41,7 @@ __all__ = ["ReductionError", "TumbleSetup", "from_record", "reduce", "refusals",
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
+TILT_MEANING = "misalignment of the input axis towards the output axis"
 FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
 
 
@@ -60,7 +65,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
     rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
     y = rate - setup.k * current
     names = drift.terms(9 if setup.terms == 10 else setup.terms)
-    if setup.tilt:
+    if setup.tilt:  # estimated whatever the data say of it
         names = (*names, budget.TILT)
     X = budget.design(setup, turning, names)
     book, fits, why = closed.reduce(
@@ -69,7 +74,18 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
     )  # fmt: skip
     quantities = [_quantity(setup, n, book) for n in names]
     groups = [_group(setup, turning, phase, X, names, p) for p in setup.faces]
-    found = fit(quantities, X, y, turning.t_start, turning.t_end, groups, "drift rate", "°/h", DPH)
+    found = fit(
+        quantities,
+        X,
+        y,
+        turning.t_start,
+        turning.t_end,
+        groups,
+        "drift rate",
+        "°/h",
+        DPH,
+        candidates=_candidates(setup, turning, phase, windows),
+    )
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
     turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
     turns.test()
@@ -112,36 +128,27 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
     )
     first = []
     if dominant:
-        first.append("The tilt of the input axis makes most of the uncertainty of D_O; the option tilt estimates it.")
-    if not setup.tilt:
-        first += _tilt_seen(setup, turning, names, y)
+        first.append("The tilt of the input axis makes most of the uncertainty of D_O; tilt=yes estimates it.")
     result.warnings[:0] = first
     result.summary = _summary(result.coefficients, found)
     return result
 
 
-def _tilt_seen(setup: TumbleSetup, turning: window_regressors.Turning, names: tuple[str, ...], y: Array) -> list[str]:
-    """A warning when the data ask for the tilt of the input axis (above four u), which these terms do not hold.
-
-    It is a step between the mounts; taken for slow noise it leaks into the coefficients.
-    """
-    more = (*names, budget.TILT)
-    try:
-        est = noise_mixture_fit.fit(budget.design(setup, turning, more), y, more, turning.t_start, turning.t_end)
-    except regression.RegressionError:
+def _candidates(
+    s: TumbleSetup, turning: window_regressors.Turning, phase: Array, windows: Mapping[str, Array]
+) -> list[Candidate]:
+    """Set-up effects that a tumble may have: misalignment, trend, temperature, constants from mount to mount."""
+    if not s.nuisances:
         return []
-    tilt, u = (float(v[-1]) / units.factor("arcsec") for v in (est.beta, est.u))
-    if abs(tilt) < max(4.0 * u, 0.01):
-        return []
-    return [
-        f"The record shows a tilt of the input axis towards the output axis of {tilt:.3g}″ (u = {u:.2g}″), which these "
-        "terms take for drift: the coefficients are off by more than u says; set the option tilt."
-    ]
+    along = window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, 1)
+    found = [] if s.tilt is not None else [Candidate.of(budget.TILT, TILT_MEANING, "arcsec", -along)]
+    mounts = nuisances.mounts(phase, s.faces)
+    return [*found, *nuisances.common(windows), nuisances.scatter("σ_mount", nuisances.MOUNTS, mounts)]
 
 
 def _quantity(s: TumbleSetup, name: str, book: Mapping[str, float]) -> Quantity:
     if name == budget.TILT:
-        return Quantity.of(name, "tilt of the input axis towards the output axis", "arcsec")
+        return Quantity.of(name, TILT_MEANING, "arcsec")
     truth = None
     if s.truth is not None:
         oo = s.truth.get("D_OO", 0.0)
@@ -212,6 +219,7 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
         f"Constant drift {first.name} = {plus_minus(first)}.",
         f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         found.noise_sentence(),
+        *found.nuisance_sentences(),
     ]
 
 

@@ -14,7 +14,7 @@ from gyrobench.result import Specification
 class TumbleSetup(setups.TumbleSetup):
     """k: torquer scale factor, rad/s/A.  terms: of the model.  quantum: resolution of the current reading.
 
-    tilt: the small angle of the input axis towards the output axis is estimated too (D_O then rests on the dwells).
+    tilt: the small angle of the input axis towards the output axis (where it is estimated D_O rests on the dwells).
     """
 
     k: float

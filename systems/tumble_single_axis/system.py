@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift, frames
-from gyrobench.system.families.option_groups import FOLD, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.tumble_test import TumbleTest
 from gyrobench.system.system import Option
@@ -30,8 +30,9 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         SITE
         | TumbleTest.tumble
         | FOLD
+        | TILT
+        | NUISANCES
         | {
-            "tilt": Option(False, bool, "estimate the tilt of the input axis towards the output axis too"),
             "terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9),
         }
         | type_b("axis", "mount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")

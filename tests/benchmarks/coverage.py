@@ -241,9 +241,9 @@ def seen_windows() -> Iterator[list[tuple[Any, Any, bool]]]:
     found: list[tuple[Any, Any, bool]] = []
     inner = noise_mixture_fit.fit
 
-    def fit(X: Any, y: Any, names: Any, t0: Any, t1: Any, limit: float = 1e3, readings: bool = False) -> Any:
-        found.append((t0, t1, readings))
-        return inner(X, y, names, t0, t1, limit, readings)
+    def fit(X: Any, y: Any, names: Any, t0: Any, t1: Any, *more: Any, **named: Any) -> Any:
+        found.append((t0, t1, more[1] if len(more) > 1 else named.get("readings", False)))
+        return inner(X, y, names, t0, t1, *more, **named)
 
     noise_mixture_fit.fit = fit
     try:

@@ -78,13 +78,28 @@ def test_input_axis_tilted_towards_the_output_axis(session: Session) -> None:
     assert eps * RATE > 0.1 * DPH  # it is a large disturbance: eps times the table rate
 
 
-def test_tilt_that_is_not_asked_for_is_reported(session: Session) -> None:
-    """With noise: 60 arcsec are seen and named, and no warning comes where there is none."""
+def test_tilt_that_the_data_show_is_estimated(session: Session) -> None:
+    """With noise: 62 arcsec join the model and are reported with an interval; where there is none, nine coefficients.
+    Without nuisances they go into the coefficients.
+    """
     for eps, seen in ((3e-4, True), (0.0, False)):
         values = {**SHORT, "gyro.mount": towards_output(eps)}
         for seed in range(3):
-            result = load().with_values(values).reduce(session.run(values, seed=seed))
-            assert any("shows a tilt of the input axis" in w and "6" in w for w in result.warnings) == seen
+            record = session.run(values, seed=seed)
+            result = load().with_values(values).reduce(record)
+            names = [c.name for c in result.coefficients]
+            assert ("ε_IO" in names) == seen and len(names) == 9 + seen
+            assert all(c.truth is None or abs(c.estimate - c.truth) < 4.0 * c.u for c in result.coefficients)
+            table = next(t for t in result.tables if t["title"] == "Nuisance model")
+            assert [row[0] for row in table["rows"]] == ["ε_IO", "trend", "σ_mount"]
+            if seen:
+                tilt = result.coefficients[-1]
+                assert tilt.interval[0] < math.degrees(eps) * 3600.0 < tilt.interval[1]
+                assert any("In the model: misalignment of the input axis" in s for s in result.summary)
+                run = record.run.replace(options={**record.run.options, "nuisances": "none"})
+                plain = load().reduce(type(record)(record.windows, {}, run))
+                off = [abs(c.estimate - (c.truth or 0.0)) / result[c.name].u for c in plain.coefficients]
+                assert len(off) == 9 and max(off) > 10.0
 
 
 def test_scale_factor_error_scales_everything(session: Session) -> None:

@@ -22,14 +22,16 @@ from scipy import special
 
 from gyrobench import drift, units
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation import residual_series as series
+from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Series, Test
 
 Array = NDArray[np.float64]
 RAW = "Ljung-Box, residuals"
+IDEAL = 1e-6  # residuals over data, below which there is no noise
 
 
 @dataclass(frozen=True)
@@ -97,14 +99,16 @@ class Estimates:
 def fit(
     quantities: Sequence[Quantity | str], X: Array, y: Array, t_start: Array | None, t_end: Array | None,
     groups: Sequence[Group], y_name: str, y_unit: str, y_scale: float, *, noise: str = "estimated",
-    weights: Array | None = None, limit: float = 1e3,
+    weights: Array | None = None, limit: float = 1e3, candidates: Sequence[Candidate] = (),
 ) -> Findings:  # fmt: skip
     """Least squares of ``y = X a + noise``: X (n, p), y (n,) in SI, means over windows [t_start, t_end] (s).
 
     quantities: one for each column; a name alone for an unknown that is only a step to a derived quantity.
     noise: "estimated" (white, Gauss-Markov or both, from the data; wants some tens of windows) or "white" (assumed;
     few readings; then ``weights`` (n,) may be given, and times may be None); "readings": estimated, of data that are
-    differences of readings at t_start and t_end (angles over time).  limit: largest condition number.
+    differences of readings at t_start and t_end (angles over time).  limit: largest condition number.  candidates:
+    set-up effects that may be in the data (gyrobench.reduction.estimation.nuisances); those that are follow the
+    quantities.  Noise that is assumed takes none.
     Raises ReductionError for data that cannot carry the model.
     """
     n = len(y)
@@ -112,19 +116,61 @@ def fit(
         t_start, t_end = np.arange(n, dtype=float), np.arange(n, dtype=float) + 1.0
     known = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in quantities)
     names = [q.name for q in known]
+    tested = candidates if noise != "white" and not _noise_free(X, y) else ()
+    seen, hidden = nuisances.observable(X, names, tested)
     try:
         if noise == "white":
             est = noise_mixture_fit.ordinary(X, y, names, t_start, t_end, weights, limit)
         elif noise in ("estimated", "readings") and weights is None:
-            est = noise_mixture_fit.fit(X, y, names, t_start, t_end, limit, noise == "readings")
+            est = noise_mixture_fit.fit(
+                X, y, names, t_start, t_end, limit, noise == "readings", [c.block for c in seen]
+            )
         else:
             raise ValueError(f"noise '{noise}': 'estimated', 'readings', or 'white' with or without weights")
     except RegressionError as error:
         raise ReductionError(str(error)) from None
-    reported = Estimates(est.beta, est.covariance, est.u, est.half_width, est.p, est.dof, est.gain)
+    joined = nuisances.reported(seen, est)
+    known += tuple(Quantity(c.name, c.meaning, c.unit, c.scale) for c, _ in joined)
     return Findings(
-        known, X, y, t_start, t_end, est, reported, list(groups), y_name, y_unit, y_scale, noise == "white", weights
+        known, X, y, t_start, t_end, est, _reported(est, joined, X.shape[1]), list(groups), y_name, y_unit, y_scale,
+        noise == "white", weights, candidates=seen, hidden=hidden,
+    )  # fmt: skip
+
+
+def _noise_free(X: Array, y: Array) -> bool:
+    """True for simulated data without noise, whose remainder (the lag of a loop) no candidate is to explain."""
+    if not (np.all(np.isfinite(X)) and np.all(np.isfinite(y))):
+        return True  # the fit says what is wrong
+    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    return bool(np.linalg.norm(left) <= IDEAL * np.linalg.norm(y))
+
+
+def _reported(
+    est: noise_mixture_fit.Estimate, joined: Sequence[tuple[Candidate, noise_mixture_fit.Evidence]], p: int
+) -> Estimates:
+    """The p coefficients, then each effect that joined: its constant, or the standard deviation of its constants."""
+    rows, spread, at = list(range(p)), {}, p
+    for c, e in joined:
+        if c.scatter:
+            spread[len(rows)] = e
+        rows.append(at)
+        at += e.value.size
+    value, u, half, probability, dof, gain = (
+        np.array(v[rows]) for v in (est.beta, est.u, est.half_width, est.p, est.dof, est.gain)
     )
+    covariance = np.array(est.covariance[np.ix_(rows, rows)])
+    for j, e in spread.items():
+        mean, sd, low, high = e.scatter
+        value[j], u[j], half[j], probability[j], dof[j] = (
+            mean,
+            sd,
+            max(high - mean, mean - low),
+            1 - e.probability,
+            np.inf,
+        )
+        covariance[j], covariance[:, j], gain[j] = 0.0, 0.0, 0.0
+        covariance[j, j] = sd**2
+    return Estimates(value, covariance, u, half, probability, dof, gain)
 
 
 @dataclass
@@ -145,15 +191,23 @@ class Findings:
     white: bool  # assumed, not estimated
     weights: Array | None = None
     tests: list[Test] = field(default_factory=list)
+    candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
+    hidden: Sequence[Hidden] = ()
 
     def __post_init__(self) -> None:
-        dof = self.y.size - self.X.shape[1]
+        dof = self.dof
         residual = self.est.residual / self.y_scale
         self.residual_std = math.sqrt(float(np.sum(self.est.residual**2)) / dof) / self.y_scale
         self.stretches = series.stretches(self.t_start, self.t_end, residual)
         self.ideal = self.residual_std * self.y_scale <= 1e-12 * float(np.max(np.abs(self.y)))
         if not self.tests:
             self.tests = self._residual_tests()
+
+    @property
+    def dof(self) -> int:
+        """Data less coefficients, those of effects that joined among them."""
+        flat = sum(e.value.size for c, e in nuisances.reported(self.candidates, self.est) if not c.scatter)
+        return int(self.y.size) - int(self.X.shape[1]) - flat
 
     @property
     def value(self) -> Array:
@@ -169,19 +223,23 @@ class Findings:
         return self.reported.gain
 
     def change(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
-        """Change (q,) of the reported values, to first order, when the data and the design were wrong by dy, dX."""
+        """Change (q,) of the reported values, to first order, when the data and the design X were wrong by dy, dX."""
         error = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
-        out: Array = self.gain @ (error if dX is None else error - dX @ self.est.beta)
+        out: Array = self.gain @ (error if dX is None else error - dX @ self.est.beta[: dX.shape[1]])
         return out
 
     def derive(self, quantities: Sequence[Quantity], function: Callable[[Array], ArrayLike]) -> Findings:
-        """The same fit reported as ``function`` (of the linear unknowns, SI) with uncertainties to first order."""
-        r, beta = self.est, self.est.beta
+        """The same fit reported as ``function`` (of the linear unknowns, SI) with uncertainties to first order.
+
+        Effects that joined the model follow as they are.
+        """
+        r, p = self.est, self.X.shape[1]
+        beta, after = r.beta[:p], self.quantities[p:]
         size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
         value = np.atleast_1d(np.asarray(function(beta), dtype=float))
         if value.size != len(quantities):
             raise ValueError(f"{len(quantities)} quantities for {value.size} values")
-        J = np.empty((value.size, beta.size))
+        J = np.zeros((value.size, r.beta.size))
         for j in range(beta.size):
             step = np.zeros_like(beta)
             step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
@@ -192,9 +250,20 @@ class Findings:
         size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
         covariance = (J @ r.covariance @ J.T) * np.outer(size, size)
         dof = noise_mixture_fit.equivalent_dof(half / np.maximum(u, 1e-300))
-        p = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
-        reported = Estimates(value, covariance, u, half, p, dof, J @ r.gain)
-        return replace(self, quantities=tuple(quantities), reported=reported, tests=list(self.tests))
+        outside = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
+        reported = Estimates(value, covariance, u, half, outside, dof, J @ r.gain)
+        if after:
+            reported = _behind(reported, self.reported, p)
+        return replace(self, quantities=(*quantities, *after), reported=reported, tests=list(self.tests))
+
+    def nuisance_tables(self) -> list[dict[str, Any]]:
+        """Return the table of the nuisance model (none without candidates)."""
+        names = [q.title for q in self.quantities]
+        found = None if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
+        return [found] if found else []
+
+    def nuisance_sentences(self) -> list[str]:
+        return nuisances.sentences(self.candidates, self.est)
 
     # ------------------------------------------------------------------------------------------ plots
     def series(self) -> list[Series]:
@@ -214,7 +283,8 @@ class Findings:
             )  # fmt: skip
             if g.dense is not None:
                 s.shown_fit_x = np.asarray(g.dense[0], dtype=float).tolist()
-                s.shown_fit_y = (np.asarray(g.dense[1], dtype=float) @ self.est.beta / self.y_scale).tolist()
+                curve = np.asarray(g.dense[1], dtype=float) @ self.est.beta[: self.X.shape[1]]
+                s.shown_fit_y = (curve / self.y_scale).tolist()
             out.append(s)
         return out
 
@@ -314,14 +384,20 @@ class Findings:
 
     def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
         """Return coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""
-        columns = np.column_stack([self.X, extra, self.y])
+        model = self.est.X  # with what joined
+        columns = np.column_stack([model, extra, self.y])
         if self.white:
             Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
         else:
             tau, share = self.est.best
-            model = np.array([tau]), np.array([share]), np.array([self.est.reading])
-            Z = noise_model.whiten(self.t_start, self.t_end, columns, *model)[0][:, 0, :]
-        z, A, p = Z[:, -1], Z[:, :-1], self.X.shape[1]
+            likeliest = np.array([tau]), np.array([share]), np.array([self.est.reading])
+            Z = noise_model.whiten(self.t_start, self.t_end, columns, *likeliest)[0][:, 0, :]
+        z, A, p = Z[:, -1], Z[:, :-1], model.shape[1]
+        if any(c.scatter for c, _ in nuisances.reported(self.candidates, self.est)):  # some of A's columns are alike
+            q, s, _ = np.linalg.svd(A[:, :p], full_matrices=False)
+            basis = q[:, s > 1e-9 * s[0]]
+            p = basis.shape[1]
+            A = np.column_stack([basis, A[:, model.shape[1] :]])
         plain = np.linalg.lstsq(A[:, :p], z, rcond=None)[0]
         q, r = np.linalg.qr(A)
         full = np.linalg.solve(r, q.T @ z)
@@ -340,10 +416,20 @@ class Findings:
         fewer than ``minimum`` degrees of freedom.  Raises numpy.linalg.LinAlgError for columns the fit holds already.
         """
         k = extra.shape[1]
-        if self.ideal or not k or self.y.size - self.X.shape[1] - k < minimum:
+        if self.ideal or not k or self.dof - k < minimum:
             return None
         values, covariance, rss0, rss1, dof = self.whitened_fit(extra)
         f = ((rss0 - rss1) / k) / (rss1 / dof)
         p = float(special.fdtrc(k, dof, f))
         self.tests.append(Test(name, f, p, what, bad if p < 0.05 else good))
         return values, np.sqrt(np.diag(covariance))
+
+
+def _behind(first: Estimates, of: Estimates, p: int) -> Estimates:
+    """``first`` with all but the first p of ``of`` behind it, as uncorrelated with it."""
+    n = first.value.size
+    size = n + of.value.size - p
+    covariance = np.zeros((size, size))
+    covariance[:n, :n], covariance[n:, n:] = first.covariance, of.covariance[p:, p:]
+    rest = (np.concatenate([getattr(first, k), getattr(of, k)[p:]]) for k in ("u", "half_width", "p", "dof", "gain"))
+    return Estimates(np.concatenate([first.value, of.value[p:]]), covariance, *rest)

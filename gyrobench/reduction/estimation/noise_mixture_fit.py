@@ -22,17 +22,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.reduction.estimation import noise
+from gyrobench.reduction.estimation import noise, nuisance_states
+from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
+JOINED = 0.95  # probability from which on a possible effect is reported with the coefficients
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -60,6 +62,31 @@ class Mixture:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What the data say of a possible effect: probability that it is there, its constants if it is, and by how much
+    the coefficients (p,) then differ from those without it.
+    """
+
+    block: Block
+    probability: float
+    value: Array  # (k,)
+    u: Array
+    change: Array  # (p,)
+    u_without: Array
+    u_with: Array
+    scatter: tuple[float, float, float, float]  # of its constants: mean, standard deviation, 2.5 % and 97.5 % point
+
+    @property
+    def joined(self) -> bool:
+        return self.probability >= JOINED
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        k = self.block.columns.shape[1]
+        return (self.block.name,) if k == 1 else tuple(f"{self.block.name} {j + 1}" for j in range(k))
+
+
+@dataclass(frozen=True)
 class Estimate:
     """A fit under an estimated noise model; arrays follow ``names``."""
 
@@ -83,14 +110,19 @@ class Estimate:
     mixture: Mixture
     reading: float = 0.0  # share of reading errors in the most likely model
     sigma_reading: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of one reading: likeliest, 5 % and 95 % point
+    X: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns of ``names``
+    evidence: tuple[Evidence, ...] = ()  # of each block
 
 
 def fit(
-    X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False
-) -> Estimate:
+    X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False,
+    blocks: Sequence[Block] = (),
+) -> Estimate:  # fmt: skip
     """Return the coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
 
-    readings: the data are differences of readings at t0 and t1, neighbours share one.
+    readings: the data are differences of readings at t0 and t1, neighbours share one.  blocks: effects that may be in
+    the data too (gyrobench.reduction.estimation.nuisance_states); their columns must not be combinations of X.  The
+    coefficients of those that are, with a probability above JOINED, follow the others.
 
     Raises RegressionError (a ValueError) for data that cannot carry the model and for windows without length or out
     of order.  u, half width and interval are in the unit of the coefficients.
@@ -101,63 +133,174 @@ def fit(
     grid = noise.noise_grid(t0, t1, readings)
     scale = np.linalg.norm(X, axis=0)
     Q, R = np.linalg.qr(X / scale)
-    start = Q.T @ y
-    remainder = y - Q @ start
-    both = np.column_stack([Q, remainder])
+    Z = np.column_stack([np.empty((n, 0)), *(b.columns for b in blocks)])
+    z_scale = np.linalg.norm(Z, axis=0)
+    start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
+    remainder = y - Q @ start[:p]
+    both = np.column_stack([Q, Z / z_scale, remainder])
     M, xy, yy, logdet = _moments(t0, t1, both, grid)
-    Mi = np.linalg.inv(M)
-    b = np.einsum("gpq,gq->gp", Mi, xy)
-    rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
-    ll = -0.5 * (logdet + np.linalg.slogdet(M)[1] + (n - p) * np.log(np.maximum(rss, 1e-300)))
-    ll += np.log(grid.prior)
-    if np.linalg.norm(remainder) <= 1e-12 * np.linalg.norm(y):  # ideal data: what is left is rounding, no noise
-        ll = np.where((grid.share == 0.0) & (grid.reading == 0.0), 0.0, -np.inf)
+    T = np.zeros((start.size, start.size))  # back from the columns of both
+    T[:p, :p] = np.linalg.inv(R) / scale[:, None]
+    T[p:, p:] = np.diag(1.0 / z_scale)
+    likely, unit = _all_in(blocks, M, xy, yy, logdet, n, p, grid.prior)
+    each = list(nuisance_states.states(blocks, z_scale, M, p, likely, unit))
+    parts = [_posterior(s, M, xy, yy, logdet, n, p) for s in each]
+    ll = np.array([part[0] for part in parts]) + np.log(grid.prior)  # (states, models)
+    white_only = (grid.share == 0.0) & (grid.reading == 0.0)
+    tiny = 1e-12 * np.linalg.norm(y)
+    if np.linalg.norm(remainder) <= tiny:  # ideal data: what is left is rounding, no noise
+        ll = np.where(white_only & (np.arange(len(each)) == 0)[:, None], 0.0, -np.inf)
+    elif blocks and np.linalg.norm(remainder - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], remainder)[0]) <= tiny:
+        ll = np.where(white_only, ll, -np.inf)
     w = np.exp(ll - ll.max())
     w /= w.sum()
+    flat = w.ravel()
+    b, s2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
 
-    T = np.linalg.inv(R) / scale[:, None]  # back from orthonormal columns
     estimates = (start + b) @ T.T
-    beta = T @ (start + w @ b)
-    s2 = rss / (n - p)
-    cov_each = s2[:, None, None] * (T @ Mi @ T.T)
+    beta = flat @ estimates
     off = estimates - beta
-    covariance = np.einsum("g,gpq->pq", w, cov_each) + np.einsum("g,gp,gq->pq", w, off, off)
-    counts = w > LIGHT * w.max()
-    mixture = Mixture(w[counts] / w[counts].sum(), off[counts], cov_each[counts], n - p)
-    sd, half = mixture.spread(np.eye(p))
+    counts = flat > LIGHT * flat.max()
+    cov_each = T @ np.concatenate([part[3] for part in parts])[counts] @ T.T
+    best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
+    dof = n - p - each[best].flat
+    mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof)
+    evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
+    keep = np.concatenate([np.ones(p, bool), *(np.full(e.block.columns.shape[1], e.joined) for e in evidence)])
+    mixture = replace(mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep])
+    eye = np.eye(int(keep.sum()))
+    covariance = np.einsum("g,gpq->pq", mixture.weight, mixture.covariance)
+    covariance += np.einsum("g,gp,gq->pq", mixture.weight, mixture.off, mixture.off)
+    sd, half = mixture.spread(eye)
     sd = np.maximum(sd, 1e-300)
     u = np.minimum(sd, half / NORMAL)
     covariance = covariance * np.outer(u / sd, u / sd)
-    probability = mixture.outside(np.eye(p), np.abs(beta))
+    probability = mixture.outside(eye, np.abs(beta[keep]))
 
-    k = int(np.argmax(ll))
-    best = slice(k, k + 1)
-    Z = noise.whiten(t0, t1, both, grid.tau[best], grid.share[best], grid.reading[best])[0][:, 0, :]
-    scatter = Z[:, p] - Z[:, :p] @ b[k]
+    index, at = each[best].index, int(best) * grid.tau.size + int(k)
+    only = slice(k, k + 1)
+    Zk = noise.whiten(t0, t1, both, grid.tau[only], grid.share[only], grid.reading[only])[0][:, 0, :]
+    Mk = M[k][np.ix_(index, index)] + np.diag(each[best].precision[k])
+    scatter = Zk[:, -1] - Zk[:, index] @ b[at, index]
     model = float(grid.tau[k]), float(grid.share[k]), float(grid.reading[k])
-    gain = T @ Mi[k] @ noise.whiten_transposed(t0, t1, Z[:, :p], model).T
+    gain = np.zeros((start.size, n))
+    gain[index] = np.linalg.solve(Mk, noise.whiten_transposed(t0, t1, Zk[:, index], model).T)
+    gain = (T @ gain)[keep]
     window = float(np.median(t1 - t0))
     v = noise.mean_variance(window / grid.tau)
-    white = float(w[(grid.share == 0.0) & (grid.reading == 0.0)].sum())
-    without_reading = s2 * (1.0 - grid.reading)
-    tau = _spread(w, grid.tau, k, grid.share > 0.0)
-    sigma = _spread(w, np.sqrt(without_reading * grid.share / v), k)
-    density = _spread(w, np.sqrt(without_reading * (1.0 - grid.share) * window), k)
+    models, best_s2 = w.sum(axis=0), s2.reshape(w.shape)[best]
+    white = float(models[white_only].sum())
+    without_reading = best_s2 * (1.0 - grid.reading)
+    tau = _spread(models, grid.tau, int(k), grid.share > 0.0)
+    sigma = _spread(models, np.sqrt(without_reading * grid.share / v), int(k))
+    density = _spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), int(k))
     record = float(t1[-1] - t0[0])
     warnings = []
-    slow = float(w[grid.share == 0.0].sum()) < 0.5
+    slow = float(models[grid.share == 0.0].sum()) < 0.5
     if slow and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
             f"{tau[2]:.3g} s). Slower drift is confounded with the constant term, whose interval is valid for this "
             "record only."
         )
+    columns = np.column_stack([X, Z])[:, keep]
+    joined = tuple(c for e in evidence if e.joined for c in e.names)
     return Estimate(
-        tuple(names), beta, covariance, u, half, probability, equivalent_dof(half / u), y - X @ beta,
-        scatter / math.sqrt(s2[k]), gain, design, white, tau, sigma, density,
-        model[:2], tuple(warnings), mixture, model[2],
-        _spread(w, np.sqrt(s2 * grid.reading / 2.0) * window, k),
+        (*names, *joined), beta[keep], covariance, u, half, probability, equivalent_dof(half / u),
+        y - columns @ beta[keep], scatter / math.sqrt(max(float(s2[at]), 1e-300)), gain, design, white, tau, sigma,
+        density, model[:2], tuple(warnings), mixture, model[2],
+        _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
     )  # fmt: skip
+
+
+def _all_in(
+    blocks: Sequence[Block], M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int, prior: Array
+) -> tuple[Array, float]:
+    """Weights (G,) of the noise models with all single effects in the design; standard deviation of unit weight."""
+    single = np.concatenate([np.ones(p, bool), *(np.full(b.columns.shape[1], not b.scatter) for b in blocks)])
+    A, c = M[:, single][:, :, single], xy[:, single]
+    rss = np.maximum(yy - np.einsum("gp,gpq,gq->g", c, np.linalg.inv(A), c), 1e-300)
+    m = n - A.shape[1]
+    ll = np.log(prior) - 0.5 * (logdet + np.linalg.slogdet(A)[1] + m * np.log(rss))
+    likely = np.exp(ll - ll.max())
+    likely /= likely.sum()
+    return likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
+
+
+def _posterior(
+    s: State, M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int
+) -> tuple[Array, Array, Array, Array]:
+    """Log likelihood, coefficients (G, all), variance of unit weight and covariance (G, all, all)."""
+    index = np.array(s.index)
+    A = M[:, index][:, :, index] + s.precision[:, :, None] * np.eye(len(index))
+    inverse = np.linalg.inv(A)
+    b = np.zeros(xy.shape)
+    b[:, index] = np.einsum("gpq,gq->gp", inverse, xy[:, index])
+    rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
+    m = n - p - s.flat
+    ll = -0.5 * (logdet + np.linalg.slogdet(A)[1] + m * np.log(np.maximum(math.pi * rss, 1e-300)))
+    ll += s.log_weight + math.lgamma(m / 2.0)
+    s2 = rss / m
+    covariance = np.zeros(M.shape)
+    covariance[:, index[:, None], index] = s2[:, None, None] * inverse
+    return ll, b, s2, covariance
+
+
+def _evidence(
+    blocks: Sequence[Block], each: Sequence[State], w: Array, estimates: Array, mixture: Mixture,
+    counts: NDArray[np.bool_], s2: Array, p: int,
+) -> list[Evidence]:  # fmt: skip
+    """What the data say of each block; estimates (states * models, all columns), w and s2 (states, models)."""
+    found, at, flat = [], p, w.ravel()
+    sd = np.sqrt(np.maximum(np.einsum("gpp->gp", mixture.covariance), 0.0))
+    total = np.zeros_like(estimates)
+    total[counts] = sd**2
+    for j, block in enumerate(blocks):
+        present = np.array([s.blocks[j] for s in each])
+        probability = float(w[present].sum())
+        inside = np.repeat(present, w.shape[1])
+        columns = slice(at, at + block.columns.shape[1])
+        at = columns.stop
+
+        def mean(rows: NDArray[np.bool_]) -> tuple[Array, Array]:
+            part = np.where(rows & counts, flat, 0.0)
+            if not part.sum() > 0.0:
+                part = np.where(rows, 1.0, 0.0)
+            part = part / part.sum()
+            centre = part @ estimates
+            return centre, np.sqrt(part @ (total + (estimates - centre) ** 2))
+
+        (with_it, u_with), (without, u_without) = mean(inside), mean(~inside)
+        spread = (0.0, 0.0, 0.0, 0.0)
+        if block.scatter:
+            size = np.array([s.scatter[j] if j in s.scatter else np.zeros(w.shape[1]) for s in each]) * np.sqrt(s2)
+            part = np.where(present[:, None], w, 0.0).ravel()
+            spread = _moments_of(size.ravel(), part)
+        found.append(
+            Evidence(
+                block,
+                probability,
+                with_it[columns],
+                u_with[columns],
+                with_it[:p] - without[:p],
+                np.maximum(u_without[:p], 1e-300),
+                u_with[:p],
+                spread,
+            )
+        )
+    return found
+
+
+def _moments_of(values: Array, weight: Array) -> tuple[float, float, float, float]:
+    """Mean, standard deviation, 2.5 % and 97.5 % point of weighted values; zeros without weight."""
+    if not weight.sum() > 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    weight = weight / weight.sum()
+    centre = float(weight @ values)
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.025, 0.975))
+    return centre, math.sqrt(float(weight @ (values - centre) ** 2)), low, high
 
 
 def ordinary(
@@ -179,7 +322,7 @@ def ordinary(
     return Estimate(
         ols.names, ols.beta, ols.covariance, ols.u, ols.half_width(), ols.p, dof, ols.residual, whitened,
         ols.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
-        Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof),
+        Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof), X=X,
     )  # fmt: skip
 
 
@@ -211,7 +354,8 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
     for k in range(40):
         excess = _tails(w, off, size, dof, x) - (1.0 - level)
         low, high = np.where(excess > 0.0, x, low), np.where(excess > 0.0, high, x)
-        density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
+        with np.errstate(over="ignore"):  # a constant that a combination does not have: sd 0
+            density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
         step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
         new = np.where((step >= low) & (step <= high) & (k < 12), step, (low + high) / 2.0)
         done = bool(np.all(np.abs(new - x) <= 1e-9 * high))

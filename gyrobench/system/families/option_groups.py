@@ -16,6 +16,12 @@ SITE = {
 TORQUER = {
     "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),
 }
+NUISANCES = {
+    "nuisances": Option("auto", str, "set-up effects (trend, temperature ...): weighed by the data (auto), or none"),
+}
+TILT = {
+    "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)"),
+}
 FOLD = {"fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS")}
 SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 0.0)}
 ATTITUDE = {

@@ -1,0 +1,188 @@
+"""Candidates for the nuisance model of a drift test, which of them a plan shows, and the table of what became of them.
+
+    candidates = [trend(t_start, t_end), Candidate.of("ε_IO", "input axis towards output axis", "arcsec", column)]
+    found = fit(quantities, X, y, ..., candidates=candidates)          # gyrobench.reduction.estimation.linear_fit
+
+A candidate whose columns the coefficients (and the candidates before it) make up themselves is not observable and is
+named with what it is aliased with.  The others are weighed by the fit (nuisance_states); from a probability of 95 % on
+they are reported with the coefficients, below it only the intervals hold them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation.nuisance_states import Block
+
+Array = NDArray[np.float64]
+MOUNTS = "standard deviation of the drift from mount to mount"
+DPH = units.factor("deg/h")
+FREEDOM = 10  # degrees of freedom that must be left beside all candidates
+CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
+VISIBLE = 1e-3  # least share of a column's length at right angles to the others
+COLUMNS = ["candidate", "meaning", "estimate", "u", "unit", "probability", "in the model", "largest change", "of u"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One possible effect: columns (n,) or (n, k) of the data per SI unit of it; see nuisance_states.Block."""
+
+    name: str
+    meaning: str
+    unit: str  # printed
+    scale: float  # of it in SI
+    columns: Array
+    scatter: bool = False
+
+    @classmethod
+    def of(cls, name: str, meaning: str, unit: str, columns: Array) -> Candidate:
+        return cls(name, meaning, units.display(unit), units.factor(unit), columns)
+
+    @property
+    def block(self) -> Block:
+        return Block(self.name, np.reshape(self.columns, (len(self.columns), -1)), self.scatter)
+
+
+def trend(t_start: Array, t_end: Array) -> Candidate:
+    """Drift that changes linearly in time; its column has no mean, so that the constant is that of the middle."""
+    middle = (t_start + t_end) / 2.0
+    hours = (middle - np.average(middle, weights=t_end - t_start)) / 3600.0
+    return Candidate("trend", "linear change of the drift in time", "°/h/h", DPH, hours)
+
+
+def temperature(windows: Mapping[str, Array], rows: slice | Array = slice(None)) -> list[Candidate]:
+    """One candidate of each column temperature... of a record: its mean over all (K) and, of two, their difference."""
+    named = {n: np.asarray(v, dtype=float)[rows] for n, v in windows.items() if n.startswith("temperature")}
+    values = list(named.values())
+    if not values:
+        return []
+    mean = np.mean(values, axis=0)
+    found = [Candidate("temperature", "drift per kelvin", "°/h/K", DPH, mean - mean.mean())]
+    if len(values) == 2:
+        step = values[1] - values[0]
+        between = " and ".join(named)
+        found.append(Candidate("gradient", f"drift per kelvin between {between}", "°/h/K", DPH, step - step.mean()))
+    return found
+
+
+def scatter(name: str, meaning: str, groups: Sequence[object]) -> Candidate:
+    """Constants that scatter from group to group: groups (n,) names each row's mount, or turn-on."""
+    keys = list(dict.fromkeys(groups))
+    columns = np.array([[g == k for k in keys] for g in groups], dtype=float)
+    return Candidate(name, meaning, "°/h", DPH, columns, scatter=True)
+
+
+def common(windows: Mapping[str, Array]) -> list[Candidate]:
+    """The candidates of every test: a trend and what thermometers read (columns temperature...)."""
+    t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
+    return [trend(t0, t1), *temperature(windows)]
+
+
+def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:
+    """Return the number of the mount of each row: phases one after the other on the same face are one mount."""
+    order = list(dict.fromkeys(np.asarray(phase).astype(int).tolist()))
+    number = {order[0]: 0}
+    for before, p in pairwise(order):
+        number[p] = number[before] + (not np.allclose(faces[before], faces[p]))
+    return [number[p] for p in np.asarray(phase).astype(int).tolist()]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A candidate that this plan does not show, and why."""
+
+    candidate: Candidate
+    reason: str
+
+
+def observable(X: Array, names: Sequence[str], candidates: Iterable[Candidate]) -> tuple[list[Candidate], list[Hidden]]:
+    """Return the candidates that the data can tell from the coefficients ``names`` of X and from one another."""
+    seen: list[Candidate] = []
+    hidden: list[Hidden] = []
+    model, known = X, list(names)
+    for c in sorted(candidates, key=lambda c: c.scatter):  # a scatter last: it takes what is left
+        columns = c.block.columns
+        if not np.any(np.abs(columns).max(axis=0) > 0.0):
+            continue  # it does not occur: no temperature but one
+        unit = columns / np.where(np.linalg.norm(columns, axis=0) > 0.0, np.linalg.norm(columns, axis=0), 1.0)
+        left = unit - model @ np.linalg.lstsq(model, unit, rcond=None)[0]
+        contrasts = int(np.sum(np.linalg.svd(left, compute_uv=False) > VISIBLE))
+        if X.shape[0] - model.shape[1] - columns.shape[1] < FREEDOM:
+            hidden.append(Hidden(c, f"not tested: fewer than {FREEDOM} degrees of freedom would be left"))
+        elif c.scatter and contrasts < CONTRASTS:
+            text = "all of its constants" if not contrasts else f"all but {contrasts} of its contrasts"
+            hidden.append(
+                Hidden(c, f"not observable: {text} aliased with {', '.join(_partners(columns, model, known))}; repeat")
+            )
+        elif not c.scatter and contrasts < columns.shape[1]:
+            hidden.append(Hidden(c, f"not observable: aliased with {', '.join(_partners(columns, model, known))}"))
+        else:
+            seen.append(c)
+            if not c.scatter:
+                model = np.column_stack([model, columns])
+                known += [c.name] * columns.shape[1]
+    return seen, hidden
+
+
+def _partners(columns: Array, model: Array, names: Sequence[str]) -> list[str]:
+    """Names of the columns of the model that make up ``columns``."""
+    scale = np.linalg.norm(model, axis=0)
+    share = np.abs(np.linalg.lstsq(model / scale, columns, rcond=None)[0]).max(axis=1)
+    return list(dict.fromkeys(n for n, v in zip(names, share, strict=True) if v > 0.05 * share.max()))
+
+
+def table(
+    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: noise_mixture_fit.Estimate, names: Sequence[str]
+) -> dict[str, object] | None:
+    """The candidates with their estimates (if present), probabilities and what they change most; None without any."""
+    rows: list[list[object]] = []
+    for c, e in zip(candidates, est.evidence, strict=True):
+        change = e.change / e.u_without
+        j = int(np.argmax(np.abs(change)))
+        value, u = (e.scatter[0], e.scatter[1]) if c.scatter else (float(e.value[0]), float(e.u[0]))
+        joined = "yes" if e.joined else "no; the intervals allow for it"
+        rows.append(
+            [c.name, c.meaning, value / c.scale, u / c.scale, c.unit, e.probability, joined, names[j], float(change[j])]
+        )
+    for h in hidden:
+        rows.append([h.candidate.name, h.candidate.meaning, None, None, h.candidate.unit, None, h.reason, "", None])
+    if not rows:
+        return None
+    caption = (
+        "Set-up effects weighed by the data, each with even odds beforehand. Estimate and u: if it is present. Largest "
+        "change: coefficient that moves most when the effect is in the model, in its u without the effect. Estimates "
+        "and intervals are means over all combinations, weighted by their probabilities."
+    )
+    return {"title": "Nuisance model", "caption": caption, "columns": COLUMNS, "rows": rows}
+
+
+def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
+    """Return what joined the model, as sentences."""
+    out = []
+    for c, e in zip(candidates, est.evidence, strict=True):
+        if not e.joined:
+            continue
+        value, u = (e.scatter[0], e.scatter[1]) if c.scatter else (float(e.value[0]), float(e.u[0]))
+        out.append(
+            f"In the model: {c.meaning}, {c.name} = {value / c.scale:.3g} {c.unit} (u = {u / c.scale:.2g} {c.unit}, "
+            f"probability {_percent(e.probability)})."
+        )
+    return out
+
+
+def _percent(p: float) -> str:
+    return "above 99.9 %" if p > 0.999 else f"{100.0 * p:.3g} %"
+
+
+def reported(
+    candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate
+) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+    """Return those that joined."""
+    return [(c, e) for c, e in zip(candidates, est.evidence, strict=True) if e.joined]
