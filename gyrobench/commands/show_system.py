@@ -34,9 +34,9 @@ def show_system(
     invalid = list(system.check()) or system.check_parameters(parameters)
     description["notes"] += [f"a run is refused: {p}" for p in invalid]
     if picture is not None:
-        from gyrobench.report import diagrams
+        from gyrobench.report import wiring_figure
 
-        picture.write_text(diagrams.system(description["order"], description, "system"), encoding="utf-8")
+        picture.write_text(wiring_figure.draw(description["order"], description, "system"), encoding="utf-8")
         console.print_note(str(picture)) if as_json else print(picture)
     if as_json:
         print(json.dumps(description, indent=1, ensure_ascii=False))

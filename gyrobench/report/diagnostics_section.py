@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.report import diagrams, plots
+from gyrobench.report import budget_figure, plots
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     CollapsedBlocks,
@@ -258,6 +258,6 @@ def budget(doc: Json) -> list[Any]:
         small=True,
     )
     return [
-        *pictures(Picture("budget", diagrams.budget(lines, u, "budget"), caption, alt)),
+        *pictures(Picture("budget", budget_figure.budget(lines, u, "budget"), caption, alt)),
         CollapsedBlocks("All lines of the budget", [table]),
     ]

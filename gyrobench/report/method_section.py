@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.report import diagrams
+from gyrobench.report import wiring_figure
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -41,7 +41,7 @@ def system(doc: Json) -> list[Any]:
             "Components on the diagonal in execution order. Connections above the diagonal (solid) carry values of the "
             "current communication step, those below it (dashed) values of the previous one."
         )
-        svg = diagrams.system(order, run, "system")
+        svg = wiring_figure.draw(order, run, "system")
         blocks += pictures(
             Picture("system", svg, caption, "Components in execution order with their connections: " + ", ".join(order))
         )

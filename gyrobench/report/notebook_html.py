@@ -133,7 +133,7 @@ def _main_figure(doc: Mapping[str, Any]) -> str:
 @notebook.html.register
 def record_html(record: Record) -> str:
     """Return the first windows, the range of each channel, and the first channels against time."""
-    from gyrobench.report import plots
+    from gyrobench.report import channel_figure
     from gyrobench.report.style import styled
 
     run = record.run
@@ -142,10 +142,12 @@ def record_html(record: Record) -> str:
     blocks = [paragraph(f"Record of {run.system}", strong=True), paragraph(f"{run.title}; {origin}.{state}")]
     blocks += [table_html(t) for t in (_first_windows(record), _channel_ranges(record)) if t.rows]
     if len(record.channels) > 1:
-        names = [n for n in record.channels if n != "time"][:MAX_CHANNELS]
+        shown = channel_figure.panels(record.channels, run.units, most=MAX_CHANNELS)
         key = f"nb{abs(hash((run.system, run.seed, tuple(run.tables.values()), id(record)))):x}"
         with styled():
-            blocks.append(figure_html(plots.channels(record.channels, names, run.units, key)))
+            blocks.append(
+                figure_html(channel_figure.draw(record.channels, shown, run.units, key, run.as_dict()["plan"]))
+            )
     return fragment(*blocks)
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gyrobench.report.numbers import superscript
 from gyrobench.report.style import (
     BLUE,
     CYCLE,
@@ -117,42 +116,6 @@ def residuals_in_time(series: Sequence[Json], key: str) -> str:
     ax.margins(x=0.01)
     span_labels(ax, spans)
     return svg(fig, key, zoom=ax)
-
-
-# what is recorded in SI and read in other units
-_SHOWN = {"rad": ("°", 180.0 / math.pi), "rad/s": ("°/h", 648000.0 / math.pi)}
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M"}
-
-
-def scaled(values: Sequence[float], unit: str) -> tuple[float, str]:
-    """Factor and unit in which values recorded in an SI unit are easy to read: °, °/h, µV, mA, or 10⁻⁶ of the unit."""
-    shown, factor = _SHOWN.get(unit, (unit, 1.0))
-    size = factor * max((abs(v) for v in values), default=0.0)
-    exponent = 3 * math.floor(math.log10(size) / 3.0) if size > 0.0 else 0
-    if 1e-2 <= size < 1e5:
-        return factor, shown
-    if shown in ("V", "A", "N", "m", "s", "W") and exponent in _PREFIXES:
-        return factor * 10.0**-exponent, _PREFIXES[exponent] + shown
-    return factor * 10.0**-exponent, f"10{superscript(exponent)} {shown}"
-
-
-def channels(record: Json, names: Sequence[str], units: Mapping[str, str], key: str) -> str:
-    """Recorded channels against time, one above the other, decimated by their min-max envelope."""
-    time = [float(v) for v in record["time"]]
-    if len(time) < 3 or not names:
-        return ""
-    divisor, time_unit = time_axis(time)
-    fig, axes = figure(WIDE, 14 + 27 * len(names), nrows=len(names), sharex=True)
-    for ax, name in zip(axes[:, 0], names, strict=True):
-        t, y = finite(time, [float(v) for v in record[name]])
-        factor, unit = scaled(y, units.get(name, "SI"))
-        t, y = envelope([v / divisor for v in t], [v * factor for v in y])
-        ax.plot(t, y, "-", color=BLUE, linewidth=0.8)
-        ax.set_title(axis_label(name, unit), pad=3)
-        ax.margins(x=0.01)
-        ax.locator_params(axis="y", nbins=4)
-    axes[-1, 0].set_xlabel(axis_label("time", time_unit))
-    return svg(fig, key, zoom=axes[-1, 0])
 
 
 def acf(data: Json, key: str) -> str:

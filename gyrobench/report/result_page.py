@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.record.run_document import ABOUT, SetupError
-from gyrobench.report import diagnostics_section, method_section, plots, responses
+from gyrobench.report import channel_figure, diagnostics_section, method_section, plots, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -209,17 +209,20 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _shown(record: Mapping[str, Any], units: Mapping[str, str], most: int = 6) -> list[str]:
-    """Return the channels to draw: the first ones, those that do not move and counters and flags after the others."""
-    names = [n for n in record if n != "time"]
-
-    def dull(name: str) -> bool:
-        values = [float(v) for v in record[name]]
-        whole = units.get(name) == "1" and all(v.is_integer() for v in values)
-        return whole or not values or min(values) == max(values)
-
-    chosen = sorted(names, key=dull)[:most] if len(names) > most else names
-    return [n for n in names if n in chosen]
+def _channels(run: Json, record: Mapping[str, Any]) -> list[Any]:
+    """Return the figure of the channels that the system shows."""
+    units = run.get("units") or {}
+    shown = channel_figure.panels(record, units, run.get("shown") or ())
+    caption = (
+        "Recorded channels against time. Long records are drawn as the envelope of minimum and maximum in each "
+        "interval."
+    )
+    names = [n for panel in shown for n in panel]
+    left = [n for n in record if n != "time" and n not in names]
+    caption += f" Not drawn: {', '.join(left)}." if left else ""
+    svg = channel_figure.draw(record, shown, units, "channels", run.get("plan") or ()) if shown else ""
+    alt = "Recorded channels against time: " + ", ".join(names)
+    return pictures(Picture("channels", svg, caption, alt, zoom=True))
 
 
 def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
@@ -240,16 +243,7 @@ def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
             )
             alt = f"Points and fitted curve with residuals: {both}"
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
-    units = doc["provenance"].get("units") or {}
-    names = _shown(record, units)
-    caption = (
-        "Recorded channels against time. Long records are drawn as the envelope of minimum and maximum in each "
-        "interval."
-    )
-    svg = plots.channels(record, names, units, "channels") if names else ""
-    blocks += pictures(
-        Picture("channels", svg, caption, "Recorded channels against time: " + ", ".join(names), zoom=True)
-    )
+    blocks += _channels(doc["provenance"], record)
     rows = []
     for k, s in enumerate(doc["series"]):
         rows.append(

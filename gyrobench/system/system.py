@@ -108,6 +108,8 @@ class System(Configurable):
     windows: ClassVar[Windows | None] = None
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
     channels: ClassVar[Iterable[str]] = ()  # "slot.output" recorded every channel_period
+    #: channels that a report draws, a panel an entry: names, of a vector without its index; (): the first ones
+    shown: ClassVar[Iterable[str]] = ()
     channel_period: float = 1.0  # s
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result

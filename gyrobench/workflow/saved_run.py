@@ -38,7 +38,7 @@ def reduce_run(system: System, record: Record, limits: Specification | None) -> 
 
     result = system.reduce(record, limits)
     wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
-    result.provenance = {**record.run.as_dict(), "wires": wires}
+    result.provenance = {**record.run.as_dict(), "wires": wires, "shown": list(system.shown)}
     check_truth(result, set_values(record.run))
     return result
 

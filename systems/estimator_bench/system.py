@@ -54,6 +54,7 @@ class EstimatorBench(System):
         "estimator.variance",
         "estimator.latency",
     )
+    shown = ("source.z source.truth estimator.estimate", "estimator.variance estimator.R_hat", "estimator.latency")
 
     @property
     def benchmark(self) -> Benchmark:

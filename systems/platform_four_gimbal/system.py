@@ -42,10 +42,14 @@ class PlatformFourGimbal(TwoGyroTest):
         "rate_max": Option(5.0, "rad/s", "largest rate of a gimbal", 0.1),
         "load": Option(50.0, "N.m", "disturbance torque of the steps; 0: none, and no sweeps"),
     }
-    channels = (  # those that a report draws come first
+    channels = (
         *three("platform.attitude"), "platform.theta_4", *three("platform.theta"), "exciter.phase", "exciter.gate",
         *three("exciter.torque", "exciter.test", "motion.omega", "platform.theta_dot"), "platform.theta_4_dot",
         "platform.lock", "pitch.e", "roll.e", "azimuth.e", "gyro_a.saturated", "gyro_b.saturated",
+    )  # fmt: skip
+    shown = (
+        "platform.attitude", "platform.theta platform.theta_4", "platform.theta_dot platform.theta_4_dot",
+        "motion.omega", "pitch.e roll.e azimuth.e", "platform.lock gyro_a.saturated gyro_b.saturated",
     )  # fmt: skip
 
     def flown(self) -> Any:

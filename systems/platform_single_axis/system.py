@@ -57,6 +57,10 @@ class PlatformSingleAxisLoop(OneAxisTest):
         *OneAxisTest.channels, "platform.saturated", "rebalance.i_read", "rebalance.saturated", "estimator.estimate",
         "estimator.latency", "stabilizer.e", "stabilizer.v",
     )  # fmt: skip
+    shown = (
+        "platform.attitude", "platform.omega", "rebalance.i_read estimator.estimate", "stabilizer.v",
+        "exciter.motion_angle", "exciter.torque", "platform.saturated rebalance.saturated",
+    )  # fmt: skip
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:

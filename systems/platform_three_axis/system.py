@@ -76,6 +76,10 @@ class PlatformThreeAxis(ThreeAxisTest):
         *three("motion.angle", "platform.attitude", "platform.theta"), "platform.lock", "platform.saturated",
         "decoupler.saturated", *(f"{axis}.e" for axis in AXES), *(f"{axis}.v" for axis in AXES),
     )  # fmt: skip
+    shown = (
+        "platform.attitude", "motion.angle", "platform.theta", "pitch.e roll.e azimuth.e", "pitch.v roll.v azimuth.v",
+        "platform.lock platform.saturated decoupler.saturated",
+    )  # fmt: skip
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:

@@ -59,12 +59,16 @@ class PlatformThreeGimbal(TwoGyroTest):
         "torquer": Option(1e-4, "1", "error of the torquers' scale factors"),
         "command": Option(2e-3, "rad/s", "rate commanded about the platform's z"),
     }
-    channels = (  # those that a report draws come first
+    channels = (
         *three("platform.attitude", "platform.theta"), "exciter.phase", "exciter.gate",
         *three("exciter.torque", "exciter.test"), "exciter.command[3]",
         *three("motion.omega", "platform.theta_dot"), "platform.lock", "pitch.e", "roll.e", "azimuth.e",
         "gyro_a.u_y", "gyro_b.u_x", "gyro_a.drift_x", "gyro_a.drift_y", "gyro_b.drift_x", "gyro_b.drift_y",
         "gyro_a.saturated", "gyro_b.saturated",
+    )  # fmt: skip
+    shown = (
+        "platform.attitude", "platform.theta", "platform.theta_dot", "motion.omega", "pitch.e roll.e azimuth.e",
+        "platform.lock gyro_a.saturated gyro_b.saturated",
     )  # fmt: skip
 
     def legs(self) -> list[Leg]:

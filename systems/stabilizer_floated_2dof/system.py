@@ -82,6 +82,10 @@ class StabilizerFloated2dof(OneAxisTest):
     step = 1e-4
     channel_period = 1e-3
     channels = (*OneAxisTest.channels, "platform.saturated", "gyro.saturated", "stabilizer.e")
+    shown = (
+        "platform.attitude", "platform.omega", "stabilizer.e", "exciter.torque", "exciter.motion_angle",
+        "platform.saturated gyro.saturated",
+    )  # fmt: skip
 
     def phases(self) -> list[LoopPhase]:
         settle = 3.0  # s: the slowest pole of the default loop, -4.96 1/s, leaves exp(-7) in the second half

@@ -50,6 +50,7 @@ class StabilizerPower2dof(LoopTest):
         "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.torque[2]", "exciter.test[1]",
         "motion.angle[1]", "gyro.alpha", "gyro.beta", "stabilizer.e", "stabilizer.v", "gyro.drift_x",
     )  # fmt: skip
+    shown = ("gyro.alpha", "gyro.beta", "stabilizer.v", "motion.angle", "exciter.torque")
     noises = noises(channels=("_x", "_y"))
     options = {
         "K_m": Option(100.0, "N.m/rad", "stiffness of the correction, ratio k_u k_i k_m", 0.0),

@@ -57,6 +57,7 @@ class StabilizerSdf(OneAxisTest):
     }
     step = 1e-3
     channels = (*OneAxisTest.channels, "gyro.b", "stabilizer.e")
+    shown = ("platform.attitude", "platform.omega", "gyro.b", "exciter.torque", "exciter.motion_angle")
     channel_period = 1e-2
 
     def axis(self) -> Axis:

@@ -64,6 +64,14 @@ class VerticalGyroBench(LoopTest):
         "exciter.phase", "exciter.gate", "motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll",
         "gyro.e_x", "gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
     )  # fmt: skip
+    shown = (
+        "motion.angle",
+        "gyro.pitch gyro.roll",
+        "gyro.e_x gyro.e_y",
+        "gyro.inner",
+        "gyro.ring_angle",
+        "erection.cut",
+    )
     channel_period = 0.1
 
     def flown(self) -> list[str]:

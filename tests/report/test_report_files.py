@@ -349,12 +349,12 @@ def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
 
 def test_wiring_drawing_stands_alone():
     """The wiring drawing also stands alone, from the description of a system."""
-    from gyrobench.report.diagrams import system
+    from gyrobench.report.wiring_figure import draw
 
     description = {
         "wires": [{"wire": "a.x[1] -> b.y[1]", "connected": True}, {"wire": "b.z -> a.w", "connected": True}]
     }
-    svg = system(["a", "b"], description, "s")
+    svg = draw(["a", "b"], description, "s")
     assert svg.startswith("<svg") and svg.rstrip().endswith("</svg>")
     assert "xmlns=" in svg
 

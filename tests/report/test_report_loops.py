@@ -13,15 +13,17 @@ import pytest
 from reading import Written
 
 from gyrobench import report
+from gyrobench.bench import Bench
 from gyrobench.report.assets import read_content
+from gyrobench.report.channel_figure import panels, scaled
 from gyrobench.report.comparison_page import comparison
 from gyrobench.report.responses import draw
 from gyrobench.report.result_json import document
-from gyrobench.report.result_page import _shown
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
 from gyrobench.result import Coefficient, LoopResult, Response, Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.system import load_system
 
 PLAN = LoopPlan(
     [LoopPhase("load", "torque", "step", 1, 0.5, settle=1.0, dwell=2.0), *sweep("loop", "test", [1.0], 0.1)]
@@ -148,9 +150,41 @@ def test_channels_that_tell_nothing_give_way() -> None:
     moving = {f"gyro.{n}": [0.1, 0.2] for n in "abcdef"}
     record = {"time": [0.0, 1.0], "exciter.phase": [1.0, 2.0], "gyro.still": [0.5, 0.5], **moving}
     units = {"exciter.phase": "1", "gyro.still": "rad"}
-    assert _shown(record, units) == list(moving)
+    assert panels(record, units) == [[n] for n in moving]
     few = {k: record[k] for k in ("time", "exciter.phase", "gyro.still", "gyro.a")}
-    assert _shown(few, units) == ["exciter.phase", "gyro.still", "gyro.a"]
+    assert panels(few, units) == [["exciter.phase"], ["gyro.still"], ["gyro.a"]]
+
+
+def test_a_system_says_which_channels_matter() -> None:
+    """The attitude is the 8th quantity of the record; its elements share a panel, one that never moved is left out."""
+    early = {f"exciter.{n}": [0.1, 0.2] for n in "abcdefg"}
+    attitude = {f"platform.attitude[{k}]": [0.0, float(k != 2)] for k in (1, 2, 3)}
+    record = {"time": [0.0, 1.0], **early, **attitude, "pitch.e": [0.0, 1.0], "roll.e": [0.0, 2.0], "lock": [0.0, 0.0]}
+    declared = ("platform.attitude", "pitch.e roll.e", "lock", "absent")
+    assert panels(record, {}, declared) == [["platform.attitude[1]", "platform.attitude[3]"], ["pitch.e", "roll.e"]]
+
+
+def test_declared_channels_are_drawn_and_the_others_named(tmp_path: Any) -> None:
+    loop = result()
+    loop.provenance |= {"shown": ["platform.attitude"], "units": {"platform.attitude": "rad", "exciter.phase": "1"}}
+    t = np.linspace(0.0, 10.0, 50)
+    record = {"time": t, "exciter.phase": 1.0 + (t > 4.0), "platform.attitude": np.sin(t)}
+    html = Written(report.write(loop, tmp_path, ("json", "html"), record)).paths["html"].read_text(encoding="utf-8")
+    assert "Recorded channels against time: platform.attitude" in html and "Not drawn: exciter.phase" in html
+    assert 'id="channels-spanlabel-1"' in html  # load, then test
+
+
+@pytest.mark.parametrize("name", sorted(set(Bench.find().systems()) - {"drift_test_suite"}))
+def test_systems_show_channels_that_they_record(name: str) -> None:
+    system = load_system(name)
+    recorded = {re.sub(r"\[\d+\]$", "", n) for n in system.channels}
+    assert {n for entry in system.shown for n in entry.split()} <= recorded
+    assert system.shown or not system.loops
+
+
+def test_fast_rates_are_shown_in_degrees_a_second() -> None:
+    assert scaled([0.5], "rad/s")[1] == "°/s" and scaled([1e-3], "rad/s")[1] == "°/h"
+    assert scaled([1.0], "N.m")[1] == "N·m"
 
 
 def test_one_unit_or_few_units_of_many_rows_are_groups() -> None:
