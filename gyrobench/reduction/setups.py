@@ -48,18 +48,20 @@ class Setup:
 @dataclass(frozen=True, kw_only=True)
 class SiteSetup(Setup):
     """A test at a site: latitude rad, gravity m/s2, earth_rate rad/s.  nuisances: set-up effects that may be in the
-    data are weighed (gyrobench.reduction.estimation.nuisances).
+    data are weighed (gyrobench.reduction.estimation.nuisances).  robust: a robust fit is shown beside the plain one.
     """
 
     latitude: float
     gravity: float
     earth_rate: float = frames.EARTH_RATE
     nuisances: bool = True
+    robust: bool = False
 
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
         site = Site.of(run)
         place: dict[str, Any] = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
+        place["robust"] = bool(run.options.get("robust", False))
         place["nuisances"] = choice(run, "nuisances", ("auto", "none"), "auto") == "auto"
         return super().of(run, specification, **{**place, **own})
 
@@ -74,6 +76,7 @@ class SiteSetup(Setup):
             "site": self.site.shown(),
             "instrument": self.instrument,
             "simulated": self.truth is not None,
+            "robust": self.robust,
         }
 
     @property

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.estimation import regression, uncertainty
+from gyrobench.reduction.estimation import outliers, regression, uncertainty
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
@@ -55,6 +55,7 @@ def linear_result(
     no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
     harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
+    robust: bool = False,
 ) -> DriftTestResult:  # fmt: skip
     """Return the result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
 
@@ -62,10 +63,13 @@ def linear_result(
     unit.  no_closed: why there are no values of the source's formulas, if there should be.  tables: the method's own,
     {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
+    robust: a table with a robust fit beside this one.
     """
     coefficients = [_coefficient(fit, j, effects, specification or {}) for j in range(len(fit.quantities))]
     design = fit.est.design
-    fit_warnings = [*fit.est.warnings, *fit.warnings()]
+    odd = outliers.find(fit)
+    beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust else [])]
+    fit_warnings = [*outliers.warnings(fit, odd), *fit.est.warnings, *fit.warnings()]
     if no_closed:
         fit_warnings.append(f"No closed-form estimates: {no_closed}.")
     if design.condition > CONDITION:
@@ -97,7 +101,7 @@ def linear_result(
         budget=_budget(fit, effects, random),
         type_b=_type_b(fit, effects),
         repeatability=dict(repeatability or {}),
-        tables=[*_closed_table(fit, closed_caption), *tables, *fit.nuisance_tables()],
+        tables=[*_closed_table(fit, closed_caption), *tables, *fit.nuisance_tables(), *beside],
         warnings=[*fit_warnings, *warnings],
         summary=[*summary, *fit.nuisance_sentences()],
         decision_rule=uncertainty.DECISION_RULE,

@@ -133,7 +133,7 @@ def fit(
     known += tuple(Quantity(c.name, c.meaning, c.unit, c.scale) for c, _ in joined)
     return Findings(
         known, X, y, t_start, t_end, est, _reported(est, joined, X.shape[1]), list(groups), y_name, y_unit, y_scale,
-        noise == "white", weights, candidates=seen, hidden=hidden,
+        noise == "white", weights, candidates=seen, hidden=hidden, linear=known[: X.shape[1]], mode=noise,
     )  # fmt: skip
 
 
@@ -193,6 +193,9 @@ class Findings:
     tests: list[Test] = field(default_factory=list)
     candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
     hidden: Sequence[Hidden] = ()
+    linear: tuple[Quantity, ...] = ()  # those of the columns of X
+    mode: str = "estimated"  # noise, as of fit()
+    function: Callable[[Array], ArrayLike] | None = None  # of derive()
 
     def __post_init__(self) -> None:
         dof = self.dof
@@ -206,8 +209,13 @@ class Findings:
     @property
     def dof(self) -> int:
         """Data less coefficients, those of effects that joined among them."""
-        flat = sum(e.value.size for c, e in nuisances.reported(self.candidates, self.est) if not c.scatter)
+        flat = sum(e.value.size for c, e in self.joined if not c.scatter)
         return int(self.y.size) - int(self.X.shape[1]) - flat
+
+    @property
+    def joined(self) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+        """Effects of the nuisance model that are reported."""
+        return nuisances.reported(self.candidates, self.est)
 
     @property
     def value(self) -> Array:
@@ -234,17 +242,12 @@ class Findings:
         Effects that joined the model follow as they are.
         """
         r, p = self.est, self.X.shape[1]
-        beta, after = r.beta[:p], self.quantities[p:]
-        size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
-        value = np.atleast_1d(np.asarray(function(beta), dtype=float))
+        after = self.quantities[p:]
+        value, own = self.linearized(function, r.beta[:p])
         if value.size != len(quantities):
             raise ValueError(f"{len(quantities)} quantities for {value.size} values")
         J = np.zeros((value.size, r.beta.size))
-        for j in range(beta.size):
-            step = np.zeros_like(beta)
-            step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
-            high, low = np.asarray(function(beta + step)), np.asarray(function(beta - step))
-            J[:, j] = (high - low) / (2.0 * step[j])
+        J[:, :p] = own
         sd, half = r.mixture.spread(J)
         u = np.minimum(sd, half / noise_mixture_fit.NORMAL)
         size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
@@ -254,7 +257,21 @@ class Findings:
         reported = Estimates(value, covariance, u, half, outside, dof, J @ r.gain)
         if after:
             reported = _behind(reported, self.reported, p)
-        return replace(self, quantities=(*quantities, *after), reported=reported, tests=list(self.tests))
+        return replace(
+            self, quantities=(*quantities, *after), reported=reported, tests=list(self.tests), function=function
+        )
+
+    def linearized(self, function: Callable[[Array], ArrayLike], beta: Array) -> tuple[Array, Array]:
+        """Return ``function`` of the linear unknowns beta (p,) and its derivatives (q, p)."""
+        size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
+        value = np.atleast_1d(np.asarray(function(beta), dtype=float))
+        J = np.empty((value.size, beta.size))
+        for j in range(beta.size):
+            step = np.zeros_like(beta)
+            step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
+            high, low = np.asarray(function(beta + step)), np.asarray(function(beta - step))
+            J[:, j] = (high - low) / (2.0 * step[j])
+        return value, J
 
     def nuisance_tables(self) -> list[dict[str, Any]]:
         """Return the table of the nuisance model (none without candidates)."""
@@ -393,7 +410,7 @@ class Findings:
             likeliest = np.array([tau]), np.array([share]), np.array([self.est.reading])
             Z = noise_model.whiten(self.t_start, self.t_end, columns, *likeliest)[0][:, 0, :]
         z, A, p = Z[:, -1], Z[:, :-1], model.shape[1]
-        if any(c.scatter for c, _ in nuisances.reported(self.candidates, self.est)):  # some of A's columns are alike
+        if any(c.scatter for c, _ in self.joined):  # some of A's columns are alike
             q, s, _ = np.linalg.svd(A[:, :p], full_matrices=False)
             basis = q[:, s > 1e-9 * s[0]]
             p = basis.shape[1]

@@ -18,6 +18,7 @@ TORQUER = {
 }
 NUISANCES = {
     "nuisances": Option("auto", str, "set-up effects (trend, temperature ...): weighed by the data (auto), or none"),
+    "robust": Option(False, bool, "show a robust fit beside the plain one"),
 }
 TILT = {
     "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)"),

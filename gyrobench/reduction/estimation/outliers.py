@@ -1,0 +1,236 @@
+"""Windows that do not belong to the rest: which rows, what the result is without them, and a robust fit beside.
+
+Search: residuals of the fit as they are and under its likeliest noise model, r_i = (R^-1 v)_i / sqrt((R^-1)_ii) (a
+group of neighbours looks like drift to that), over their median absolute deviation, which many outliers cannot raise
+together (no masking up to a fifth of the rows).  Rows beyond the
+Bonferroni limit are left out, the model with its noise is fitted to the others, and each is tested against that fit:
+externally studentized, t with the degrees of freedom of the others, LEVEL over the number of rows.  Those that pass
+come back.  The fit itself is never changed: what is reported is the plain one, and beside it the one without them.
+
+The robust fit, asked for by an option, is Tukey's bisquare (c = 4.685, 95 % efficient for normal noise) from a Huber
+start (k = 1.345), on the problem whitened by the same noise model; u by Huber's sandwich.
+[Cook and Weisberg 1982, ch. 2; Huber 1981, ch. 7]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.reduction.estimation import noise as noise_model
+from gyrobench.reduction.estimation.linear_fit import Findings, fit
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+LEVEL = 0.01  # probability that any row of a clean record is named
+MOST = 0.2  # share of the rows that may be outliers
+FEWEST = 10  # degrees of freedom that must be left
+EXACT = 2000  # rows up to which every (R^-1)_ii is computed
+LISTED = 8
+MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+
+
+@dataclass(frozen=True)
+class Outliers:
+    """Rows (from 0), how far they lie from the fit to the others (unit of the data; in standard deviations), and that
+    fit.
+    """
+
+    rows: NDArray[np.intp]
+    distance: Array
+    t: Array
+    without: Findings
+
+
+def find(found: Findings) -> Outliers | None:
+    """Return the outliers of a fit; None where there are none, or too few windows to tell."""
+    n = found.y.size
+    most = int(min(MOST * n, found.dof - FEWEST))
+    if found.ideal or most < 1:
+        return None
+    limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
+    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual))
+    size = np.max([r / max(float(np.median(r)), 1e-300) for r in each], axis=0)
+    rows = np.flatnonzero(size > limit)
+    if not rows.size:
+        return None
+    rows = np.sort(rows[np.argsort(-size[rows])][:most])
+    for _ in range(5):
+        rest = _fitted_without(found, rows)
+        if rest is None:
+            return None
+        distance, t = _against(found, rest, rows)
+        p = 2.0 * special.stdtr(rest.dof, -np.abs(t))
+        if np.all(p < LEVEL / n):
+            return Outliers(rows, distance / found.y_scale, t, rest)
+        rows = rows[p < LEVEL / n]
+        if not rows.size:
+            return None
+    return None
+
+
+def _decorrelated(found: Findings) -> Array:
+    """r (n,) of the residuals, up to a factor."""
+    v = found.y - found.est.X @ found.est.beta
+    if found.white:
+        return v if found.weights is None else v * np.sqrt(found.weights)
+    n = v.size
+    model = (*found.est.best, found.est.reading)
+    one = tuple(np.array([m]) for m in model)
+    z = noise_model.whiten(found.t_start, found.t_end, v[:, None], *one)[0][:, 0, :]
+    inverse = noise_model.whiten_transposed(found.t_start, found.t_end, z, model)[:, 0]
+    chosen = np.arange(n) if n <= EXACT else np.linspace(0, n - 1, 200).astype(int)
+    unit = np.zeros((n, chosen.size))
+    unit[chosen, np.arange(chosen.size)] = 1.0
+    W = noise_model.whiten(found.t_start, found.t_end, unit, *one)[0][:, 0, :]
+    diagonal = np.sum(W * W, axis=0)
+    out: Array = inverse / np.sqrt(diagonal if n <= EXACT else np.median(diagonal))
+    return out
+
+
+def _fitted_without(found: Findings, rows: NDArray[np.intp]) -> Findings | None:
+    keep = np.ones(found.y.size, dtype=bool)
+    keep[rows] = False
+    try:
+        rest = fit(
+            found.linear, found.X[keep], found.y[keep], found.t_start[keep], found.t_end[keep], [], found.y_name,
+            found.y_unit, found.y_scale, noise=found.mode, limit=math.inf,
+            weights=None if found.weights is None else found.weights[keep],
+            candidates=[replace(c, columns=np.asarray(c.columns)[keep]) for c in found.candidates],
+        )  # fmt: skip
+    except ReductionError:
+        return None  # these rows carry a coefficient alone
+    if found.function is None:
+        return rest
+    return rest.derive(found.quantities[: found.value.size - len(found.joined)], found.function)
+
+
+def _against(found: Findings, rest: Findings, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Distance (SI) of the rows from the fit to the others, and in standard deviations of a new window."""
+    p = found.X.shape[1]
+    X, C = found.X[rows], rest.est.covariance[:p, :p]
+    model = X @ rest.est.beta[:p]
+    names = {c.name: np.reshape(np.asarray(c.columns), (found.y.size, -1))[rows] for c in found.candidates}
+    at = p
+    for c, e in rest.joined:
+        model = model + names[c.name] @ rest.est.beta[at : at + e.value.size]
+        at += e.value.size
+    distance = found.y[rows] - model
+    variance = (rest.residual_std * rest.y_scale) ** 2 + np.einsum("ij,jk,ik->i", X, C, X)
+    if found.weights is not None:
+        variance = variance * float(np.median(found.weights)) / found.weights[rows]
+    return distance, distance / np.sqrt(variance)
+
+
+def warnings(found: Findings, outliers: Outliers | None) -> list[str]:
+    """Return which rows, and what changes most without them, as a warning."""
+    if outliers is None:
+        return []
+    rows, rest = outliers.rows, outliers.without
+    listed = ", ".join(
+        f"{row + 1} ({d:+.3g} {found.y_unit}, {abs(t):.0f} standard deviations)".replace("-", "−")
+        for row, d, t in zip(rows[:LISTED], outliers.distance, outliers.t, strict=False)
+    )
+    more = f" and {rows.size - LISTED} more" if rows.size > LISTED else ""
+    both = _common(found, rest)
+    a, b = max(both, key=lambda ab: abs(rest.value[ab[1]] - found.value[ab[0]]) / rest.u[ab[1]])
+    q = found.quantities[a]
+    values = f"{rest.value[b] / q.scale:.6g} {q.unit} (u = {rest.u[b] / q.scale:.2g})"
+    plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})"
+    what, them = ("Row", "it") if rows.size == 1 else ("Rows", "them")
+    verb = "lies" if rows.size == 1 else "lie"
+    return [
+        f"{what} {listed}{more} {verb} outside the noise of the others. They are in the estimates; without {them} "
+        f"{q.title} = {values} in place of {plain}. Look for the cause, and leave {them} out only if it is one."
+    ]
+
+
+def _common(found: Findings, rest: Findings) -> list[tuple[int, int]]:
+    there = {q.name: j for j, q in enumerate(rest.quantities)}
+    return [(j, there[q.name]) for j, q in enumerate(found.quantities) if q.name in there]
+
+
+def tables(found: Findings, outliers: Outliers | None) -> list[dict[str, Any]]:
+    """Return the estimates with and without the outliers."""
+    if outliers is None:
+        return []
+    rest, rows = outliers.without, []
+    for a, b in _common(found, rest):
+        q = found.quantities[a]
+        pair = (found.value[a], found.u[a], rest.value[b], rest.u[b])
+        rows.append([q.title, *(float(v) / q.scale for v in pair), q.unit])
+    which = ", ".join(str(r + 1) for r in outliers.rows)
+    caption = f"Rows left out: {which}. The result is that of all rows."
+    head = ["coefficient", "all rows", "u", "without", "u without", "unit"]
+    return [{"title": "Estimates without outliers", "caption": caption, "columns": head, "rows": rows}]
+
+
+# ------------------------------------------------------------------------------------------- robust fit
+def robust(found: Findings) -> list[dict[str, Any]]:
+    """Return the table of the robust fit beside the plain one; nothing for data without noise."""
+    if found.ideal:
+        return []
+    beta, covariance, light = bisquare(found)
+    p = found.X.shape[1]
+    if found.function is None:
+        value, u = beta, np.sqrt(np.diag(covariance))
+    else:
+        value, J = found.linearized(found.function, beta[:p])
+        u = np.sqrt(np.einsum("qi,ij,qj->q", J, covariance[:p, :p], J))
+    rows = []
+    for q, a, ua, b, ub in zip(found.quantities, found.value, found.u, value, u, strict=False):
+        rows.append(
+            [q.title, a / q.scale, ua / q.scale, float(b) / q.scale, float(ub) / q.scale, float((b - a) / ua), q.unit]
+        )
+    caption = (
+        "Bisquare weights on the residuals of the likeliest noise model; the result is the plain fit. "
+        f"Weight below a half: {light} of {found.y.size} windows."
+    )
+    head = ["coefficient", "least squares", "u", "robust", "u robust", "difference / u", "unit"]
+    return [{"title": "Robust fit", "caption": caption, "columns": head, "rows": rows}]
+
+
+def bisquare(found: Findings) -> tuple[Array, Array, int]:
+    """Coefficients of the whitened problem, their covariance, and the number of weights below a half."""
+    X = found.est.X
+    columns = np.column_stack([X, found.y])
+    if found.white:
+        Z = columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
+    else:
+        one = tuple(np.array([m]) for m in (*found.est.best, found.est.reading))
+        Z = noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :]
+    A, z = Z[:, :-1], Z[:, -1]
+    n, p = A.shape
+    beta = np.linalg.lstsq(A, z, rcond=None)[0]
+    for k, weigh in ((1.345, _huber), (4.685, _bisquare)):
+        for _ in range(100):
+            r = z - A @ beta
+            s = MAD * float(np.median(np.abs(r))) * math.sqrt(n / (n - p))
+            w = weigh(r / (k * s))
+            root = np.sqrt(w)
+            new = np.linalg.lstsq(A * root[:, None], z * root, rcond=None)[0]
+            done = bool(np.linalg.norm(A @ (new - beta)) <= 1e-10 * np.linalg.norm(z))
+            beta = new
+            if done:
+                break
+    x = (z - A @ beta) / (4.685 * s)
+    inside = np.abs(x) < 1.0
+    psi = np.where(inside, x * (1.0 - x * x) ** 2, 0.0) * 4.685 * s
+    slope = float(np.mean(np.where(inside, (1.0 - x * x) * (1.0 - 5.0 * x * x), 0.0)))
+    covariance = float(np.sum(psi**2)) / (n - p) / slope**2 * np.linalg.pinv(A.T @ A)
+    return beta, covariance, int(np.sum(w < 0.5))
+
+
+def _huber(x: Array) -> Array:
+    out: Array = 1.0 / np.maximum(np.abs(x), 1.0)
+    return out
+
+
+def _bisquare(x: Array) -> Array:
+    out: Array = np.where(np.abs(x) < 1.0, (1.0 - x * x) ** 2, 0.0)
+    return out

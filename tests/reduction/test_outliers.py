@@ -1,0 +1,105 @@
+"""Outliers are named by row with what they change; the fit stays as it is; a robust fit stands beside it when asked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench import units
+from gyrobench.reduction.estimation import outliers
+from gyrobench.reduction.estimation.fit_result import linear_result
+from gyrobench.reduction.estimation.linear_fit import Findings, Quantity, fit
+
+DPH = units.factor("deg/h")
+N = 88
+
+
+def record(shift: dict[int, float], seed: int = 1, slow: float = 0.0, noise: str = "estimated") -> Findings:
+    """88 windows of 100 s with noise of 0.01 deg/h; some rows shifted by so many standard deviations."""
+    rng = np.random.default_rng(seed)
+    e = rng.normal(size=N)
+    for k in range(1, N):
+        e[k] += slow * e[k - 1]
+    x = np.cos(2.0 * np.pi * np.arange(N) / 11.0)
+    X = np.column_stack([np.ones(N), x])
+    for row, size in shift.items():
+        e[row] += size
+    t = 100.0 * np.arange(N)
+    wanted = [Quantity.of("a", "constant", "deg/h"), Quantity.of("b", "cosine", "deg/h")]
+    return fit(wanted, X, DPH * (X @ [0.3, -0.2] + 0.01 * e), t, t + 100.0, [], "rate", "°/h", DPH, noise=noise)
+
+
+def result(found: Findings, **more: Any) -> Any:
+    return linear_result(
+        found, system="line", title="A line", method="by hand", sources=["RED-OLS"], equation="y = a + b x",
+        conventions=[], **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("noise", ["estimated", "white"])
+def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
+    """60 sigma in row 41 of 88: it moves the mean by 60/88 sigma = 0.0068 deg/h; without it u is that of the rest."""
+    clean, spoilt = record({}, noise=noise), record({40: 60.0}, noise=noise)
+    odd = outliers.find(spoilt)
+    assert odd is not None and odd.rows.tolist() == [40]
+    assert abs(odd.t[0]) == pytest.approx(60.0, abs=12.0)
+    assert odd.distance[0] == pytest.approx(0.6, abs=0.03)
+    assert odd.without.value == pytest.approx(clean.value, abs=0.4 * float(clean.u.max()))
+    assert spoilt.u[0] > 5.0 * odd.without.u[0]
+    r = result(spoilt)
+    assert r.coefficients[0].estimate == pytest.approx(0.3 + 0.6 / N, abs=0.004)  # the plain fit stays
+    (text,) = [w for w in r.warnings if "outside the noise" in w]
+    assert text.startswith("Row 41 (+0.") and "without it" in text and "u = " in text
+    (table,) = [t for t in r.tables if t["title"] == "Estimates without outliers"]
+    assert table["rows"][0][4] < 0.2 * table["rows"][0][2]
+
+
+def test_rows_that_hide_one_another() -> None:
+    """Nine neighbours shifted alike raise the scatter so that none stands out by the plain residuals."""
+    group = {k: 12.0 for k in range(30, 39)}
+    spoilt = record(group)
+    plain = np.abs(spoilt.est.residual) / np.std(spoilt.est.residual)
+    assert plain.max() < 3.6  # the usual limit for 88 rows
+    odd = outliers.find(spoilt)
+    assert odd is not None and odd.rows.tolist() == list(group)
+    assert abs(odd.without.value[0] / DPH - 0.3) < 0.005
+
+
+@pytest.mark.parametrize("slow", [0.0, 0.8])
+def test_clean_records_have_none(slow: float) -> None:
+    """At 1 % a record not more than two of 40, with drift too."""
+    assert sum(outliers.find(record({}, seed, slow)) is not None for seed in range(40)) <= 2
+
+
+def test_a_spike_on_drift() -> None:
+    """5.5 standard deviations of the innovations on a drift that wanders as far by itself."""
+    odd = outliers.find(record({50: 30.0}, 3, 0.8))
+    assert odd is not None and odd.rows.tolist() == [50]
+
+
+def test_robust_fit_beside_the_plain_one() -> None:
+    """Bisquare by hand: the location of (0, 0.1 ... ) with weights (1 - (r/4.685 s)^2)^2 is a fixed point; and a spoilt
+    record's robust values are those of the clean one within a fraction of u.
+    """
+    clean, spoilt = record({}, noise="white"), record({40: 60.0, 70: -25.0}, noise="white")
+    beta, covariance, light = outliers.bisquare(spoilt)
+    r = spoilt.y - spoilt.X @ beta
+    s = 1.4826 * np.median(np.abs(r)) * np.sqrt(N / (N - 2))
+    w = np.where(np.abs(r) < 4.685 * s, (1.0 - (r / (4.685 * s)) ** 2) ** 2, 0.0)
+    assert np.abs(spoilt.X.T @ (w * r)).max() < 1e-8 * DPH
+    assert light >= 2
+    assert np.all(np.abs(beta - clean.value) < 0.5 * clean.u)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(clean.u, rel=0.2)
+    tables = {t["title"]: t for t in result(spoilt, robust=True).tables}
+    assert [row[0] for row in tables["Robust fit"]["rows"]] == ["a", "b"]
+    assert "Robust fit" not in {t["title"] for t in result(spoilt).tables}
+
+
+def test_derived_quantities_have_both() -> None:
+    found = record({40: 60.0}).derive([Quantity.of("c", "ratio", "1")], lambda b: b[1] / b[0])
+    odd = outliers.find(found)
+    assert odd is not None and abs(odd.without.value[0] + 2.0 / 3.0) < 4.0 * odd.without.u[0]
+    (row,) = outliers.robust(found)[0]["rows"]
+    assert row[0] == "c" and abs(row[3] + 2.0 / 3.0) < 4.0 * row[4]
