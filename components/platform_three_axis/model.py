@@ -100,6 +100,7 @@ class PlatformThreeAxis(Component):
     i_motor = Output("A", "motor currents, A order", shape=(3,))
     lock = Output("1", "1 beyond lock_angle")
     saturated = Output("1", "1 while a voltage or a current is at its limit")
+    at_stop = Output("1", "1 while the pitch gimbal is at its stop")
 
     q = State(NONE, "rad", "joint angles, A order")
     dq = State(NONE, "rad/s", "joint rates, A order")
@@ -261,6 +262,7 @@ class PlatformThreeAxis(Component):
             if fabs(self.v[k]) > self.v_max[k] or fabs(amps) >= self.i_max[k]:
                 self.saturated = 1.0
         self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0
+        self.at_stop = 1.0 if fabs(self.q[PITCH]) > self.pitch_stop else 0.0
         cr = cos(self.q[ROLL])
         sr = sin(self.q[ROLL])
         cf = cos(self.q[PITCH])

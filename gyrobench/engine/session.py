@@ -17,6 +17,7 @@ from typing import Any
 
 from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
+from gyrobench.engine.limits import limit_flags, limits_reached
 from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import ReferenceEngine, initial_state, initialize
 from gyrobench.engine.run_driver import EngineStopped, ProgressReport, run_to_end
@@ -270,13 +271,15 @@ class Session:
         document.stopped_at = state.k * system.step
         if checkpoints is not None and checkpoints.resumed_at:
             document.resumed_at = checkpoints.resumed_at
+        channels = rows_to_columns(state.channel_rows, self.program.channel.names, time=True)
+        text = str(problem)
+        if isinstance(problem, FmuCallError):
+            sockets = {slot: binding.socket for slot, binding in self.assembly.bindings.items()}
+            reached = limits_reached(channels, limit_flags(self.program.channel.names, sockets))
+            text += f"\n  {reached}" if reached else ""
         if problem is not None:
-            document.problem = str(problem)
-        record = Record(
-            rows_to_columns(state.window_rows, names, time=False),
-            rows_to_columns(state.channel_rows, self.program.channel.names, time=True),
-            document,
-        )
+            document.problem = text
+        record = Record(rows_to_columns(state.window_rows, names, time=False), channels, document)
         if out is not None:
             record.save(out)
         if isinstance(problem, EngineStopped) and problem.by_user:
@@ -284,7 +287,7 @@ class Session:
                 f"{problem}; {checkpoints.resume_hint}" if checkpoints is not None else str(problem), record
             )
         if problem is not None:
-            raise RunError(str(problem), record)
+            raise RunError(text, record)
         if checkpoints is not None and out is not None:
             checkpoints.remove()
         return record

@@ -12,7 +12,8 @@ wires; excitations come in from outside.  Two models are made:
 Opened at an input, the loop is L = -(returned signal) / (injected signal), other loops closed.
 
 A sampled method that passes an input on has no continuous model; the discrete one takes the part's own step, where one
-step is like the next (gyrobench.linear.sampled_model).
+step is like the next (gyrobench.linear.sampled_model).  One that carries it through the step only (the motion of a base
+between its values) has both.
 
 Not modelled: limits.  Sampled methods whose steps differ (a moving average) and third-party FMUs leave the system
 without a linear model; a warning says so.
@@ -248,7 +249,8 @@ def loops(
     try:
         parts = operating_point(assembly, parameters, part_of)
         linear = Linear(assembly, parts, step)
-        kinds = {"discrete": linear.discrete} | ({} if linear.sampled else {"continuous": linear.continuous})
+        in_samples = any(not model.within for model in linear.sampled.values())
+        kinds = {"discrete": linear.discrete} | ({} if in_samples else {"continuous": linear.continuous})
         loops_: dict[str, OpenLoop] = {}
         for name, at in assembly.system.loops.items():
             loops_[name] = OpenLoop.model_validate({"break": at, **{kind: model(at) for kind, model in kinds.items()}})

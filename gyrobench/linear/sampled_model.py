@@ -24,13 +24,18 @@ MAX_DISCRETE = 60  # discrete values: more are a memory, whose step is not the s
 
 @dataclass
 class Step:
-    """One step; names: of states and discrete values, in the order of the columns of A and C."""
+    """One step; names: of states and discrete values, in the order of the columns of A and C.
+
+    within: the discrete values carry inputs through the step only (a part that follows an input between its values); at
+    the instants themselves nothing depends on them, and the part's Jacobians are its continuous model.
+    """
 
     names: list[str]
     a: Array
     b: Array
     c: Array
     d: Array
+    within: bool = False
 
 
 def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
@@ -54,6 +59,9 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         reached = reached | np.any(first.a[n:, n:][:, reached], axis=1)
     if not (np.any(first.a[:n, n:][:, reached]) or np.any(first.c[:, n:][:, reached])):
         return None  # none that the inputs reach goes further; constants of the part do not count
+    first.within = not any(np.any(side) for k in np.flatnonzero(reached) for side in part.tangent({discrete[k]: 1.0}))
+    if first.within:
+        return first
     try:
         for k in range(SETTLED):
             twin.do_step(k * step, step)

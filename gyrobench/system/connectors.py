@@ -32,6 +32,7 @@ class Connector:
     optional: bool = False
     whole: bool = False  # integer valued: an Integer or Boolean variable fits as well as a Real one
     quantity: str = ""  # one of QUANTITIES: what the signal stands for, where its unit does not say
+    limit: bool = False  # a flag: 1 while a limit (of a signal, of a motion) is reached
 
     @property
     def elements(self) -> list[str]:
@@ -64,3 +65,8 @@ def inp(name: str, unit: str, meaning: str, *shape: int, optional: bool = False,
 def out(name: str, unit: str, meaning: str, *shape: int, optional: bool = False, whole: bool = False) -> Connector:
     """An output of the part in the slot."""
     return Connector(name, "output", unit, meaning, shape, optional, whole)
+
+
+def limit_flag(name: str, meaning: str) -> Connector:
+    """An optional output that is 1 while a limit is reached; meaning: "1 while ..."."""
+    return Connector(name, "output", "1", meaning, optional=True, whole=True, limit=True)

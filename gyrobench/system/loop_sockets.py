@@ -11,7 +11,7 @@ the minus (v = -K F(s) e); a positive voltage makes a positive motor torque.  [C
 
 from __future__ import annotations
 
-from gyrobench.system.connectors import Connector, Socket, inp, out
+from gyrobench.system.connectors import Connector, Socket, inp, limit_flag, out
 
 
 def _platform(*shape: int) -> tuple[Connector, ...]:
@@ -31,7 +31,8 @@ def _platform(*shape: int) -> tuple[Connector, ...]:
         out("f", "m/s2", "specific force of the platform, platform axes", 3, optional=True),
         out("attitude", "rad", "small rotation of the platform from its start: integral of omega", *shape),
         out("i_motor", "A", f"motor current{axes}", *shape, optional=True),
-        out("saturated", "1", "1 while a motor is at its limit", optional=True, whole=True),
+        limit_flag("saturated", "1 while a motor is at its limit"),
+        limit_flag("at_stop", "1 while a gimbal is at its stop"),
     )
 
 
@@ -109,7 +110,7 @@ LOOPS: tuple[Socket, ...] = (
             inp("u", "", "signals along the platform axes", 3),
             inp("theta", "rad", "joint angles, A order", 3),
             out("u_axes", "", "signals about the motor axes, A order", 3),
-            out("saturated", "1", "1 while a gain is at its limit", optional=True, whole=True),
+            limit_flag("saturated", "1 while a gain is at its limit"),
         ),
     ),
     Socket(
@@ -126,7 +127,7 @@ LOOPS: tuple[Socket, ...] = (
             out("v", "V", "voltage of the torque motor"),
             out("e", "V", "the signal inside the loop, u + test"),
             out("M", "N.m", "torque of a correction motor that belongs to the stabilizer, and M_load", optional=True),
-            out("saturated", "1", "1 while an output is at its limit", optional=True, whole=True),
+            limit_flag("saturated", "1 while an output is at its limit"),
         ),
     ),
     Socket(

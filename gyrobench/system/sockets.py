@@ -11,7 +11,7 @@ Conventions of the connectors: SI units; vectors along I, O, S (gyro), face axes
 from __future__ import annotations
 
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, out
+from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, limit_flag, out
 from gyrobench.system.loop_sockets import LOOPS
 
 __all__ = ["SOCKETS", "Connector", "Shape", "Socket", "element_names", "socket"]
@@ -57,7 +57,7 @@ SOCKETS: dict[str, Socket] = {
                 out("M_react", "N.m", "torque of the gyro on its mount along I, O, S", 3, optional=True),
                 out("h_I", "N.m.s", "spin momentum along I, H sin b", optional=True),
                 out("M_I", "N.m", "torque on the mount along I without its part -dh_I/dt", optional=True),
-                out("saturated", "1", "1 while the pickoff is saturated", optional=True, whole=True),
+                limit_flag("saturated", "1 while the pickoff is saturated"),
             ),
         ),
         Socket(
@@ -77,7 +77,7 @@ SOCKETS: dict[str, Socket] = {
                 out("drift_y", "rad/s", "drift rate about y, precession sign (diagnostic)", optional=True),
                 out("beta", "rad", "angle of the inner gimbal (diagnostic)", optional=True),
                 out("M_react", "N.m", "torque of the gyro on its mount along x, y, z", 3, optional=True),
-                out("saturated", "1", "1 while a pickoff is saturated", optional=True, whole=True),
+                limit_flag("saturated", "1 while a pickoff is saturated"),
             ),
         ),
         Socket(
@@ -88,7 +88,7 @@ SOCKETS: dict[str, Socket] = {
                 out("i", "A", "rebalance current"),
                 out("i_read", "A", "rebalance current as measured"),
                 out("theta", "rad", "angle of the pendulum (diagnostic)", optional=True),
-                out("saturated", "1", "1 while the current is limited", optional=True, whole=True),
+                limit_flag("saturated", "1 while the current is limited"),
             ),
         ),
         Socket(
@@ -98,7 +98,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("u", "V", "pickoff voltage"),
                 out("i", "A", "torquer current"),
                 out("i_read", "A", "torquer current as measured"),
-                out("saturated", "1", "1 while the current is limited", optional=True, whole=True),
+                limit_flag("saturated", "1 while the current is limited"),
             ),
         ),
         Socket("Table", "turntable with one driven axis", TABLE),
@@ -108,7 +108,7 @@ SOCKETS: dict[str, Socket] = {
             (
                 *TABLE,
                 inp("u", "V", "pickoff voltage of the gyro"),
-                out("saturated", "1", "1 while the motor is at its limit", optional=True, whole=True),
+                limit_flag("saturated", "1 while the motor is at its limit"),
             ),
         ),
         Socket(

@@ -74,7 +74,8 @@ class PlatformThreeAxis(ThreeAxisTest):
     channels = (
         "exciter.phase", "exciter.gate", *three("exciter.command", "exciter.test"), "exciter.motion_angle[1]",
         *three("motion.angle", "platform.attitude", "platform.theta"), "platform.lock", "platform.saturated",
-        "decoupler.saturated", *(f"{axis}.e" for axis in AXES), *(f"{axis}.v" for axis in AXES),
+        "platform.at_stop", "decoupler.saturated", *(f"{slot}.saturated" for slot in (*GYROS, *AXES)),
+        *(f"{axis}.e" for axis in AXES), *(f"{axis}.v" for axis in AXES),
     )  # fmt: skip
     shown = (
         "platform.attitude", "motion.angle", "platform.theta", "pitch.e roll.e azimuth.e", "pitch.v roll.v azimuth.v",

@@ -235,6 +235,7 @@ def test_pitch_stop_and_lock():
         part.do_step(k * 1e-3, 1e-3)
         widest = max(widest, part.theta[0])
         assert part.lock == float(abs(part.theta[0]) > 80 * DEG)
+        assert part.at_stop == float(abs(part.theta[0]) > 85 * DEG)
     assert 85 * DEG < widest < 86 * DEG
     assert -0.5 < part.theta_dot[0] < -0.05  # damping 0.5 on one half-wave leaves exp(-pi / (2 sqrt(0.75))) = 0.16
     part.M_load = [50.0, 0.0, 0.0]  # pressed against it: rests at stop + M / stiffness

@@ -49,6 +49,10 @@ def test_stability_over_azimuth(sessions, azimuth):
             record = session.run(values)
         except RunError as error:  # the pitch gimbal has run to 90 degrees
             record = error.record
+            flags = [n for n in record.channels if n.endswith((".saturated", ".at_stop"))]
+            first = min(record.channels["time"][record.channels[n] > 0.5].min(initial=np.inf) for n in flags)
+            assert "limits reached before that, first: " in str(error) and f" at t = {first:.6g} s (" in str(error)
+            assert str(error) == record.run.problem
         moved = max(np.abs(record.channels[f"platform.attitude[{k}]"]).max() for k in (1, 2, 3))
         assert (moved < 1e-4) if stable else (moved > 1e-2)
         assert bool(unstable(record.run.linear.closed.discrete)) is not stable
@@ -93,13 +97,21 @@ def test_isolation_is_that_of_the_continuous_model(sessions):
 
     A base held over the step would add h/2 times its rate: -76 dB at 0.5 Hz, which made -72.6 of -80.5 about x.
     """
-    _, _, found = reduced(sessions[True])
+    record, _, found = reduced(sessions[True])
     slope, place = three_axis_loop()
     start = np.zeros(21)
     start[0], start[2] = math.radians(20.0), math.radians(30.0)
     for k, (axis, hertz) in enumerate(zip("xyz", (0.5, 0.7, 0.9), strict=True)):
         truth = isolation(slope, start, place, k, hertz)
         assert found[f"isolation {axis}"].estimate == pytest.approx(truth, abs=0.15)
+        for model in (record.run.linear.closed.continuous, record.run.linear.closed.discrete):
+            s = 2j * math.pi * hertz
+            base = np.zeros(len(model.inputs), complex)
+            for name, value in (("angle", 1.0), ("rate", s), ("acceleration", s * s)):
+                base[model.inputs.index(f"exciter.motion_{name}[{k + 1}]")] = value
+            rows = [model.outputs.index(f"platform.attitude[{n}]") for n in (1, 2, 3)]
+            taken = np.linalg.norm(m.model_response(model, [hertz])[0][rows] @ base)
+            assert 20.0 * math.log10(taken) == pytest.approx(truth, abs=0.15)
 
 
 def test_command_turns_the_platform_its_way(sessions):
