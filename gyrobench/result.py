@@ -158,7 +158,7 @@ class Result(Displayed):
     coefficients: list[Coefficient]
     tests: list[Test] = field(default_factory=list)
     tables: list[dict[str, Any]] = field(default_factory=list)  # method's own: {"title","caption","columns","rows"}
-    step_check: dict[str, Any] = field(default_factory=dict)  # {"step", "rows": [{name, change, u, ratio}], "worst"}
+    step_check: dict[str, Any] = field(default_factory=dict)  # see reduction.step_effect; "worst": largest change/u
     warnings: list[str] = field(default_factory=list)
     summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
     decision_rule: str = ""
@@ -290,6 +290,7 @@ class LoopResult(Result):
     kind: ClassVar[str] = "loop"
 
     responses: list[Response]
+    budget: list[BudgetLine] = field(default_factory=list)
     allan: dict[str, Any] = field(default_factory=dict)  # as of a drift test
     # of an estimator: its readings and their errors
     series: list[Series] = field(default_factory=list)

@@ -30,13 +30,16 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Run a gyrobench command: exit code, standard output, standard error.  Anything but an exit fails the test.
 
-    pages: a run or reduction writes its HTML and PDF too, which takes two seconds.
+    pages: a run or reduction writes its HTML and PDF too, which takes two seconds.  The step of a run is not checked
+    unless --check-step is among the words, or default_check is true.
     """
 
-    def run(*words: object, pages: bool = False) -> tuple[int, str, str]:
+    def run(*words: object, pages: bool = False, default_check: bool = False) -> tuple[int, str, str]:
         from gyrobench.commands import cli
 
         plain = [] if pages or words[0] not in ("run", "reduce") else ["--no-report"]
+        if words[0] == "run" and "--check-step" not in words and not default_check:
+            plain.append("--no-check-step")
         monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words), *plain])
         capsys.readouterr()
         try:

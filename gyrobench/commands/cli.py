@@ -180,11 +180,13 @@ def run(
     engine: Annotated[Engine | None, typer.Option(help="Default: native where a C compiler is available.")] = None,
     step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
     check_step: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--check-step", help="Repeat the run with half the step, noise off, and report the change of the results."
+            "--check-step/--no-check-step",
+            help="Repeat the run with its step and half of it, noise off, and take the effect of the step into u. "
+            "Default: two short runs for a system with loops, else none.",
         ),
-    ] = False,
+    ] = None,
     isolate: Annotated[
         list[str] | None,
         typer.Option(

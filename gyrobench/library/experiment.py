@@ -137,7 +137,7 @@ class Experiment:
         *,
         step: float | str | None = None,
         engine: str | None = None,
-        check_step: bool = False,
+        check_step: bool | None = None,
         isolate: Iterable[str] = (),
         spec: File | None = None,
         out: File | None = None,
@@ -147,10 +147,11 @@ class Experiment:
     ) -> Run:
         """Run the system and reduce its record.
 
-        seed: of all noise.  step: s, or a text with its unit.  engine: "native" or "reference".  check_step: halve the
-        step once, noise off.  isolate: slots that run in a process of their own.  spec: name or file of an acceptance
-        specification.  out: folder for record and result.json; without it nothing is written.  force: replace another
-        run there.  resume: go on with an interrupted run there.  progress: called about five times a second.
+        seed: of all noise.  step: s, or a text with its unit.  engine: "native" or "reference".  check_step: find by
+        two further runs without noise what the step does, and take it into u; None: by two short ones for a system with
+        loops.  isolate: slots that run in a process of their own.  spec: name or file of an acceptance specification.
+        out: folder for record and result.json; without it nothing is written.  force: replace another run there.
+        resume: go on with an interrupted run there.  progress: called about five times a second.
 
         Raises errors of type GyrobenchError; one that comes after the first step holds what was recorded in its
         attribute ``record``.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from gyrobench.reduction.step_effect import step_text
 from gyrobench.report import budget_figure, plots
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
@@ -17,6 +18,7 @@ from gyrobench.report.page_model import (
     pictures,
     text_cell,
 )
+from gyrobench.report.plain_text import step_sentence
 from gyrobench.report.tables import heading, render_value, unit_groups, words
 
 Json = dict[str, Any]
@@ -186,18 +188,18 @@ def repeatability(doc: Json) -> list[Any]:
 
 
 def _step(doc: Json) -> list[Any]:
-    """Return the step check: the changes of the coefficients when the communication step is halved."""
+    """Return the step check: what the communication step does to the coefficients."""
     check = doc["step_check"]
     if not check.get("rows"):
-        unchecked = Text("The communication step was not checked in this run (option --check-step).", quiet=True)
-        return [unchecked] if doc["simulated"] else []
-    step = write_number(check.get("step"), significant=6).text
-    worst = write_number(check.get("worst"), significant=2).text
+        text = "The communication step was not checked in this run (option --check-step): its effect is not in u."
+        return [Text(text, quiet=True)] if doc["simulated"] else []
     caption = (
-        "Step check: change of each coefficient when the communication step is halved, noise off; ratio: change / u."
+        "Step check: effect of the communication step on each coefficient, from runs without noise at two steps, "
+        "extrapolated to step zero; u: without it; ratio: effect / u."
     )
     table = render_value(doc, ("step_check", "rows"), caption, significant=2)
-    return [Text(f"Halving the communication step of {step} s changes no coefficient by more than {worst} u."), *table]
+    sentence = step_sentence(check).replace("step check", "Step check", 1)
+    return [Text(f"{sentence}; step {step_text(check['step'])}."), *table]
 
 
 def _method_tables(doc: Json) -> list[Any]:

@@ -35,13 +35,20 @@ def format_result(result: Result) -> str:
     notes = [s.replace("No", "no", 1) for s in no_values((c.name, c.no_value) for c in result.coefficients)]
     notes += [f"warning: {w}" for w in result.warnings]
     if result.step_check:
-        worst = result.step_check["worst"]
-        notes.append(f"step check: halving the communication step changes no coefficient by more than {worst:.2g} u")
+        notes.append(step_sentence(result.step_check))
     if judged:
         notes.append(f"verdict: {result.verdict}")
     left = {0, 4} | ({len(rows[0]) - 1} if judged else set())
     agreement = _agreement(result) if isinstance(result, SuiteResult) else []
     return "\n".join([result.title, "", *align_columns(rows, left), "", *notes, *agreement])
+
+
+def step_sentence(check: Mapping[str, Any]) -> str:
+    """Return what a step check has found, and its cost."""
+    cost = f" ({check['seconds']:.1f} s)" if check.get("seconds") else ""
+    worst = check.get("worst")
+    most = "" if worst is None else f", at most {write_number(worst, significant=2).text} times the u without it"
+    return f"step check{cost}: the effect of the communication step is in u{most}"
 
 
 def no_values(coefficients: Iterable[tuple[str, str]]) -> list[str]:

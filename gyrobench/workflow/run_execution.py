@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
+from gyrobench.errors import GyrobenchError
 from gyrobench.report import FORMATS
-from gyrobench.result import Result
+from gyrobench.result import Coefficient
 from gyrobench.system.system import System
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
@@ -28,7 +29,8 @@ class RunRequest:
     """The settings of a run other than the system and its values.
 
     step: s, None for the system's own.  in_memory: nothing is written, ``out``, ``force`` and ``resume`` have no
-    meaning.  formats: of the report.
+    meaning.  formats: of the report.  check_step: whether what the step does is found by two further runs; None: by two
+    short ones for a system with loops, else not.
     """
 
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -39,7 +41,7 @@ class RunRequest:
     out: Path | None = None
     force: bool = False
     spec: str | Path | None = None
-    check_step: bool = False
+    check_step: bool | None = None
     isolate: tuple[str, ...] = ()
     resume: bool = False
     in_memory: bool = False
@@ -98,37 +100,61 @@ def execute_run(
         with record_kept(folder, record):
             if not system.has_reduction:
                 return RunOutcome(record, folder=folder)
-            result = reduce_run(system, record, limits)
-            if request.check_step:
+            check: dict[str, Any] = {}
+            wanted = bool(system.loops) if request.check_step is None else request.check_step
+            if wanted and record.complete:
                 try:
-                    result.step_check = check_step(session, system, result, request.seed, step, feedback)
+                    check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
                 except RunInterrupted as error:
                     stopped = CommandInterrupted(f"step check {error}; the report is without it")
                 except Exception as error:
                     stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
                     stopped.__cause__ = error
+            result = reduce_run(system, record, limits, check)
+            if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
+                result.warnings.append(f"The communication step is not in u: {stopped}.".replace("\n", "; "))
+                stopped = None
             paths = write_report(result, folder, record, spec, request.formats)
             return RunOutcome(record, result, folder, paths, stopped)
 
 
 def check_step(
-    session: Any, system: System, result: Result, seed: int, step: float, feedback: Feedback = SILENT
+    session: Session, system: System, seed: int, step: float, feedback: Feedback = SILENT, short: bool = False
 ) -> dict[str, Any]:
-    """Return the change of each coefficient when the step is halved, noise off, against its standard uncertainty."""
+    """Return what the step does to each coefficient, from two runs with the noise off; see reduction.step_effect.
+
+    The second run has half the step.  short: twice the step, in a quarter of the time, and the shortest holds that the
+    system takes; half the step where the parts refuse the double one or have no figures there.
+    """
+    import time
+
+    from gyrobench.engine.session import RunInterrupted
+    from gyrobench.reduction.step_effect import step_effects
+
     bindings = session.assembly.bindings
     known = {f"{slot}.{name}" for slot, binding in bindings.items() for name in binding.parameters}
-    quiet = {name: 0.0 for name in system.noises if name in known}
-    estimates: list[dict[str, float]] = []
-    for h in (step, step / 2.0):
+    values: dict[str, Any] = {name: 0.0 for name in system.noises if name in known}
+    hold = system.options.get("hold")
+    if short and hold is not None and hold.min is not None:
+        values["hold"] = min(hold.min, system["hold"])
+
+    def coefficients(h: float) -> list[Coefficient]:
         with feedback.progress(f"step check, {h:g} s") as progress:
-            reduced = system.reduce(session.run(quiet, seed, h, None, progress))
-        estimates.append({c.name: c.estimate for c in reduced.coefficients})
-    full, half = estimates
+            return system.reduce(session.run(values, seed, h, None, progress)).coefficients
+
+    start = time.perf_counter()
+    at_step = coefficients(step)
     rows: list[dict[str, Any]] = []
-    for c in result.coefficients:
-        if c.name in full and c.name in half:  # a coefficient of the noise alone is missing without it
-            change = half[c.name] - full[c.name]
-            ratio = abs(change) / c.u if c.u > 0.0 else None
-            rows.append({"name": c.name, "unit": c.unit, "change": change, "u": c.u, "ratio": ratio})
-    worst = max((r["ratio"] for r in rows if r["ratio"] is not None), default=None)
-    return {"step": step, "rows": rows, "worst": worst}
+    factor = 2.0 if short else 0.5
+    if any(not c.no_value for c in at_step):
+        try:
+            rows = step_effects(at_step, coefficients(factor * step), factor)
+        except RunInterrupted:
+            raise
+        except GyrobenchError:
+            if not short:
+                raise
+        if not rows:
+            factor = 0.5
+            rows = step_effects(at_step, coefficients(factor * step), factor)
+    return {"step": step, "other": factor * step, "seconds": time.perf_counter() - start, "rows": rows}

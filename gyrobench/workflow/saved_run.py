@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
@@ -32,13 +33,21 @@ class RunOutcome:
     stopped: PostRunError | None = None
 
 
-def reduce_run(system: System, record: Record, limits: Specification | None) -> Result:
-    """Return the result of the system's own reduction, with the run as provenance."""
+def reduce_run(
+    system: System, record: Record, limits: Specification | None, step_check: Mapping[str, Any] | None = None
+) -> Result:
+    """Return the result of the system's own reduction, with the run as provenance.
+
+    step_check: what the communication step does, to be part of u; see gyrobench.reduction.step_effect.
+    """
+    from gyrobench.reduction.step_effect import apply_step
     from gyrobench.system.wiring import parse_wires
 
     result = system.reduce(record, limits)
     wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
     result.provenance = {**record.run.as_dict(), "wires": wires, "shown": list(system.shown)}
+    if step_check and step_check.get("rows"):
+        apply_step(result, step_check)
     check_truth(result, set_values(record.run))
     return result
 
@@ -69,16 +78,15 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
     record = Record.load(folder)
     limits = load_limits(spec)
     with record_kept(folder, record):
+        old = folder / "result.json"  # the step check needs further runs and is kept
+        check = (json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}) if old.exists() else {}
         try:
-            result = reduce_run(system, record, limits)
+            result = reduce_run(system, record, limits, check if "other" in check else None)
         except GyrobenchError:
             if record.complete:
                 raise
             missing = _missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
-        old = folder / "result.json"
-        if old.exists():  # the step check needs further runs and is kept
-            result.step_check = json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}
         return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
 
 

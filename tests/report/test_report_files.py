@@ -341,7 +341,8 @@ def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
     assert texts["/tables/0/rows/0/1"] == "0.2976"  # to the second digit of u
     assert texts["/tables/0/rows/0/2"] == "1.2·10⁻⁵"
     assert "/step_check/rows/3/ratio" in texts
-    assert "Halving the communication step of 0.0005 s changes no coefficient by more than 0.0001 u." in w.html
+    said = "the effect of the communication step is in u, at most 0.0001 times the u without it; step 0.5 ms."
+    assert f"Step check (2.5 s): {said}" in w.html
     r.step_check = {}
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
     assert "The communication step was not checked in this run" in w.html

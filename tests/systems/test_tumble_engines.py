@@ -125,4 +125,6 @@ def test_halving_the_step_changes_nothing_that_matters(command: Command, tmp_pat
         assert row["u"] > 1e-4  # deg/h per g^n: noise is on
         assert row["ratio"] == abs(row["change"]) / row["u"] < 1e-3, row
     assert check["worst"] == max(r["ratio"] for r in check["rows"])
-    assert f"halving the communication step changes no coefficient by more than {check['worst']:.2g} u" in out
+    assert "the effect of the communication step is in u, at most" in out
+    lines = {b["coefficient"]: b["contribution"] for b in result["budget"] if b["source"] == "coupling step"}
+    assert lines == {r["name"]: pytest.approx(r["change"] / 3**0.5) for r in check["rows"]}

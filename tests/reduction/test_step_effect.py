@@ -1,0 +1,124 @@
+"""The communication step as a part of u: extrapolation, intervals, budget, correlation, words."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.step_effect import apply_step, step_effects, step_text
+from gyrobench.result import Coefficient, DriftTestResult, LoopResult
+from gyrobench.system.system import load_system
+
+PLATFORM = "platform_single_axis"
+
+
+def coefficient(estimate: float, u: float = 0.0, name: str = "m", unit: str = "1", **more: Any) -> Coefficient:
+    half = NORMAL * u
+    return Coefficient(name, "", unit, estimate, u, NORMAL, (estimate - half, estimate + half), **more)
+
+
+def effect(law: Any, factor: float, unit: str = "1") -> float:
+    (row,) = step_effects([coefficient(law(1.0), unit=unit)], [coefficient(law(factor), unit=unit)], factor)
+    return float(row["change"])
+
+
+@pytest.mark.parametrize(("factor", "second"), [(0.5, 1.5), (2.0, 3.0)])
+def test_first_order_is_exact_and_second_order_overstated(factor: float, second: float) -> None:
+    """m = 7 + 0.3 h: m(1) - m(0) = 0.3.  m = 7 + 0.3 h2: (1 - p2)/(1 - p) = 1 + p times that."""
+    assert effect(lambda h: 7.0 + 0.3 * h, factor) == pytest.approx(0.3)
+    assert effect(lambda h: 7.0 + 0.3 * h * h, factor) == pytest.approx(0.3 * second)
+
+
+def test_isolation_is_extrapolated_as_an_amplitude() -> None:
+    """2.355e-4 at 0.1 ms, 0.813e-4 without a step, linear between: 9.24 dB; half the step alone shows 3.4 dB."""
+
+    def law(h: float) -> float:
+        return 20.0 * math.log10(0.813e-4 + (2.355e-4 - 0.813e-4) * h)
+
+    assert law(1.0) - law(0.5) == pytest.approx(3.44, abs=0.01)
+    assert effect(law, 0.5, "dB") == pytest.approx(9.24, abs=0.01)
+    assert effect(law, 2.0, "dB") == pytest.approx(9.24, abs=0.01)
+    assert effect(lambda h: -80.0 * h, 2.0, "dB") == pytest.approx(-5.93, abs=0.1)  # -20 lg(2 - 1e-4)
+    assert effect(lambda h: -80.0 + 7.0 * h, 2.0, "dB") == pytest.approx(20.0)  # no amplitude is left: bounded
+
+
+def loop_result(*coefficients: Coefficient) -> LoopResult:
+    return LoopResult(
+        system="s", title="t", method="", sources=[], conventions=[], coefficients=list(coefficients), responses=[],
+        verdict=coefficients[0].verdict,
+    )  # fmt: skip
+
+
+def test_the_step_joins_u_interval_verdict_and_budget() -> None:
+    """u = 0.3, effect 0.4 sqrt 3: u becomes 0.5; the pass of 10 below 10.8 (U = 0.588) ends inconclusive (U = 0.98)."""
+    r = loop_result(coefficient(10.0, 0.3, limit=(None, 10.8), verdict="pass", truth=9.0, z=1.0 / 0.3))
+    change = 0.4 * math.sqrt(3.0)
+    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": change}]})
+    c = r["m"]
+    assert c.u == pytest.approx(0.5) and c.k * c.u == pytest.approx(NORMAL * 0.5)
+    assert c.interval == pytest.approx((10.0 - 0.98, 10.0 + 0.98), abs=1e-4)
+    assert (c.verdict, r.verdict) == ("inconclusive", "inconclusive") and c.z == pytest.approx(2.0)
+    assert math.hypot(*(b.contribution for b in r.budget)) == pytest.approx(c.u)
+    assert [b.source for b in r.budget] == ["noise and evaluation", "coupling step"]
+    assert r.step_check["rows"][0]["ratio"] == pytest.approx(change / 0.3) == r.step_check["worst"]
+
+
+def test_the_warning_says_what_to_do() -> None:
+    """Above u it speaks; an effect of a thousandth of the estimate is in u without a word."""
+    rows = [{"name": "isolation", "unit": "dB", "change": 3.2}, {"name": "S", "unit": "N·m/rad", "change": 5.0}]
+    r = loop_result(coefficient(-72.56, 0.01, "isolation", "dB"), coefficient(16000.0, 0.1, "S", "N·m/rad"))
+    apply_step(r, {"step": 1e-4, "rows": rows})
+    (text,) = r.warnings
+    assert text.startswith(
+        "The communication step of 0.1 ms moves isolation by 3.2 dB (u without it 0.01 dB): more than"
+    )
+    assert text.endswith("run with --step 25us.") and "S by" not in text
+    assert r["S"].u == pytest.approx(math.hypot(0.1, 5.0 / math.sqrt(3.0)))
+    assert [step_text(x) for x in (5e-4, 2.5e-5, 1.0, 1e-2)] == ["0.5 ms", "25 us", "1 s", "10 ms"]
+
+
+def test_the_covariance_of_a_drift_test_gets_the_signed_product() -> None:
+    """Effects that only follow from one another: cov = C + s s^T, against numpy."""
+    c = [coefficient(1.0, 0.2, "a"), coefficient(2.0, 0.3, "b")]
+    r = DriftTestResult(
+        system="s", title="t", method="", sources=[], conventions=[], coefficients=c, series=[], condition=1.0, rank=2,
+        correlation=[[1.0, 0.5], [0.5, 1.0]], dof=1.0, noise={}, residual_std=0.0, residual_unit="1",
+    )  # fmt: skip
+    before = r.covariance()
+    rows = [{"name": n, "unit": "1", "change": x} for n, x in (("a", 0.6), ("b", -0.9))]
+    apply_step(r, {"step": 1e-3, "rows": rows})
+    s = np.array([0.6, -0.9]) / math.sqrt(3.0)
+    np.testing.assert_allclose(r.covariance(), before + np.outer(s, s), rtol=1e-12)
+
+
+# ------------------------------------------------------------------------------- through the product
+def test_the_effect_stated_by_default_is_that_of_much_smaller_steps(command: Any, tmp_path: Any) -> None:
+    """Against runs at h and h/4 of a plan, noise off, whose difference is 3/4 of the effect: within a fifth."""
+    import json
+
+    code, out, _ = command("run", PLATFORM, "--set", "hold=10s", "--out", tmp_path / "a", default_check=True)
+    assert code == 0 and "step check (" in out and "the communication step of 0.5 ms moves" in out.lower()
+    result = json.loads((tmp_path / "a" / "result.json").read_text())
+    stated = {r["name"]: r["change"] for r in result["step_check"]["rows"]}
+    with Session(PLATFORM) as session:
+        system = load_system(PLATFORM)
+        quiet = {
+            **dict.fromkeys((n for n in system.noises if n.startswith(("gyro.", "rebalance."))), 0.0),
+            "hold": 10.0,
+        }
+        runs = [{c.name: c for c in system.reduce(session.run(quiet, 1, h)).coefficients} for h in (5e-4, 1.25e-4)]
+    u = {c["name"]: c["u"] for c in result["coefficients"]}
+    for name in ("peak", "load/peak", "PM", "rate error", "platform error"):
+        true = (runs[0][name].estimate - runs[1][name].estimate) / 0.75
+        assert stated[name] == pytest.approx(true, rel=0.3), name
+        assert u[name] >= abs(true) / 2.0  # U covers it
+    code, out, _ = command("report", tmp_path / "a")
+    again = json.loads((tmp_path / "a" / "result.json").read_text())
+    assert again["step_check"] == result["step_check"] and again["coefficients"] == result["coefficients"]
+    code, out, _ = command("run", PLATFORM, "--set", "hold=10s", "--out", tmp_path / "b")  # with --no-check-step
+    assert code == 0 and "step check" not in out
