@@ -9,7 +9,7 @@ come back.  The fit itself is never changed: what is reported is the plain one, 
 
 The robust fit, asked for by an option, is Tukey's bisquare (c = 4.685, 95 % efficient for normal noise) from a Huber
 start (k = 1.345), on the problem whitened by the same noise model; u by Huber's sandwich.
-[Cook and Weisberg 1982, ch. 2; Huber 1981, ch. 7]
+[Cook 1982, ch. 2; Huber 1981, ch. 7]
 """
 
 from __future__ import annotations
