@@ -64,6 +64,16 @@ def test_the_vendors_platform_does_what_ours_does(both: Any) -> None:
     assert np.array_equal(theirs["platform.lock"], ours["platform.lock"])
 
 
+def test_a_platform_that_takes_no_acceleration_of_the_base_fits(foreign: Foreign, tmp_path: Path) -> None:
+    """The mapping without alpha_b: the rest is wired."""
+    mapping = tmp_path / "vendor.toml"
+    head, rest = MAPPING.read_text(encoding="utf-8").split("[alpha_b]")
+    mapping.write_text(head + "[f_b]" + rest.split("[f_b]")[1], encoding="utf-8")
+    with Session(NAME, {"platform": foreign("vendor_platform")}, {"platform": mapping}) as s:
+        wired = {c.input.variable for c in s.assembly.connections if c.target == "platform"}
+        assert {"BASE_X", "LOAD_Z"} <= wired and not wired & {"BACC_X", "BACC_Y", "BACC_Z"}
+
+
 def test_measures_of_the_vendors_platform(both: Any) -> None:
     """The channels follow rate_gain: stiffness drag feedback = 150 40 = 6000 N.m/rad.  There is no linear model of the
     vendor's, which is said, and margins without it."""
