@@ -67,15 +67,23 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "roll": _roll,
         }[gate.label](found, gate, o)
     whole = record.channels
-    tilt = np.hypot(*_lean(whole).T)
-    found.measure("max", "largest tilt of the rotor after the erection", "arcmin", _after(found, tilt) / ARCMIN,
-                  chatter(record.run) / ARCMIN)  # fmt: skip
-    _figure(found, "tilt", "tilt", "arcmin", whole["time"], tilt / ARCMIN,
-            "Angle between the rotor axis and the true vertical, over the whole run.")  # fmt: skip
-    shown = np.hypot(*_lean(whole, shown=True).T)
-    _figure(found, "error", "error of the shown vertical", "arcmin", whole["time"], shown / ARCMIN,
-            "Angle between the vertical that pitch and roll show and the true one: the tilt, and the lag of the ring.",
-            )  # fmt: skip
+    u = chatter(record.run) / ARCMIN
+    tilt, shown = (np.hypot(*_lean(whole, s).T) / ARCMIN for s in (False, True))
+    t, first = whole["time"], _erected(found)
+    found.measure("max", "largest tilt of the rotor after the erection", "arcmin", float(tilt[first:].max(initial=0.0)),
+                  u)  # fmt: skip
+    found.measure("shown max", "largest error of the shown vertical after the erection: tilt, and lag of the ring",
+                  "arcmin", float(shown[first:].max(initial=0.0)), u)  # fmt: skip
+    if first:
+        _figure(found, "erection", "tilt", "arcmin", t[: first + 1], tilt[: first + 1],
+                "Angle between the rotor axis and the true vertical while it is erected.")  # fmt: skip
+    when = f"from {t[first]:.4g} s on, after the erection" if 0 < first < t.size else "over the whole run"
+    if first < t.size:
+        _figure(found, "tilt", "tilt", "arcmin", t[first:], tilt[first:],
+                f"Angle between the rotor axis and the true vertical, {when}.")  # fmt: skip
+        _figure(found, "error", "error of the shown vertical", "arcmin", t[first:], shown[first:],
+                f"Angle between the vertical that pitch and roll show and the true one, {when}: the tilt, and the lag "
+                "of the ring.")  # fmt: skip
     found.tables.append(_phases(found, o))
     result = found.result(
         title="Vertical gyro",
@@ -92,9 +100,10 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     )
     result.ranked_by = "max"
     result.summary = result.summary or found.tell(
-        "Erected to the dead zone in {t_zone:.3g} s.",
-        "The acceleration leaned it by {lean:.3g}°.",
-        "After the erection it was never more than {max:.3g} arcmin from the vertical.",
+        "Erected to the dead zone in {t_zone}.",
+        "The acceleration leaned the rotor by {lean}.",
+        "After the erection the rotor was never more than {max} from the vertical, and what pitch and roll show never "
+        "more than {shown max}.",
     )
     return result
 
@@ -112,9 +121,21 @@ def _of(gate: Gate, shown: bool = False) -> Array:
     return _lean({n: gate[n] for n in (*ANGLES, "gyro.inner")}, shown)
 
 
-def _after(found: LoopFindings, tilt: Array) -> float:
+def _erected(found: LoopFindings) -> int:
+    """Return the row of the record at which the erection is over; 0 without one."""
     first = [g for g in found.gates if g.label == "erection"]
-    return float(tilt[first[-1].inside.stop if first else 0 :].max(initial=0.0))
+    return first[-1].inside.stop if first else 0
+
+
+def _through(gate: Gate) -> slice:
+    """Return the rows from the last one before the gate opened, when the vehicle rested, to the last one in it."""
+    return slice(max(gate.inside.start - 1, 0), gate.inside.stop)
+
+
+def _turned(angle: Array) -> float:
+    """Return what an angle that is counted within a turn went through, rad."""
+    way = np.unwrap(angle)
+    return float(way[-1] - way[0])
 
 
 def chatter(run: RunDocument) -> float:
@@ -163,16 +184,17 @@ def _rest(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
 
 
 def _acceleration(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
-    forward = _of(gate)[:, 1]
+    rows = _through(gate)
+    forward = _lean({n: gate.channels[n][rows] for n in (*ANGLES, "gyro.inner")})[:, 1]
     change = float(forward[-1] - forward[0])
-    time = float(gate.t[-1] - gate.t[0])
+    time = float(gate.channels["time"][rows][-1] - gate.channels["time"][rows][0])
     closed = 0.0
     if not o["cut_off"] and o["law"] == "switches":
         closed = min(float(o["rate"]) * time, math.atan(float(o["acceleration"]) / G0) - float(o["dead_zone"]))
     elif not o["cut_off"]:
         a, k = math.atan(float(o["acceleration"]) / G0), float(o["gain"])
         closed = min(float(o["rate"]) * time, a * (1.0 - math.exp(-k * time)))
-    u = float(o["rate"]) * _u_time(gate) / DEG
+    u = math.sqrt(2.0) * chatter(found.record.run) / DEG
     found.measure("lean", "lean forward through the acceleration (closed: without Earth rate)", "°", change / DEG, u,
                   closed=closed / DEG)  # fmt: skip
 
@@ -184,23 +206,25 @@ def _turn(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
 
 
 def _loop(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
-    tilt, pitch = np.hypot(*_of(gate, shown=True).T), np.unwrap(gate["gyro.pitch"])
+    tilt, rows, c = np.hypot(*_of(gate, shown=True).T), _through(gate), gate.channels
     found.measure("loop", "largest error of the shown vertical in the loop", "arcmin", float(tilt.max()) / ARCMIN,
                   chatter(found.record.run) / ARCMIN)  # fmt: skip
-    step = found.record.run.step / math.sqrt(12.0)
-    found.measure("pitch", "pitch shown through the loop", "°", float(pitch[-1] - pitch[0]) / DEG,
-                  36.0 * step, closed=36.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
+    rise, x = np.sin(c["motion.angle[1]"][rows]), c["motion.angle[2]"][rows]
+    true = _turned(np.arctan2(rise, np.cos(c["motion.angle[1]"][rows]) * np.cos(x)))  # pitch counted on beyond 90 deg
+    found.measure("pitch", "pitch shown through the loop (closed: of the vehicle)", "°",
+                  _turned(c["gyro.pitch"][rows]) / DEG, math.sqrt(2.0) * chatter(found.record.run) / DEG,
+                  closed=true / DEG)  # fmt: skip
     ring = np.unwrap(gate["gyro.ring_angle"])
     found.measure("ring", "travel of the ring in the loop", "°", float(np.ptp(ring)) / DEG,
                   chatter(found.record.run) / DEG)  # fmt: skip
 
 
 def _roll(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
-    roll = np.unwrap(gate["gyro.roll"])
-    step = found.record.run.step / math.sqrt(12.0)
-    found.measure("roll", "roll shown through the roll", "°", float(roll[-1] - roll[0]) / DEG, 60.0 * step,
-                  closed=60.0 * float(gate.t[-1] - gate.t[0]))  # fmt: skip
+    rows, c = _through(gate), gate.channels
     lag = 60.0 / float(found.record.run.parameters.get("gyro.k_ring", math.inf))
+    found.measure("roll", "roll shown at the end of the roll (closed: of the vehicle, less the lag of the ring)", "°",
+                  _turned(c["gyro.roll"][rows]) / DEG, math.sqrt(2.0) * chatter(found.record.run) / DEG,
+                  closed=_turned(c["motion.angle[2]"][rows]) / DEG - lag)  # fmt: skip
     found.measure("g2", "largest angle left to the ring's servo in the roll", "°",
                   float(np.abs(gate["gyro.inner"]).max()) / DEG, chatter(found.record.run) / DEG,
                   closed=lag)  # fmt: skip

@@ -25,6 +25,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import (
     LAST,
@@ -53,9 +54,15 @@ from gyrobench.result import Coefficient, LoopResult, Response, Specification
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 CURVE = 241  # points of a drawn curve
-DRIFTS = "The platform drifts by {drift:.3g} °/h at rest."  # for LoopFindings.tell
+DRIFTS = "The platform drifts by {drift} at rest."  # for LoopFindings.tell
 SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
+
+
+def _rounded(c: Coefficient) -> str:
+    """Return a value for a sentence."""
+    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
+    return plus_minus(c).replace(" °", "°") + zero
 
 
 class LoopFindings:
@@ -143,10 +150,20 @@ class LoopFindings:
         return {c.name: c.estimate for c in self.coefficients if not c.no_value}
 
     def tell(self, *texts: str) -> list[str]:
-        """Return the sentences of which all was measured: "It crosses over at {f_c:.4g} Hz."."""
+        """Return the sentences of which all was measured: "It crosses over at {f_c:.4g} Hz.".
+
+        A field without a format, "{drift}", is written with its unit and rounded by its expanded uncertainty.
+        """
         measured = self.estimates
-        fields = {text: [name for _, name, _, _ in Formatter().parse(text) if name is not None] for text in texts}
-        return [text.format_map(measured) for text in texts if measured.keys() >= set(fields[text])]
+        rounded = {c.name: _rounded(c) for c in self.coefficients if c.name in measured}
+        out = []
+        for text in texts:
+            fields = [(name, spec) for _, name, spec, _ in Formatter().parse(text) if name is not None]
+            if measured.keys() >= {name for name, _ in fields}:
+                for name, spec in fields:
+                    text = text if spec else text.replace(f"{{{name}}}", rounded[name])
+                out.append(text.format_map(measured))
+        return out
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
