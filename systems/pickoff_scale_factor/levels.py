@@ -38,12 +38,14 @@ class Levels:
     dof: int
 
     @classmethod
-    def of(cls, angle: Array, seen: Array, t: Array, u: Array, drift: float) -> Levels:
-        """seen: what the float sees of the angle.  drift: change of the voltage with time, V/s."""
-        steady = u - drift * (t - float(np.mean(t)))
+    def of(cls, angle: Array, seen: Array, t: Array, u: Array, moved: Array, fitted: int) -> Levels:
+        """seen: what the float sees of the angle.  moved: what the drift changed of the voltage, V, by ``fitted``
+        coefficients.
+        """
+        steady = u - moved
         slope, zero = (float(v) for v in np.polyfit(seen, steady, 1))
         cubic = steady - np.polyval(np.polyfit(seen, steady, 3), seen)
-        dof = u.size - 5 if drift else u.size - 4
+        dof = u.size - 4 - fitted
         scatter = math.sqrt(float(np.sum(cubic**2)) / dof)
         return cls(angle, t, u, zero, steady - zero - slope * seen, slope, scatter, dof)
 

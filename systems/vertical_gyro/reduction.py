@@ -143,6 +143,14 @@ def chatter(run: RunDocument) -> float:
     return float(run.options["rate"]) * run.step / math.sqrt(3.0)
 
 
+def _between(y: Array, k: int) -> float:
+    """Standard uncertainty of an extreme at reading k: a parabola through it and its neighbours rises above it by an
+    eighth of their second difference at most.
+    """
+    near = y[max(k - 1, 0) : k + 2]
+    return float(abs(np.diff(near, 2)[0])) / 8.0 / math.sqrt(3.0) if near.size == 3 else 0.0
+
+
 def _u_time(gate: Gate) -> float:
     return float(gate.t[1] - gate.t[0]) / math.sqrt(12.0)
 
@@ -215,8 +223,8 @@ def _loop(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
                   _turned(c["gyro.pitch"][rows]) / DEG, math.sqrt(2.0) * chatter(found.record.run) / DEG,
                   closed=true / DEG)  # fmt: skip
     ring = np.unwrap(gate["gyro.ring_angle"])
-    found.measure("ring", "travel of the ring in the loop", "°", float(np.ptp(ring)) / DEG,
-                  chatter(found.record.run) / DEG)  # fmt: skip
+    u = math.hypot(chatter(found.record.run), _between(ring, int(ring.argmax())), _between(ring, int(ring.argmin())))
+    found.measure("ring", "travel of the ring in the loop", "°", float(np.ptp(ring)) / DEG, u / DEG)
 
 
 def _roll(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:

@@ -125,10 +125,33 @@ def test_effects() -> None:
     assert lines["voltmeter", "S"] == pytest.approx(3e-3 * S, rel=1e-4)
 
 
+def test_drift_that_changes_evenly_is_not_taken_for_scale_factor() -> None:
+    """The two passes are one cycle of a square wave: a drift that goes from -1 to +1 deg/h in the 8 s of the test lifts
+    one pass by 4 s 1 deg/h / 2 = 2 arcsec and lowers the other, of 2400 each: differences weighed alike would give S
+    8e-4 too large, as slow noise it still was 1.4e-4.
+    """
+    ideal = made(drift=0.0)
+    t = ideal["t_start"] - 4.0
+    way = DPH * t**2 / 8.0  # of the float: the integral of t / 4 deg/h
+    c = named(R.reduce({**ideal, "mean": ideal["mean"] - 12.0 * way}, R.PickoffSetup(1.0, 2.0 * DPH)))
+    assert c["S"].estimate == pytest.approx(12.0, rel=1e-9)
+    assert c["drift"].estimate == pytest.approx(0.0, abs=1e-6) and abs(c["linearity"].estimate) < 1e-9
+
+
+def test_seconds_do_not_pass_the_drift_of_a_gyro(stepping: Session) -> None:
+    """Random drift that lasts through the test is in its mean: parameters are no truth of it, limits no verdict."""
+    values = {"gyro.markov": 0.5 * DPH, "gyro.markov_tau": 300.0}
+    limits = {"drift": (-5.0, 5.0), "S": (1.0, 100.0)}
+    c = named(load().with_values(values).reduce(stepping.run(values), limits))
+    assert c["drift"].truth is None and c["drift"].verdict == "inconclusive" and c["S"].verdict == "pass"
+    steady = named(load().reduce(stepping.run({"gyro.markov": 0.0})))
+    assert steady["drift"].truth is not None
+
+
 # ------------------------------------------------------------------------------------------ co-simulation
 @pytest.mark.parametrize("seed", range(4))
 def test_random_gyros(stepping: Session, seed: int) -> None:
-    """Noise off: S to 2e-7; the drift to what the attitude changes of it (1 deg/h/g times 6e-3)."""
+    """Noise off: S to 3e-7; the drift to what the attitude changes of it (1 deg/h/g times 6e-3)."""
     rng = np.random.default_rng(seed)
     values: dict[str, Any] = {**quiet(), "latitude": float(rng.uniform(-1.3, 1.3)), "points": int(rng.integers(10, 16))}
     values |= {"gyro.C": float(rng.uniform(0.15, 0.3)), "gyro.K_sg": float(rng.uniform(5.0, 12.0))}
@@ -136,8 +159,8 @@ def test_random_gyros(stepping: Session, seed: int) -> None:
     r = load().with_values(values).reduce(stepping.run(values))
     c = named(r)
     S = values["gyro.K_sg"] * 0.2 / values["gyro.C"]
-    assert c["S"].truth == pytest.approx(S) and c["S"].estimate == pytest.approx(S, rel=2e-7)
-    assert c["K_sg"].estimate == pytest.approx(values["gyro.K_sg"], rel=2e-7)
+    assert c["S"].truth == pytest.approx(S) and c["S"].estimate == pytest.approx(S, rel=3e-7)
+    assert c["K_sg"].estimate == pytest.approx(values["gyro.K_sg"], rel=3e-7)
     assert c["drift"].estimate == pytest.approx(c["drift"].truth, abs=6e-3)
     assert c["S"].closed == pytest.approx(S, rel=1e-4)
 
