@@ -21,13 +21,15 @@ class FloatedGyro(SdfGyro):
 
         omega_d = F + X I + Y O + Z S + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
                   + turn-on constant + Gauss-Markov + white
-        F = D_F (1 + p_F T)                          I = D_I (1 + p_I T) + D_TI dT_S
+        F = D_F (1 + p_F T) + D_vI v_I + D_vO v_O + D_vS v_S
+                                                     I = D_I (1 + p_I T) + D_TI dT_S
         O = D_O (1 + p_O T) - D_TO dT_O              S = D_S (1 + p_S T) - D_TS dT_I        T = age + time
 
     The second block is Hu 1981, eq. 2-39..2-42, which stands in torque sign omega_M = -omega_d, with every
     coefficient's sign turned: D_F = -D_K, D_I = -U_z, D_O = -U_y, D_S = +U_x, and of the thermal terms
     -D_Tzx dT_z X -> +D_TI dT_S X, +D_Tyy dT_y Y -> -D_TO dT_O Y, +D_Txz dT_x Z -> -D_TS dT_I Z.  dT_j is the
-    temperature difference between the two ends of the float along j.  p_O has no physical cause in Hu 1981.
+    temperature difference between the two ends of the float along j, v_j the velocity of the float against the case
+    (D_vI = -D_vx, D_vO = -D_vy, D_vS = -D_vz of Hu 1981).  p_O has no physical cause there.
 
     `terms` says which model is meant: 3 = F, I, S; 4 = 3 + IS; 5 = 4 + II; 8 = 5 + SS, IO, OS; 9 = 8 + O;
     10 = 9 + OO.  A coefficient outside it must be 0.  Gauss-Markov: g+ = e^(-h/tau) g + sqrt(1 - e^(-2 h/tau))
@@ -46,13 +48,13 @@ class FloatedGyro(SdfGyro):
     step has determinant 1).  Computed with reaction = 1 only.
     The run ends where |b| reaches `stop`.
 
-    Not modelled: bearing and rotor compliance (third-order dynamics), nutation, float translation (D_v terms),
+    Not modelled: bearing and rotor compliance (third-order dynamics), nutation, how the float comes to move (v_float),
     vibration, hysteresis and warm-up, contact of the float with its stop, torquer axis error; in M_react the float's
     own inertia about I and S (count it with the mount).
     Source: Hu 1981, ch. 2; Xia 2008, sections 2.1, 2.2.2.2 (corrected).
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
     K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)
@@ -73,7 +75,12 @@ class FloatedGyro(SdfGyro):
     D_TO = Parameter(0.0, "rad/s/K", "D_Tyy: drift per g0 along O and temperature difference along O")
     D_TS = Parameter(0.0, "rad/s/K", "D_Txz: drift per g0 along S and temperature difference along I")
 
+    D_vI = Parameter(0.0, "rad/m", "drift per velocity of the float along I")
+    D_vO = Parameter(0.0, "rad/m", "drift per velocity of the float along O")
+    D_vS = Parameter(0.0, "rad/m", "drift per velocity of the float along S")
+
     dT = Input([0.0, 0.0, 0.0], "K", "temperature differences along I, O, S")
+    v_float = Input([0.0, 0.0, 0.0], "m/s", "velocity of the float against the case, along I, O, S")
 
     M_react = Output("N.m", "torque of the gyro on its mount, case axes", shape=(3,))
     h_I = Output("N.m.s", "spin momentum along I, H sin b, half an internal step ahead")
@@ -101,7 +108,8 @@ class FloatedGyro(SdfGyro):
 
     def static_drift(self, x: Vector) -> Number:
         age = self.age + self.t
-        fixed = self.D_F * (1.0 + self.p_F * age)
+        v = self.v_float
+        fixed = self.D_F * (1.0 + self.p_F * age) + (self.D_vI * v[0] + self.D_vO * v[1] + self.D_vS * v[2])
         along_i = self.D_I * (1.0 + self.p_I * age) + self.D_TI * self.dT[2]
         along_o = self.D_O * (1.0 + self.p_O * age) - self.D_TO * self.dT[1]
         along_s = self.D_S * (1.0 + self.p_S * age) - self.D_TS * self.dT[0]

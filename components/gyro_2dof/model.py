@@ -31,6 +31,15 @@ class Gyro2dof(Component):
     outside it must be 0.  x channel: 8 = 0, x, z, xx, zz, xy, yz, xz; 9 = 8 + y; 10 = 9 + yy.  y channel: the same with
     x and y exchanged.  Gauss-Markov and noise as in floated_gyro, each channel its own.
 
+    Ageing, temperature and translation of the float, T = age + time, as in floated_gyro (dT_j: temperature difference
+    between the ends along j, v_j: velocity of the float against the case)          [GYRO-COEFF-TIME-TEMP, 2-39..2-42]
+
+        Dc_0 (1 + p0 T) + Dc_vx v_x + Dc_vy v_y + Dc_vz v_z     for Dc_0,      Dc_j (1 + pj T) + th_j     for Dc_j with
+        x channel: th_x = +Dx_Tx dT_z,  th_y = -Dx_Ty dT_y,  th_z = -Dx_Tz dT_x
+        y channel: th_y = +Dy_Ty dT_z,  th_x = -Dy_Tx dT_x,  th_z = -Dy_Tz dT_y
+
+    The y channel is the x channel with (I, O, S) = (y, -x, z): along -x both X and dT_x change sign.
+
     Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses without lag).  p, q: inertial rates of rotor axis:
 
         J_x p' = -H q - C_x (p - omega_x) + T_x + M_x,     T_x = +H (omega_dy + k_x i_x (1 + ...))
@@ -51,13 +60,13 @@ class Gyro2dof(Component):
     H q sin(beta) about the z axis of the outer gimbal.  The run ends where |beta| reaches `stop`.
 
     Not modelled: small angles with full = 0; with full = 1 change of J_x with beta, inertia about z, coupling of the
-    base's acceleration through the inertias; torquer axis error, the share of omega_z in the angular momentum, ageing
-    and temperature, vibration, hysteresis, warm-up.
+    base's acceleration through the inertias; torquer axis error, the share of omega_z in the angular momentum,
+    how the float comes to move (v_float), vibration, hysteresis, warm-up.
     Source: Hu 1981, ch. 2 and 3 (wiring rule of 3.6); the dynamics are our own minimal model (GYRO-DYN-2DOF);
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
     nonlinear = "full"
 
     K_sg_x = Parameter(10.0, "V/rad", "gain of the x pickoff", above=0.0)
@@ -80,9 +89,11 @@ class Gyro2dof(Component):
     full = Parameter(False, bool, "gimbal angles: 0 small, 1 at full size (with nutation)")
     stop = Parameter(0.0, "rad", "stop of the inner gimbal: the run ends there (0: none)", min=0.0)
 
+    age = Parameter(0.0, "s", "age at time 0", min=0.0)
     terms_x = Parameter(9, int, "terms of the x channel: 8, 9 or 10")
     Dx = ChannelDrift(
         "x",
+        "zyx",
         fixed=(-0.3, "constant drift (-0.3 deg/h)"),
         x=(-0.9, "per g0 along x, mass unbalance along z (-0.9 deg/h/g)"),
         y=(0.1, "per g0 along y, empirical (0.1 deg/h/g)"),
@@ -98,6 +109,7 @@ class Gyro2dof(Component):
     terms_y = Parameter(9, int, "terms of the y channel: 8, 9 or 10")
     Dy = ChannelDrift(
         "y",
+        "xzy",
         fixed=(0.4, "constant drift (0.4 deg/h)"),
         x=(-0.08, "per g0 along x, empirical (-0.08 deg/h/g)"),
         y=(-1.0, "per g0 along y, unbalance with outer gimbal (-1 deg/h/g)"),
@@ -126,6 +138,8 @@ class Gyro2dof(Component):
     i_y = Input(0.0, "A", "current of the torquer about y (nulls u_x)")
     M_x = Input(0.0, "N.m", "torque from outside on the outer gimbal about x")
     M_y = Input(0.0, "N.m", "torque from outside on the inner gimbal about y")
+    dT = Input([0.0, 0.0, 0.0], "K", "temperature differences along x, y, z")
+    v_float = Input([0.0, 0.0, 0.0], "m/s", "velocity of the float against the case, along x, y, z")
 
     u_x = Output("V", "x pickoff: case against rotor about x")
     u_y = Output("V", "y pickoff: case against rotor about y")
@@ -175,8 +189,11 @@ class Gyro2dof(Component):
 
     def drift_rates(self) -> Vector:
         g = PER_G * (self.mount @ self.f)
-        x = self.Dx.rate(g) + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
-        y = self.Dy.rate(g) + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
+        age = self.age + self.t
+        for_x = vector([self.dT[2], -self.dT[1], -self.dT[0]])
+        for_y = vector([-self.dT[0], self.dT[2], -self.dT[1]])
+        x = self.Dx.rate(g, age, for_x, self.v_float) + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
+        y = self.Dy.rate(g, age, for_y, self.v_float) + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
         return vector([x, y])
 
     def precession(self, drift: Vector) -> Vector:

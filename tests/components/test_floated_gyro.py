@@ -19,7 +19,7 @@ RNG = np.random.default_rng(11)
 
 
 def started(**parameters):
-    inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f", "i", "dT") if k in parameters}
+    inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f", "i", "dT", "v_float") if k in parameters}
     part = FloatedGyro(**parameters)
     for key, x in inputs.items():
         setattr(part, key, x)
@@ -188,12 +188,17 @@ def test_ageing_and_temperature_in_torque_sign():
         D_TS=t_xz,
         age=100.0,
         dT=[0.3, -0.4, 0.5],
+        D_vI=-0.5,
+        D_vO=1.5,
+        D_vS=2.0,
+        v_float=[1e-6, 2e-6, -3e-6],
         f=[-2 * G0, -3 * G0, 5 * G0],
     )
     t = 100.0
     x, y, z = 2.0, 3.0, -5.0
     torque_sign = (
         d_k * (1 + 1e-3 * t)
+        + (0.5 * 1e-6 - 1.5 * 2e-6 + 2.0 * 3e-6)  # D_vx = 0.5, D_vy = -1.5, D_vz = -2 in torque sign
         + (u_z * (1 + 2e-3 * t) - t_zx * 0.5) * x
         + (u_y * (1 + 3e-3 * t) + t_yy * -0.4) * y
         + (-u_x * (1 + 4e-3 * t) + t_xz * 0.3) * z

@@ -67,6 +67,9 @@ class ChannelDrift(Block):
     """Static drift of one channel of a two-degree-of-freedom gyro, ten terms along x, y, z.  [GYRO-STATIC-2DOF]
 
     terms says which model is meant: 8 = without empirical terms, 9 = 8 + per g0 along `empirical`, 10 = 9 + its square.
+    p0, px, py, pz: ageing of the constant and the linear coefficients, relative; Tx, Ty, Tz: change of the linear ones
+    with the temperature difference that belongs to each; vx, vy, vz: drift per velocity of the float against the case.
+    [GYRO-COEFF-TIME-TEMP; Hu 1981, eq. 2-39..2-42]
     """
 
     suffixes = {"fixed": "0"}
@@ -80,17 +83,36 @@ class ChannelDrift(Block):
     xy = Parameter(0.0, "rad/s", "per g0 squared, x and y")
     yz = Parameter(0.0, "rad/s", "per g0 squared, y and z")
     xz = Parameter(0.0, "rad/s", "per g0 squared, x and z")
+    p0 = Parameter(0.0, "1/s", "ageing of the constant drift")
+    px = Parameter(0.0, "1/s", "ageing along x")
+    py = Parameter(0.0, "1/s", "ageing along y")
+    pz = Parameter(0.0, "1/s", "ageing along z")
+    Tx = Parameter(0.0, "rad/s/K", "per g0 along x and temperature difference")
+    Ty = Parameter(0.0, "rad/s/K", "per g0 along y and temperature difference")
+    Tz = Parameter(0.0, "rad/s/K", "per g0 along z and temperature difference")
+    vx = Parameter(0.0, "rad/m", "per velocity of the float along x")
+    vy = Parameter(0.0, "rad/m", "per velocity of the float along y")
+    vz = Parameter(0.0, "rad/m", "per velocity of the float along z")
 
-    def __init__(self, channel: str, **values: tuple[float, str]) -> None:
-        """values: coefficient -> (deg/h, meaning)."""
-        super().__init__(
-            **{n: Parameter(v * DEG_H, "rad/s", f"{channel} channel, {doc}") for n, (v, doc) in values.items()}
-        )
+    def __init__(self, channel: str, differences: str, **values: tuple[float, str]) -> None:
+        """differences: axes of the temperature differences of Tx, Ty, Tz.  values: coefficient -> (deg/h, meaning)."""
+        said = {n: Parameter(v * DEG_H, "rad/s", f"{channel} channel, {doc}") for n, (v, doc) in values.items()}
+        for name, of in (("p0", f"D{channel}_0"), *((f"p{a}", f"D{channel}_{a}") for a in "xyz")):
+            said[name] = Parameter(0.0, "1/s", f"ageing of {of}, relative")
+        for axis, along in zip("xyz", differences, strict=True):
+            text = f"{channel} channel, per g0 along {axis} and temperature difference along {along}"
+            said[f"T{axis}"] = Parameter(0.0, "rad/s/K", text)
+            said[f"v{axis}"] = Parameter(0.0, "rad/m", f"{channel} channel, per velocity of the float along {axis}")
+        super().__init__(**said)
 
-    def rate(self, g: Vector) -> Number:
-        """Return the drift rate for (X, Y, Z) = g."""
-        linear = vector([self.x, self.y, self.z])
-        return drift_polynomial(self.fixed, linear, vector([self.xx, self.yy, self.zz, self.xy, self.yz, self.xz]), g)
+    def rate(self, g: Vector, age: Number, dT: Vector, v: Vector) -> Number:
+        """Return the drift rate for (X, Y, Z) = g; dT: signed temperature differences that belong to Tx, Ty, Tz."""
+        fixed = self.fixed * (1.0 + self.p0 * age) + (self.vx * v[0] + self.vy * v[1] + self.vz * v[2])
+        along_x = self.x * (1.0 + self.px * age) + self.Tx * dT[0]
+        along_y = self.y * (1.0 + self.py * age) + self.Ty * dT[1]
+        along_z = self.z * (1.0 + self.pz * age) + self.Tz * dT[2]
+        square = vector([self.xx, self.yy, self.zz, self.xy, self.yz, self.xz])
+        return drift_polynomial(fixed, vector([along_x, along_y, along_z]), square, g)
 
 
 class SdfGyro(Component):
