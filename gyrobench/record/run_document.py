@@ -34,12 +34,13 @@ class RecordError(GyrobenchError):
 
 def _plain(value: Any) -> Any:
     """Return the same without numbers that JSON lacks: an infinite parameter of a third-party FMU becomes text."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
+        numbers = all(type(v) is float for v in value)  # the arrays of a sequencer hold thousands
+        return list(value) if numbers and all(map(math.isfinite, value)) else [_plain(v) for v in value]
     return value
 
 

@@ -57,9 +57,11 @@ def held_nodes(angle_start: Array, angle_end: Array, t_start: Array, t_end: Arra
     length = t_end - t_start
     apart = np.abs(t_start[1:] - t_end[:-1]) > 1e-6 * length[1:]
     apart |= np.abs(angle_start[1:] - angle_end[:-1]) > 1e-3 * np.abs(angle_end[1:] - angle_start[1:])
-    out = np.empty((length.size, NODES.size))
+    out: Array = ((angle_end + angle_start)[:, None] + (angle_end - angle_start)[:, None] * NODES) / 2.0
     for rows in np.split(np.arange(length.size), np.flatnonzero(apart) + 1):
         first, last = rows[0], rows[-1]
+        if first == last:
+            continue
         knots = np.concatenate([t_start[rows], t_end[last : last + 1]]) - t_start[first]
         curve = reading_spline(knots, np.concatenate([angle_start[rows], angle_end[last : last + 1]]))
         middle = (knots[1:] + knots[:-1]) / 2.0
