@@ -11,6 +11,7 @@ from typing import Any
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.reduction.loops.loop_summary import renew
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Result, Specification
@@ -48,6 +49,7 @@ def reduce_run(
     result.provenance = {**record.run.as_dict(), "wires": wires, "shown": list(system.shown)}
     if step_check and step_check.get("rows"):
         apply_step(result, step_check)
+    renew(result)
     check_truth(result, set_values(record.run))
     return result
 

@@ -10,6 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 180.0 / 3600.0
@@ -43,7 +44,11 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "Platform error: size of the integral of the platform's rate in the flight, less its drift at rest.",
             "The servo of the fourth gimbal nulls g2; within 5° of pitch 90° it has no authority (told as lock).",
         ],
-        summary=summary,
+        summary=[
+            *summary,
+            *margins(found, *AXES),
+            *told(found.coefficients, "At rest it drifts by {drift x}, {drift y} and {drift z} about x, y and z."),
+        ],
         ranked_by="platform error",
         specification=specification,
     )

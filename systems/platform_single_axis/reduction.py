@@ -10,6 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue, rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins, told
 from gyrobench.result import LoopResult, Specification
 
 MRAD = 1e-3
@@ -35,7 +36,7 @@ def level(y: np.ndarray, stretches: int = 10) -> UncertainValue:
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    summary = _ride(found)
+    swings = _ride(found)
     _steps(found)
     found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     found.ratio(
@@ -55,17 +56,21 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "i is the torquer current of the gyro: k i = omega_IA - omega_d. The stabilizer carries the minus.",
             "L is the loop opened at the input of the stabilizer: what comes back over what is put in, with minus.",
         ],
-        summary=summary,
+        summary=[
+            *margins(found),
+            *isolation(found, "attitude over base angle", ANGLE),
+            *told(found.coefficients, swings, f"A load of {_load(found)} turns it by up to {{peak}}.", DRIFTS),
+        ],
         ranked_by="platform error",
         specification=specification,
     )
 
 
-def _ride(found: LoopFindings) -> list[str]:
+def _ride(found: LoopFindings) -> str:
     """Platform error, the measure that ranks estimators and loops; what the estimator makes of its reading."""
     ride = next((g for g in found.gates if g.label == "ride"), None)
     if ride is None:
-        return []
+        return ""
     two = round(2.0 / (ride.f or SLOW) / float(ride.t[1] - ride.t[0]))
     size = level if ride.f else rms  # a recorded motion is random
     error, rate = size(jitter(ride[ANGLE], two)), size(ride[RATE] - ride[RATE].mean())
@@ -77,10 +82,11 @@ def _ride(found: LoopFindings) -> list[str]:
     if k is not None:
         _estimator(found, ride, float(k))
     base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
-    return [
-        f"A base that {base} leaves {error.value / ARCSEC:.3g}″ "
-        f"rms on the platform, and {rate.value / MRAD:.3g} mrad/s."
-    ]
+    return f"A base that {base} leaves {{platform error}} rms on the platform, and {{rate error}}."
+
+
+def _load(found: LoopFindings) -> str:
+    return next((f"{abs(g.amplitude):g} N·m" for g in found.of("torque", shape="step")), "")
 
 
 def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:

@@ -13,6 +13,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.reduction.loops.rides import share, still
 from gyrobench.result import LoopResult, Specification
 
@@ -24,7 +25,7 @@ ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    summary = [_coupling(found), _isolation(found), _ride(found)]
+    coupled, taken, ride = _coupling(found), _isolation(found), _ride(found)
     _loads(found)
     _command(found)
     for k, axis in enumerate(AXES, 1):
@@ -45,7 +46,10 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "Platform axes x, y, z belong to the inner element; commands and attitudes are along them.",
             "Loop gains are those of one axis with the two others closed.",
         ],
-        summary=[s for s in summary if s],
+        summary=[
+            *margins(found, *AXES),
+            *told(found.coefficients, taken, coupled, ride, "At rest it drifts by {drift x}, {drift y} and {drift z}."),
+        ],
         specification=specification,
     )
 
@@ -59,14 +63,12 @@ def _norm(points: list[Point]) -> tuple[float, float]:
 def _coupling(found: LoopFindings) -> str:
     """Cross over main angle of a commanded sine.  [DECOUPLE-BENCH-83MIL]"""
     points: dict[tuple[int, int], complex] = {}
-    worst = 0.0
     gates = found.of("command", shape="sine")
     for gate in gates:
         main = gate[ANGLES[gate.axis - 1]]
         there = {j: response(gate.t, main, gate[name], gate.f) for j, name in enumerate(ANGLES, 1)}
         points |= {(gate.axis, j): p.value for j, p in there.items()}
         cross, u = _norm([p for j, p in there.items() if j != gate.axis])
-        worst = max(worst, cross)
         name = XYZ[gate.axis - 1]
         meaning = f"other axes over {name}, commanded sine of {gate.f:g} Hz"
         found.measure(f"cross {name}", meaning, "%", 100.0 * cross, 100.0 * u)
@@ -79,26 +81,28 @@ def _coupling(found: LoopFindings) -> str:
     table = cross_axis(points, tuple(XYZ), f"commanded sines of {gates[0].f:g} Hz")
     table["caption"] = "Angle about each platform axis over that about the commanded one"
     found.tables.append(table)
-    return f"A commanded sine moves the other axes by at most {100.0 * worst:.2g} % of its own angle."
+    worst = max(range(len(gates)), key=lambda k: found.estimates[f"cross {XYZ[gates[k].axis - 1]}"])
+    axis = XYZ[gates[worst].axis - 1]
+    return f"A sine commanded about {axis} moves the other axes by {{cross {axis}}} of its own angle, the most of all."
 
 
 def _isolation(found: LoopFindings) -> str:
     """What the platform takes over of the base: the whole angle, not only that about the base's axis."""
-    worst = 0.0
+    taken_over = []
     slowest = {g.axis: g for g in sorted(found.of("motion", shape="sine"), key=lambda g: -g.f)}
     for gate in (slowest[axis] for axis in sorted(slowest)):
         base = gate[f"motion.angle[{gate.axis}]"]
         taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
-        worst = max(worst, taken)
         meaning = f"platform over base, base about {XYZ[gate.axis - 1]} at {gate.f:g} Hz"
         if taken:
             size = 20.0 * math.log10(taken)
             found.measure(f"isolation {XYZ[gate.axis - 1]}", meaning, "dB", size, 20.0 / math.log(10.0) * u / taken)
+            taken_over.append(f"{{-isolation {XYZ[gate.axis - 1]}}} about {XYZ[gate.axis - 1]} ({gate.f:g} Hz)")
     found.ratio(
         "attitude over base angle", "motion", 1, ANGLES[0], "exciter.motion_angle[1]",
         caption="Isolation: platform about x over base about x.",
     )  # fmt: skip
-    return f"Of a swinging base it takes over at most {20.0 * math.log10(worst):.1f} dB." if worst else ""
+    return f"A swinging base reaches the platform smaller by {', '.join(taken_over)}." if taken_over else ""
 
 
 def _ride(found: LoopFindings) -> str:
@@ -115,7 +119,7 @@ def _ride(found: LoopFindings) -> str:
     found.measure("ride", "platform over base, rms of all axes", "dB", taken.value, taken.u)
     if not math.isfinite(taken.value):
         return ""
-    return f"In the ride the platform takes over {taken.value:.1f} ± {taken.u:.1g} dB of the base's motion."
+    return "In the ride the base's motion reaches the platform smaller by {-ride}."
 
 
 def _loads(found: LoopFindings) -> None:

@@ -10,6 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
 from gyrobench.reduction.loops.loop_measures import Gate, cross_axis, drift, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 180.0 / 3600.0
@@ -41,7 +42,11 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "Gimbal lock is told within 5° of m = 90°; the largest gimbal rate for a unit rate of the base is 1/cos m.",
             "L: the loop opened at the input of a channel, the others closed; what comes back over what is put in.",
         ],
-        summary=summary,
+        summary=[
+            *summary,
+            *margins(found, *AXES),
+            *told(found.coefficients, "At rest it drifts by {drift x}, {drift y} and {drift z} about x, y and z."),
+        ],
         ranked_by="platform error",
         specification=specification,
     )  # fmt: skip

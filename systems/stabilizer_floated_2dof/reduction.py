@@ -16,7 +16,9 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, DRIFTS, LoopFindings
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, told
+from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.result import LoopResult, Specification
 
 from .closed import Loop
@@ -67,11 +69,14 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         conventions=CONVENTIONS,
         specification=specification,
     )
-    crosses = "The loop crosses over at {f_c:.4g} Hz with {PM:.3g}° of phase margin"
-    limit = "; it becomes unstable at {lower limit:.3g} of its gain." if "lower limit" in found.estimates else "."
-    sentences = found.tell(
-        "A load leaves the platform {θ*:.4g}″ off; its stiffness at rest is {S:.5g} N·m/rad.", crosses + limit, DRIFTS
-    )
+    sentences = [
+        *margin_sentences(found),
+        *isolation(found, "isolation", ANGLE),
+        *told(
+            found.coefficients, "The load leaves the platform {θ*} off and turns it by up to {θ_max}; stiffness {S}.",
+            DRIFTS,
+        ),
+    ]  # fmt: skip
     result.summary = result.summary or [*sentences, *said]
     return result
 

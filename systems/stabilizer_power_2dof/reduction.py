@@ -15,7 +15,9 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, DRIFTS, LoopFindings
+from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, told
+from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.result import LoopResult, Specification
 
 DPH = math.pi / 648000.0
@@ -82,11 +84,11 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     points = found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
     if points:
         _limits(found, points, K_m, gyro)
-    isolation = found.ratio(
+    transmitted = found.ratio(
         "isolation", "motion", 1, "gyro.alpha", BASE, plus=BASE,
         caption="Isolation: inertial angle of the platform over that of the base. Points: measured; lines: linear.",
     )  # fmt: skip
-    _friction(found, isolation)
+    _friction(found, transmitted)
     for gate in found.of("torque", 2):
         _servo(found, gate, H, own)
     for gate in holds:
@@ -99,12 +101,12 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         conventions=CONVENTIONS,
         specification=specification,
     )
-    result.summary = result.summary or found.tell(
-        "A load leaves the platform {α*:.4g}″ off; the gyro leans by M/K_m with K_m = {K_m:.4g} N·m/rad.",
-        "The loop crosses over at {f_c:.3g} Hz with a phase margin of {PM:.3g}°; it is stable up to "
-        "K_m = {K_m limit:.4g} N·m/rad.",
-        DRIFTS,
-    )
+    result.summary = result.summary or [
+        *margin_sentences(found),
+        *told(found.coefficients, "It is stable up to a correction of K_m = {K_m limit}; K_m is {K_m}."),
+        *isolation(found, "isolation", "gyro.alpha", plus=BASE),
+        *told(found.coefficients, "A load leaves the platform {α*} off and the gyro leaning by M/K_m.", DRIFTS),
+    ]
     return result
 
 

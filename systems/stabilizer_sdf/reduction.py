@@ -13,6 +13,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import ReductionError
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import DPH, LoopFindings
+from gyrobench.reduction.loops.loop_summary import isolation, margins, told
 from gyrobench.result import LoopResult, Response, Specification
 
 from . import closed
@@ -85,17 +86,22 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     if ends is not None and not found.unstable:
         beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
         result.summary = [
-            f"After {t[-1]:.4g} s of {p.M:g} N.m the platform leans by {ends.estimate:.4g} arcmin{beside}.",
-            f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°.",
-            *([SAID[kind](p)] if free else []),
+            *margins(found),
+            *isolation(found, "isolation", "platform.attitude"),
+            *told(
+                found.coefficients,
+                f"After {t[-1]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
+                f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°; it was never beyond {{b_max}}.",
+                SAID[kind](p) if free else "",
+            ),
         ]
     return result
 
 
 SAID = {
-    "integrating": lambda p: f"The gyro holds the axis like a spring of {p.stiffness:.4g} N.m/rad.",
+    "integrating": lambda p: f"The gyro holds the axis like a spring of {p.stiffness:.4g} N·m/rad.",
     "rate-integrating": lambda p: f"The axis creeps with M C/H² = {p.M * p.C / p.H**2 / ARCMIN:.4g} arcmin/s.",
-    "rate": lambda p: f"The axis feels like an inertia of {p.inertia:.5g} kg.m2 instead of {p.J0:.5g}.",
+    "rate": lambda p: f"The axis feels like an inertia of {p.inertia:.5g} kg·m² instead of {p.J0:.5g}.",
 }
 
 

@@ -13,6 +13,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
+from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.result import LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
@@ -99,8 +100,9 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         specification=specification,
     )
     result.ranked_by = "max"
-    result.summary = result.summary or found.tell(
-        "Erected to the dead zone in {t_zone}.",
+    result.summary = result.summary or told(
+        found.coefficients,
+        "Erected to the dead zone in {t_zone}; at rest it then hangs off by {hang-off}.",
         "The acceleration leaned the rotor by {lean}.",
         "After the erection the rotor was never more than {max} from the vertical, and what pitch and roll show never "
         "more than {shown max}.",

@@ -63,6 +63,18 @@ def test_isolation_is_that_of_the_friction_and_the_back_emf():
     taken = next(r for r in result.responses if r.name.startswith("attitude over"))
     left = next(r for r in free.responses if r.name.startswith("attitude over"))
     assert np.max(left.y) < 1e-9 < 1e-4 < np.min(taken.y)
+    # 0.05 against 1/|2 + 0.025j| N·m·s/rad at 1 Hz, next to which the platform is at rest
+    (said,) = [s for s in result.summary if s.startswith("Base motion at 1 Hz reaches the platform 56.8")]
+    assert said.endswith("it is carried over by the back EMF of the motor (91 %) and viscous friction (9 %).")
+    assert not [s for s in free.summary if s.startswith("Base motion")]
+
+
+def test_answer_says_how_far_the_loop_is_from_its_limits(quiet):
+    _, result, found = quiet
+    first = result.summary[0]
+    assert first.startswith(f"Crossover {found['f_c'].estimate:.1f}") and "phase margin 6" in first
+    assert "may rise by 16.9 dB (oscillation at 72 Hz) or fall by 25.7 dB" in first
+    assert any(s.startswith("A load of 1 N·m turns it by up to 75.") for s in result.summary)
 
 
 def test_estimators_are_ranked_by_platform_error_not_by_smoothness():
@@ -92,6 +104,7 @@ def test_servo_with_a_current_loop_swaps_and_isolates_better():
     _, _, plain = reduced(**QUIET)
     assert found["platform error"].estimate < 0.3 * plain["platform error"].estimate
     assert rows(result, "Linear models and")[0]["gain / dB"] < 0.05
+    assert not any("carried over" in s for s in result.summary)  # by other ways than those of a plain motor
 
 
 def test_halving_the_step_moves_the_margin_by_its_delay():

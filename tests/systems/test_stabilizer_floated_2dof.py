@@ -209,6 +209,8 @@ def test_the_step_costs_margin_in_the_first_order(steps: Session) -> None:
 
 def test_measures_of_the_whole_run(whole: Any) -> None:
     result = load().reduce(whole, {"PM": (45.0, None)})
+    assert "the gain may fall by 27.1 dB (oscillation at 2.06 Hz)" in result.summary[0]
+    assert any(s.endswith("carried over by viscous friction (100 %).") for s in result.summary)
     c = {c.name: c for c in result.coefficients}
     assert result.verdict == "pass" and c["PM"].verdict == "pass"
     for name in ("θ*", "S", "rate gain"):

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from string import Formatter
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import (
     LAST,
@@ -54,15 +52,8 @@ from gyrobench.result import Coefficient, LoopResult, Response, Specification
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 CURVE = 241  # points of a drawn curve
-DRIFTS = "The platform drifts by {drift} at rest."  # for LoopFindings.tell
 SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
-
-
-def _rounded(c: Coefficient) -> str:
-    """Return a value for a sentence."""
-    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
-    return plus_minus(c).replace(" °", "°") + zero
 
 
 class LoopFindings:
@@ -148,22 +139,6 @@ class LoopFindings:
     def estimates(self) -> dict[str, float]:
         """Return what was measured, in printed units."""
         return {c.name: c.estimate for c in self.coefficients if not c.no_value}
-
-    def tell(self, *texts: str) -> list[str]:
-        """Return the sentences of which all was measured: "It crosses over at {f_c:.4g} Hz.".
-
-        A field without a format, "{drift}", is written with its unit and rounded by its expanded uncertainty.
-        """
-        measured = self.estimates
-        rounded = {c.name: _rounded(c) for c in self.coefficients if c.name in measured}
-        out = []
-        for text in texts:
-            fields = [(name, spec) for _, name, spec, _ in Formatter().parse(text) if name is not None]
-            if measured.keys() >= {name for name, _ in fields}:
-                for name, spec in fields:
-                    text = text if spec else text.replace(f"{{{name}}}", rounded[name])
-                out.append(text.format_map(measured))
-        return out
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(

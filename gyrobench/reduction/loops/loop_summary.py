@@ -1,0 +1,167 @@
+"""The answer of a loop's report in sentences: margins, isolation and by what it is limited.
+
+    result = found.result(..., summary=[*margins(found), *isolation(found, "isolation", "platform.attitude"),
+                                        *told(found.coefficients, "A load turns it by up to {peak}.")])
+
+A sentence names coefficients in braces; they are printed with their expanded uncertainty, of the time at which the
+report is made (:func:`renew`), for what the communication step does to u is found after the reduction.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from gyrobench.reduction.estimation.fit_result import plus_minus
+from gyrobench.reduction.loops.loop_result import LoopFindings
+from gyrobench.reduction.loops.open_loop import friction_of
+from gyrobench.result import Coefficient, Response, Result
+
+FIELD = re.compile(r"\{(-?)([^{}]+)\}")
+DRIFTS = "At rest the platform drifts by {drift}."
+AGREES = 0.05  # relative: contributions that miss the whole by more do not explain it
+SAME = 1.0  # dB, between the isolation at 1 Hz and the worst one
+
+
+class Sentence(str):
+    """A sentence with numbers, and the template that they were put in; a copy is plain text."""
+
+    template: str
+
+    def __reduce__(self) -> tuple[type[str], tuple[str]]:
+        return str, (str(self),)
+
+    def __new__(cls, template: str, coefficients: Sequence[Coefficient]) -> Sentence:
+        """Put coefficients into a template: {name}, or {-name} for the value with the other sign."""
+        known = {c.name: c for c in coefficients}
+        texts = {m[0]: with_u(known[m[2]], negated=bool(m[1])) for m in FIELD.finditer(template)}
+        uncertain = [field for field, text in texts.items() if "±" in text]
+        if uncertain:  # said once, behind the last of them
+            texts[uncertain[-1]] += " (95 %)"
+        made = super().__new__(cls, FIELD.sub(lambda m: texts[m[0]], template))
+        made.template = template
+        return made
+
+
+def with_u(c: Coefficient, negated: bool = False) -> str:
+    """ "10.151 ± 0.046 Hz": estimate and expanded uncertainty; six digits of one without; whether it may be zero."""
+    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
+    text = plus_minus(replace(c, estimate=-c.estimate) if negated else c).removesuffix(" (95 %)")
+    return re.sub(r" (?=[°″′]$)| 1$", "", text) + zero
+
+
+def told(coefficients: Sequence[Coefficient], *templates: str) -> list[str]:
+    """Return the sentences of whose coefficients all have a value; none of ""."""
+    measured = {c.name for c in coefficients if not c.no_value}
+    return [Sentence(t, coefficients) for t in templates if t and measured >= {name for _, name in FIELD.findall(t)}]
+
+
+def renew(result: Result) -> None:
+    """Put the present estimates and uncertainties of a result into its sentences."""
+    result.summary = [
+        Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else s for s in result.summary
+    ]
+
+
+def margins(found: LoopFindings, *loops: str) -> list[str]:
+    """Return a sentence for each loop: crossover, phase margin, and how far the gain may change; why it has none."""
+    sentences: list[str] = []
+    for loop in loops or ("stabilizer",):
+        key, head = ("", "Crossover") if loop == "stabilizer" else (f" {loop}", f"{loop.capitalize()} loop: crossover")
+        told_of = told(found.coefficients, f"{head} {{f_c{key}}}, phase margin {{PM{key}}}{_gain(found, loop)}.")
+        reason = next((c.no_value for c in found.coefficients if c.name == f"f_c{key}" and c.no_value), "")
+        sentences += told_of or ([f"{head}: no value, {reason}."] if reason else [])
+    return sentences
+
+
+def _gain(found: LoopFindings, loop: str) -> str:
+    """Return by how much the gain may rise and fall: as measured, or where that shows no limit, by the linear model."""
+    table = next((t for t in found.tables if t["title"] == f"Stability margins, open loop, {loop}"), None)
+    rows = {row[0]: row[1:] for row in table["rows"]} if table else {}
+    by_model = rows.get("linear, with step and delays") or rows.get("linear, continuous") or [None] * 6
+    texts, modelled = [], False
+    for verb, at in (("rise", 2), ("fall", 4)):
+        value = next((r for r in (rows.get("measured", [None] * 6), by_model) if r[at] is not None), None)
+        if value is not None:
+            modelled = modelled or value is by_model
+            where = f" (oscillation at {value[at + 1]:.3g} Hz)" if value[at + 1] else ""
+            texts.append(f"{verb} by {abs(value[at]):.3g} dB{where}")
+    source = ", by the linear model" if modelled else ""
+    return f"; the gain may {' or '.join(texts)} before the loop is unstable{source}" if texts else ""
+
+
+def isolation(found: LoopFindings, name: str, output: str, axis: int = 1, plus: str | None = None) -> list[str]:
+    """Return how much smaller a motion of the base is on the platform, at 1 Hz and at worst, and what carries it over.
+
+    name: of the response "ratio".  output, plus: its channels, see LoopFindings.ratio.
+    """
+    measured = next((r for r in found.responses if r.name == name and r.kind == "ratio"), None)
+    if measured is None or not all(y > 0.0 for y in measured.y):
+        return []
+    k = min(range(len(measured.x)), key=lambda i: abs(math.log(measured.x[i])))
+    worst = max(range(len(measured.x)), key=lambda i: measured.y[i])
+    if max(measured.y) < 1e-9:
+        return []
+    text = f"Base motion at {measured.x[k]:.3g} Hz reaches the platform {_attenuated(measured, k)}"
+    if 20.0 * math.log10(measured.y[worst] / measured.y[k]) > SAME:
+        text += f", at {measured.x[worst]:.3g} Hz, the worst of the sweep, {_attenuated(measured, worst)}"
+    text += " (95 %)" if "±" in text else ""
+    by = limiting(found, output, measured.x[k], axis, plus, measured.y[k])
+    dry = friction_of(found.record.run)
+    cause = f"; it is carried over {by}" if by else f"; dry friction ({dry}) is beyond the linear model" if dry else ""
+    return [f"{text}{cause}."]
+
+
+def _attenuated(r: Response, k: int) -> str:
+    size, relative = -20.0 * math.log10(r.y[k]), (r.u[k] or 0.0) if r.u else 0.0
+    how = "smaller" if size >= 0.0 else "larger"
+    U = 1.96 * 20.0 / math.log(10.0) * relative
+    digits = max(1, 1 - math.floor(math.log10(U))) if U > 0.0 else 1
+    return f"{abs(size):.{digits}f} ± {U:.{digits}f} dB {how}" if U > 1e-4 else f"{abs(size):.1f} dB {how}"
+
+
+def limiting(
+    found: LoopFindings, output: str, f: float, axis: int = 1, plus: str | None = None, measured: float | None = None
+) -> str:
+    """Return what carries a motion of the base over: "by back EMF of the motor (91 %) and viscous friction (9 %)".
+
+    "" where the known ways do not make up the linear model's isolation, or that is not the measured one.
+    """
+    ways = base_torques(found.record.run.parameters, f)
+    torque = found.excited("discrete", "torque", axis, output, [f])
+    whole = found.excited("discrete", "motion", axis, output, [f], plus)
+    if not ways or torque is None or whole is None:
+        return ""
+    total = sum(ways.values()) * complex(torque[0])
+    if abs(total - whole[0]) > AGREES * abs(whole[0]) or (
+        measured is not None and abs(abs(whole[0]) / measured - 1.0) > AGREES
+    ):
+        return ""
+    share = {name: abs(way) / sum(map(abs, ways.values())) for name, way in ways.items()}
+    listed = [f"{n} ({100.0 * s:.0f} %)" for n, s in sorted(share.items(), key=lambda i: -i[1]) if s >= 0.005]
+    return f"by {' and '.join([', '.join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)}"
+
+
+def base_torques(p: Mapping[str, Any], f: float) -> dict[str, complex]:
+    """Torque on a platform at rest for a unit angle of the base about its axis, N.m/rad, by the ways it takes.
+
+    n ratio, s = 2j pi f:  B s,  n2 k_t k_e s/(R + L s),  n (n - 1) J_motor s2, and of a bearing that sticks with the
+    stiffness K = stiction/presliding K + s sqrt(K (J + n2 J_motor)).
+    [PLATFORM-1AXIS; a motor driven by a voltage that does not depend on its current]
+    """
+    names = ("viscous", "k_t", "k_e", "R", "L", "ratio", "J_motor", "J", "friction", "stiction", "presliding")
+    if any(f"platform.{n}" not in p or isinstance(p[f"platform.{n}"], Sequence) for n in names):
+        C = p.get("gyro.C_x")  # of a power gyro, whose outer gimbal is the platform [STAB-POWER-2DOF]
+        return {"the damping of the axis": 2j * math.pi * f * float(C)} if C else {}
+    viscous, k_t, k_e, R, L, n, J_motor, J, *dry, presliding = (float(p[f"platform.{name}"]) for name in names)
+    s, K = 2j * math.pi * f, max(dry) / presliding
+    ways = {
+        "viscous friction": viscous * s,
+        "the back EMF of the motor": n * n * k_t * k_e * s / (R + L * s),
+        "the inertia of the motor": n * (n - 1.0) * J_motor * s * s,
+        "the sticking bearing": K + s * math.sqrt(K * (J + n * n * J_motor)),
+    }
+    return {name: way for name, way in ways.items() if way}
