@@ -9,6 +9,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Windows
@@ -32,6 +33,7 @@ class EightPosition(TwoChannelTest):
     )
     options = (
         SITE
+        | PHYSICAL_FORM
         | {
             "cycles": Option(10, int, "times the eight positions are gone through", 1, 12),
             "readings": Option(10, int, "readings (averaging windows) in each position", 1, 100),

@@ -7,6 +7,7 @@ from typing import Any
 
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
@@ -28,6 +29,7 @@ class FixedPosition(RebalanceTest):
     slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     options = (
         SITE
+        | PHYSICAL_FORM
         | ATTITUDE
         | {
             "dwell": Option(3600.0, "s", "time of the readings"),

@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench import frames
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -39,6 +40,7 @@ class OpenLoopDrift(OpenLoopTest):
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     options = (
         SITE
+        | PHYSICAL_FORM
         | ATTITUDE
         | {
             "pairs": Option(29, int, "steps over and under the null, two a pair, and one more", 4, 49),

@@ -7,6 +7,7 @@ from typing import Any
 
 from gyrobench import frames
 from gyrobench.system.families.option_groups import type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM, physical_drift
 from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
 from gyrobench.system.families.servo_test import SITE_AND_STAND, TRACKING
 from gyrobench.system.families.table_test import TableTest
@@ -49,6 +50,7 @@ class ServoTwoAxis(TableTest):
     open = ("outer.face",)  # left at their start values
     options = (
         SITE_AND_STAND
+        | PHYSICAL_FORM
         | {
             "mounts": Option("2 4", str, "mounts in their order, by their numbers in Hu 1981 (1 to 12)"),
             "time": Option(86400.0, "s", "time in each mount", 1.0),
@@ -81,7 +83,8 @@ class ServoTwoAxis(TableTest):
         return setup.plan(self.mounts(), self["time"], self["window"], self["settle"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**self.plan().parameters(), **self.owned(), **setup.parameters(parts, self.mounts())}
+        physical = physical_drift(self, parts)
+        return {**self.plan().parameters(), **self.owned(), **physical, **setup.parameters(parts, self.mounts())}
 
     def check(self) -> list[str]:
         from .refusals import option_problems

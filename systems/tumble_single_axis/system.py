@@ -7,6 +7,7 @@ from typing import Any
 
 from gyrobench import drift, frames
 from gyrobench.system.families.option_groups import FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.tumble_test import TumbleTest
 from gyrobench.system.system import Option
@@ -28,6 +29,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
     slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     options = (
         SITE
+        | PHYSICAL_FORM
         | TumbleTest.tumble
         | FOLD
         | TILT

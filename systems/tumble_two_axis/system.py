@@ -8,6 +8,7 @@ from typing import Any
 
 from gyrobench import drift
 from gyrobench.system.families.option_groups import FOLD, SETTLE, SITE, TORQUER, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
 from gyrobench.system.families.table_test import Array, sampled
 from gyrobench.system.plan import Phase, Plan
@@ -44,6 +45,7 @@ class TumbleTwoAxis(RebalanceTest):
     """
     options = (
         SITE
+        | PHYSICAL_FORM
         | {
             "m": Option(5, int, "outer angle of a position in units of theta", 1, 20),
             "n": Option(1, int, "inner angle of a position in units of theta", 1, 20),

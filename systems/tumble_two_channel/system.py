@@ -7,6 +7,7 @@ from typing import Any
 
 from gyrobench import drift
 from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.families.tumble_test import TumbleTest
 from gyrobench.system.part_values import PartValues
@@ -36,6 +37,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
     options = (
         {"model": Option("nine", str, "nine: nine terms a channel, two mounts, two dwells; simple: four, two mounts")}
         | SITE
+        | PHYSICAL_FORM
         | TumbleTest.tumble
         | {
             "fold": Option(False, bool, "accept that Dx_yy and Dy_xx are folded into the other squares, the constant"),

@@ -23,6 +23,7 @@ from gyrobench.attitudes import SERVO_ATTITUDES
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.servo_expectation import Expected, capture_problems
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled
 from gyrobench.system.lab_record import read_record
@@ -95,6 +96,7 @@ class ServoTest(TableTest):
     """
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
+        | PHYSICAL_FORM
         | {"settle": Option(10.0, "s", "wait after the loop has closed", 0.5)}
         | TRACKING
         | type_b(

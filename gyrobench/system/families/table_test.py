@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from gyrobench import frames
 from gyrobench.system.connectors import Socket
 from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.physical_form import physical_drift
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, System, Windows
@@ -77,7 +78,12 @@ class TableTest(System):
         return {**planned} | {name: np.reshape(face, (3, 3)) for name, face in given}
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**self.plan().parameters(), **self.owned(), "table.base": self.base()}
+        return {
+            **self.plan().parameters(),
+            **self.owned(),
+            **physical_drift(self, parts),
+            "table.base": self.base(),
+        }
 
     def check(self) -> list[str]:
         return frames.gravity_problems(self["gravity"]) if self["gravity"] else []
