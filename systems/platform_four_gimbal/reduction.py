@@ -144,10 +144,11 @@ def _loads(found: LoopFindings) -> None:
         axis, output = AXES[gate.axis - 1], f"platform.attitude[{gate.axis}]"
         own = drift(holds[0].t, holds[0][output]).rate if holds else 0.0
         step = found.step(
-            gate, output, scale=ARCSEC, unit="″", y_name=f"platform about {'xyz'[gate.axis - 1]}", drift=own
-        )
+            gate, output, scale=ARCSEC, unit="″", y_name=f"platform about {'xyz'[gate.axis - 1]}", drift=own,
+            quiet=next(iter(holds), None),
+        )  # fmt: skip
         if step.change:
             stiffness, u = gate.amplitude / step.change, abs(gate.amplitude / step.change**2) * step.u_change
             meaning = "stiffness, torque over angle that it leaves"
             closed = drag * feedback if drag and feedback else None
-            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed)
+            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed, unsettled=step.unsettled)

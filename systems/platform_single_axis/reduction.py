@@ -122,9 +122,12 @@ def _steps(found: LoopFindings) -> None:
     for gate in found.of("command", shape="step"):
         step = found.step(gate, RATE, scale=MRAD, unit="mrad/s", y_name="rate", quiet=quiet)
         share, u = step.change / gate.amplitude, step.u_change / abs(gate.amplitude)
-        found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0)
-        found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u)
-        found.measure("settling", "time until the rate stays within 5 %", "s", step.settled_5, step.u_settled)
+        found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0,
+                      unsettled=step.unsettled)  # fmt: skip
+        found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u,
+                      unsettled=step.unsettled)  # fmt: skip
+        found.measure("settling", "time until the rate stays within 5 %", "s", step.settled_5, step.u_settled,
+                      unsettled=step.unsettled, no_value=step.restless)  # fmt: skip
 
 
 def _drift(found: LoopFindings) -> None:

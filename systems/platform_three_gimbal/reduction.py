@@ -65,13 +65,15 @@ def _loads(found: LoopFindings) -> None:
         axis = AXES[gate.axis - 1]
         output = f"platform.theta[{gate.axis}]"
         own = next((drift(g.t, g[output]).rate for g in _rest(found)), 0.0)
-        step = found.step(gate, output, scale=ARCSEC, unit="″", y_name=f"{axis} gimbal", drift=own)
+        quiet = next(iter(_rest(found)), None)
+        step = found.step(gate, output, scale=ARCSEC, unit="″", y_name=f"{axis} gimbal", drift=own, quiet=quiet)
         closed = drag * feedback if drag and feedback and not p.get("pitch.integral") else None
         if step.change and closed:
             stiffness, u = gate.amplitude / step.change, abs(gate.amplitude / step.change**2) * step.u_change
             meaning = "stiffness, torque over angle that it leaves"
-            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed)
-        found.measure(f"t_5 {axis}", "settling to 5 % after the load step", "s", step.settled_5, step.u_settled)
+            found.measure(f"S {axis}", meaning, "N·m/rad", stiffness, u, closed=closed, unsettled=step.unsettled)
+        found.measure(f"t_5 {axis}", "settling to 5 % after the load step", "s", step.settled_5, step.u_settled,
+                      unsettled=step.unsettled)  # fmt: skip
 
 
 def _coupling(found: LoopFindings) -> None:

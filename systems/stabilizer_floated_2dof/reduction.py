@@ -125,25 +125,28 @@ def _load(found: LoopFindings, gate: Gate, loop: Loop | None, own: Drift | None,
     M = gate.amplitude
     closed = None if loop is None else M / loop.K / ARCSEC
     found.measure("θ*", "platform angle under the load, at rest", "″", a.change / ARCSEC, a.u_change / ARCSEC,
-                  closed=closed)  # fmt: skip
+                  closed=closed, unsettled=a.unsettled)  # fmt: skip
     if a.change:
         found.measure("S", "stiffness at rest, M / θ*", "N·m/rad", M / a.change, abs(M / a.change**2) * a.u_change,
-                      closed=None if loop is None else loop.K)  # fmt: skip
+                      closed=None if loop is None else loop.K, unsettled=a.unsettled)  # fmt: skip
     y = gate[ANGLE] - a.initial
     noise = float(np.std(np.diff(y[-y.size // 10 :]))) / math.sqrt(2.0)
     peak = float(y[np.argmax(np.abs(y))])
     found.measure("θ_max", "largest platform angle after the load step", "″", peak / ARCSEC, noise / ARCSEC)
-    found.measure("t_5", "settling to 5 % of θ*", "s", a.settled_5, a.u_settled)
-    found.measure("t_2", "settling to 2 % of θ*", "s", a.settled_2, a.u_settled)
+    found.measure("t_5", "settling to 5 % of θ*", "s", a.settled_5, a.u_settled, unsettled=a.unsettled)
+    found.measure("t_2", "settling to 2 % of θ*", "s", a.settled_2, a.u_settled, unsettled=a.unsettled)
 
 
 def _command(found: LoopFindings, gate: Gate) -> None:
     step = found.step(gate, RATE, scale=MRAD, unit="mrad/s", y_name="platform rate")
     size = abs(gate.amplitude)
     share, u = step.change / gate.amplitude, step.u_change / size
-    found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0)
-    found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u)
-    found.measure("t_5 rate", "settling of the rate to 5 %", "s", step.settled_5, step.u_settled)
+    found.measure("rate gain", "rate reached over rate commanded", "1", share, u, closed=1.0,
+                  unsettled=step.unsettled)  # fmt: skip
+    found.measure("overshoot", "of the rate after the command", "%", 100.0 * step.overshoot, 100.0 * u,
+                  unsettled=step.unsettled)  # fmt: skip
+    found.measure("t_5 rate", "settling of the rate to 5 %", "s", step.settled_5, step.u_settled,
+                  unsettled=step.unsettled)  # fmt: skip
 
 
 def _margins(found: LoopFindings, points: list[Point], loop: Loop | None) -> None:

@@ -125,7 +125,12 @@ def _load(
     a = found.step(gate, "gyro.alpha", scale=ARCSEC, unit="″", y_name="platform α", plus=BASE, drift=rate, quiet=quiet)
     a = replace(a, u_change=math.hypot(a.u_change, u_rate * float(gate.t[-1] - gate.t[0])))
     found.measure(
-        "K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change), closed=K_m
+        "K_m",
+        "stiffness of the correction, M / β*",
+        "N·m/rad",
+        *_inverse(M, b.change, b.u_change),
+        closed=K_m,
+        unsettled=b.unsettled,
     )
     t_star = transient(H, K_m)
     near = np.interp([t_star, t_star + b.u_settled], gate.t - gate.t[0], gate["gyro.beta"] - b.initial)
@@ -138,10 +143,13 @@ def _load(
         "t_5 β", "settling of the lean to 5 %", "s", b.settled_5, b.u_settled, closed=H / K_m * math.log(20.0)
     )
     closed = steady(M, H, K_m, C_y)
-    found.measure("α*", "steady platform angle", "″", a.change / ARCSEC, a.u_change / ARCSEC, closed=closed / ARCSEC)
+    found.measure("α*", "steady platform angle", "″", a.change / ARCSEC, a.u_change / ARCSEC,
+                  closed=closed / ARCSEC, unsettled=a.unsettled)  # fmt: skip
     if closed:
         stiffness = _inverse(M, a.change, a.u_change)
-        found.measure("S", "stiffness of the platform, M / α*", "N·m/rad", *stiffness, closed=M / closed)
+        found.measure(
+            "S", "stiffness of the platform, M / α*", "N·m/rad", *stiffness, closed=M / closed, unsettled=a.unsettled
+        )
     found.measure("overshoot α", "of the platform angle", "%", 100.0 * a.overshoot, 100.0 * a.u_change / abs(a.change))
     found.measure("t_5 α", "settling of the platform to 5 %", "s", a.settled_5, a.u_settled)
     found.measure("t_2 α", "settling of the platform to 2 %", "s", a.settled_2, a.u_settled)

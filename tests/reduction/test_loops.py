@@ -197,3 +197,25 @@ def test_step_response_of_a_linear_model() -> None:
         x = A @ x + B[:, 1] * 2.5
     computed = loop_result._simulated(model, gate, "v")  # type: ignore[arg-type]
     np.testing.assert_allclose(computed, expected, rtol=0.0, atol=1e-12 * np.max(np.abs(expected)))
+
+
+# ------------------------------------------------------------------------------------------- settling
+@pytest.mark.parametrize(("lag", "settles"), [(0.2, True), (0.5, True), (2.0, False)])
+def test_a_step_that_still_moves_has_no_final_value(lag: float, settles: bool) -> None:
+    """1 - exp(-t/T) over 2 s; in the last 0.2 s it moves by exp(-1.8/T) - exp(-2/T): 0.008 %, 0.9 % and 3.9 %."""
+    t = times(2.0)
+    s = step(t, 1.0 - np.exp(-t / lag), np.zeros(0))
+    moves = math.exp(-1.8 / lag) - math.exp(-2.0 / lag)
+    assert s.moves == pytest.approx(moves, rel=0.1)
+    assert bool(s.unsettled) == (moves > 0.02 * s.change)
+    if settles:
+        assert abs(s.change - 1.0) < 1.96 * s.u_change < 1.5 * abs(s.change - 1.0)  # what is to come is in u
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_at_rest_does_not_move(seed: int) -> None:
+    """White noise of a tenth of the step, 40 records a seed: at most one in 200 is taken for a signal that moves."""
+    rng, t = np.random.default_rng(seed), times(2.0)
+    found = [step(t, 1.0 + 0.1 * rng.normal(size=t.size), 0.1 * rng.normal(size=1000)) for _ in range(40)]
+    assert sum(s.moves > 0.0 for s in found) <= 1
+    assert all(not s.unsettled or s.moves > 0.0 for s in found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import logging
 import math
 from itertools import pairwise
@@ -298,3 +299,18 @@ def test_a_poor_network_is_told_and_fails_acceptance(steps: Session, caplog: pyt
     assert pm.estimate == pytest.approx(weak.margin()[1], abs=1.0)
     assert pm.verdict == "fail" and result.verdict == "fail"
     assert any("more than 45° is wanted" in w for w in result.warnings)
+
+
+def test_a_load_step_too_short_for_a_slow_loop_is_void(command: Any, tmp_path: Any) -> None:
+    """tau1 = 2 s, T1 = 20 s put a closed-loop pole at about -1/tau1: after 3 s it has exp(-1.5) = 22 % to go, and moves
+    by 3.5 % in the last tenth.  Stiffness and angle at rest have no value; the rate gain, with a fast pole, has one.
+    """
+    slow = ("--set", "tau1=2s", "--set", "T1=20s", "--set", "hold=1s")
+    code, out, _ = command("run", NAME, *slow, "--strict", "--out", tmp_path / "a")
+    assert code == 1 and "verdict: void" in out
+    (said,) = (line for line in out.splitlines() if "not settled" in line)
+    assert said.startswith("no value of θ*, S") and "of the change, more than its u" in said
+    result = json.loads((tmp_path / "a" / "result.json").read_text())
+    found = {c["name"]: c for c in result["coefficients"]}
+    assert found["S"]["estimate"] is None and found["S"]["verdict"] == "void"
+    assert found["f_c"]["estimate"] > 10.0

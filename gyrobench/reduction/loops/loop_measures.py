@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -25,6 +25,9 @@ from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
 SEGMENTS = 8  # of a sine, for scatter and coherence
+UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
+AHEAD = 4.0  # at most, of what is moved in the last tenth, is still to come
+MOVING = 10.0  # u of the change: the slope of noise moves by more in one of 300 records (3 sqrt(12) u of a mean)
 LAST = 0.1  # share of a step's record that is its end
 
 
@@ -174,7 +177,7 @@ class Step:
 
     overshoot: share of the change beyond it.  settled_5, settled_2: time after which the signal stays within 5 or
     2 % of the change about the final value; None when it did not settle before the last tenth of the record.
-    slope: of that last tenth, unit/s: a signal that still moves has no final value.
+    slope: of that last tenth, unit/s.  moves: by how much the signal moves in it beyond its noise, part of u_change.
     """
 
     initial: float
@@ -185,6 +188,30 @@ class Step:
     settled_2: float | None
     u_settled: float
     slope: float
+    moves: float = 0.0
+    last: float = 0.0  # s, length of the last tenth
+    ahead: float = 0.5  # of the last tenth's way: what its mean is short of the final value
+
+    @property
+    def unsettled(self) -> str:
+        """Return why there is no final value, "" where there is one: it moves by less than 2 % of the change."""
+        if self.moves <= UNSETTLED * abs(self.change):
+            return ""
+        share = f"{100.0 * self.moves / abs(self.change):.2g} % of the change" if self.change else "without a change"
+        return f"not settled: in the last tenth of the step the signal still moves by {share}, more than its u"
+
+    @property
+    def restless(self) -> str:
+        """Return why there is no settling time to 5 %, "" where there is one."""
+        if self.unsettled or self.settled_5 is not None:
+            return self.unsettled
+        return "the signal does not stay within 5 % of the change before the last tenth of the step"
+
+    def with_noise(self, u: float) -> Step:
+        """Return the same with this uncertainty of the change from noise; what moves beyond it is added."""
+        width = abs(self.slope) * self.last
+        moves = width if width > MOVING * u else 0.0
+        return replace(self, u_change=math.hypot(u, self.ahead * moves / math.sqrt(3.0)), moves=moves)
 
     @property
     def change(self) -> float:
@@ -194,8 +221,8 @@ class Step:
 def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
     """Measures of a step response.  rest: the signal before it (empty: 0).  start: time of the step, default t[0].
 
-    The uncertainty of the change is that of two means of white noise; that of the settling times is the sampling
-    interval's, dt / sqrt(12).
+    The uncertainty of the change is that of two means of white noise, and what the signal still moves; that of the
+    settling times is the sampling interval's, dt / sqrt(12).
     """
     t0 = float(t[0]) if start is None else start
     last = max(2, int(LAST * t.size))
@@ -227,7 +254,22 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
         settled(0.02) if change else None,
         float(t[1] - t[0]) / math.sqrt(12.0),
         float(slope),
-    )
+        last=float(t[-1] - t[-last]),
+        ahead=_ahead(float(slope), y[-2 * last : -last], t[-2 * last : -last]),
+    ).with_noise(u)
+
+
+def _ahead(slope: float, before: Array, t: Array) -> float:
+    """Return what the mean of the last tenth is short of the end of an exponential, over its way in that tenth.
+
+    The ways of two tenths are as r = exp(last / T), so 1/(r - 1) of the last one is to come, and half of it is in the
+    mean.  At most 4: a slower exponential that began with the step moves by more than 2 % of the change.
+    """
+    if before.size < 2 or slope == 0.0:
+        return AHEAD
+    earlier = float(np.polyfit(t - t[-1], before, 1)[0])
+    ratio = earlier / slope
+    return min(AHEAD, 0.5 + 1.0 / (ratio - 1.0)) if ratio > 1.0 else AHEAD
 
 
 def step_noise_std(y: Array, before: int, gap: int, after: int) -> float | None:

@@ -94,12 +94,14 @@ class LoopFindings:
         truth: float | None = None,
         limits: Specification | None = None,
         no_value: str = "",
+        unsettled: str = "",
     ) -> None:
         """One row of the table of coefficients, in printed units; nothing for an estimate of None without a reason.
 
         u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.  no_value: why there is
-        no estimate; without a limit such a row says no more than that.
+        no estimate; without a limit such a row says no more than that.  unsettled: the same, with the verdict void.
         """
+        no_value = unsettled or no_value
         if no_value:
             estimate = u = math.nan
         elif estimate is None or not math.isfinite(estimate):
@@ -121,7 +123,7 @@ class LoopFindings:
                 truth=truth,
                 z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
                 limit=limit,
-                verdict=uncertainty.assess_conformity(estimate, half, limit),
+                verdict="void" if unsettled else uncertainty.assess_conformity(estimate, half, limit),
                 no_value=no_value,
             )
         )
@@ -317,7 +319,7 @@ class LoopFindings:
         if quiet is not None:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
             u = step_noise_std(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
-            measures = measures if u is None else replace(measures, u_change=u)
+            measures = measures if u is None else measures.with_noise(u)
         t = gate.t - gate.t[0]
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
         curves = []
