@@ -6,6 +6,8 @@ A reason voids every measure of the run.  The linear model is that of the co-sim
 the delays.  The record is asked in the drift holds, where nothing is excited, for what no linear model holds: growth
 (parts without a linear model too), a limit cycle, a limit that is active at rest.
 
+A run that has left an unstable start and come to rest elsewhere (a gimbal that turned over) keeps its figures.
+
 Not modelled: an instability that only an excitation starts and that has died away again before a hold.
 """
 
@@ -36,7 +38,7 @@ UNDAMPED = 0.01  # damping ratio of a pole below which an oscillation at rest is
 def why_void(linear: LinearModels, gates: Sequence[Gate]) -> str:
     """Return why the measures of a run have no value, "" where they have one."""
     growing = _growing(linear)
-    if growing is not None:
+    if growing is not None and not _at_rest_elsewhere(gates, growing.real):
         return f"unstable, {describe(growing)}"
     for gate in (g for g in gates if g.kind == "hold" and g.label == "drift"):
         reason = _at_rest(gate, linear)
@@ -63,6 +65,21 @@ def _growing(linear: LinearModels) -> complex | None:
         if growing:
             return growing[0]
     return None
+
+
+def _at_rest_elsewhere(gates: Sequence[Gate], rate: float) -> bool:
+    """Return whether the run has left the unstable point at which it began and come to rest: a gimbal that turned over.
+
+    It had time to grow by e^20; at its end nothing is at a limit and each loop error is within 1 % of its largest value.
+    """
+    if not gates or rate * float(gates[-1].t[-1] - gates[0].t[0]) < 20.0:
+        return False
+    last = gates[-1]
+    end = {n: np.abs(last[n][-max(2, last.t.size // 5) :]) for n in last.channels}
+    limited = any(np.any(y > 0.5) for n, y in end.items() if n.endswith(".saturated"))
+    errors = [n for n in end if n.endswith(".e")]
+    small = all(float(end[n].max()) <= 0.01 * float(np.max(np.abs(last.channels[n]))) for n in errors)
+    return bool(errors) and small and not limited
 
 
 def _at_rest(gate: Gate, linear: LinearModels) -> str:
