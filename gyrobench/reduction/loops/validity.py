@@ -70,7 +70,7 @@ def _growing(linear: LinearModels) -> complex | None:
 def _at_rest_elsewhere(gates: Sequence[Gate], rate: float) -> bool:
     """Return whether the run has left the unstable point at which it began and come to rest: a gimbal that turned over.
 
-    It had time to grow by e^20; at its end nothing is at a limit and each loop error is within 1 % of its largest value.
+    It had time to grow by e^20; at its end nothing is at a limit and each loop error below 1 % of its largest one.
     """
     if not gates or rate * float(gates[-1].t[-1] - gates[0].t[0]) < 20.0:
         return False
