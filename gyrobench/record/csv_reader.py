@@ -61,7 +61,6 @@ WINDOW_COLUMNS = (
     Column("std", "A", "standard deviation of the samples", required=False),
     Column("n", "1", "number of samples", required=False, whole=True),
     Column("flagged", "1", "suspect samples", required=False, whole=True),
-    Column("temperature", "K", "mean temperature", required=False),
 )
 
 
@@ -164,7 +163,7 @@ def read_measured(
     rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
     if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
         rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
-    expected = {c.name: c for c in (*columns, *_temperatures(header))}
+    expected = {c.name: c for c in (*columns, *temperatures(header))}
     places, problems = header_places(header, expected)
     if short := [(n, len(r)) for n, r in rows if len(r) != len(header)]:
         problems.append(f"{_rows([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
@@ -184,7 +183,7 @@ def read_measured(
     return columns_si, meta
 
 
-def _temperatures(header: list[str]) -> list[Column]:
+def temperatures(header: list[str]) -> list[Column]:
     """Columns that any record may have: temperature [degC], temperature 2 [degC] ..., for the nuisance model."""
     names = [t.split("[")[0].strip() for t in header]
     return [Column(n, "K", "temperature", required=False) for n in names if n.startswith("temperature")]

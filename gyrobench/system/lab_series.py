@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench import units
-from gyrobench.record.csv_reader import Column, DataError, Head
+from gyrobench.record.csv_reader import Column, DataError, Head, temperatures
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
 from gyrobench.system import table_motion
 from gyrobench.system.plan import Phase
@@ -78,6 +78,7 @@ def windows_of_series(
 
     attitudes: what a phase may be called.  Raises DataError.
     """
+    columns = (*columns, *temperatures(head.names))
     names = _Names.of(columns)
     there = {n.split("[")[0].strip() for n in head.names}
     keys = [k for k in names.keys if k in there]
@@ -118,7 +119,10 @@ def _as_windows(
     made: dict[str, Array] = {k: series[k].astype(np.int64) for k in keys}
     for column, name in {**names.signals, **names.optional}.items():
         if name in series:
-            made[column] = series[name]
+            there = np.isfinite(series[name])
+            if not there.any():
+                continue
+            made[column] = np.interp(series["t_end"], series["t_end"][there], series[name][there])  # logged less often
         if f"std {name}" in series:
             made[column.replace("mean", "std")] = series[f"std {name}"]
     for n in ("n", *(c.name for c in columns if c.name.startswith("flagged"))):

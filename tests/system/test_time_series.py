@@ -142,6 +142,16 @@ def test_gaps_are_counted_and_their_windows_dropped(
     assert "time series: 3 (2 rows without a value left out); 5 of 10 windows hold a gap and were dropped" in said
 
 
+def test_thermometers_are_averaged_and_may_be_read_less_often(tmp_path: Path) -> None:
+    """20 °C + 0.1 K/s, read at 1, 5, 9 .. s: windows of 2 s without one stand between their neighbours."""
+    rows = [[t, i, f"{20.0 + 0.1 * float(t):.2f}" if k % 16 == 4 else ""] for k, (t, i) in enumerate(ramp())]
+    read = fixed(tmp_path, [",".join(r) for r in rows], "time [s],current [mA],temperature case [degC]")
+    assert read.run.notes == [] and len(read.windows["mean"]) == 10
+    kelvin = read.windows["temperature case"] - 273.15
+    np.testing.assert_allclose(kelvin[0:10:2], 20.0 + 0.1 * np.arange(1.0, 20.0, 4.0), rtol=1e-12)
+    np.testing.assert_allclose(kelvin[1:9:2], 20.0 + 0.1 * np.arange(3.0, 18.0, 4.0), rtol=1e-12)
+
+
 def test_what_is_wrong_is_said_once_with_its_count(tmp_path: Path) -> None:
     rows = ramp()
     wrong = [[t, "bad" if k > 20 else i] for k, (t, i) in enumerate(rows)]
