@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -321,6 +321,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     )
 
 
+@handling_errors.examined(handling_candidates.head)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

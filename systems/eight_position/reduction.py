@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import repeatability, residual_series
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, fit
@@ -252,6 +252,7 @@ def days_of(record: Record) -> dict[str, dict[str, Array]]:
     return out
 
 
+@handling_errors.examined(handling_candidates.positions)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
     setup = setup_of(record.run, specification)

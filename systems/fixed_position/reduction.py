@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import repeatability
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
@@ -177,6 +177,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     )
 
 
+@handling_errors.examined(handling_candidates.at_rest)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
     setup = setup_of(record.run, specification)

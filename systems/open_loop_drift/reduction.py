@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of
@@ -238,6 +238,7 @@ def _float_gain(run: RunDocument) -> float:
     return float(parameters["gyro.H"]) / float(parameters["gyro.C"])
 
 
+@handling_errors.examined(handling_candidates.followed)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record with its run.json as provenance."""
     run = record.run

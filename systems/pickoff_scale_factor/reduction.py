@@ -27,7 +27,7 @@ from gyrobench import drift as drift_model
 from gyrobench import units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
@@ -243,6 +243,7 @@ def _random_drift_lasts(run: RunDocument) -> bool:
     return slow > NEGLIGIBLE * noise.get("white", 0.0) / math.sqrt(time)
 
 
+@handling_errors.examined(handling_candidates.readings)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, units
 from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -37,6 +37,7 @@ DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
+@handling_errors.examined(handling_candidates.servo)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run, windows = record.run, record.windows

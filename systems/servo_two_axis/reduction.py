@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -40,6 +40,7 @@ DPH = units.factor("deg/h")
 REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
 
 
+@handling_errors.examined(handling_candidates.two_axes)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients of both channels of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run = record.run

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
@@ -35,6 +35,7 @@ DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
 
 
+@handling_errors.examined(handling_candidates.servo)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
     run, windows = record.run, record.windows

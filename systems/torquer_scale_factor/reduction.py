@@ -27,7 +27,7 @@ from scipy import special
 
 from gyrobench import units
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
@@ -285,6 +285,7 @@ def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float]
     return truth | ({"K_LS": k / KU} if k3 == 0.0 else {})
 
 
+@handling_errors.examined(handling_candidates.table_of_rates)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
     options, measured = record.run.options, record.run.measured

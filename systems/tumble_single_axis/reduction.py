@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
@@ -223,6 +223,7 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
     ]
 
 
+@handling_errors.examined(handling_candidates.tumble, plain={"tilt": False}, advice="The record shows a tilt")
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

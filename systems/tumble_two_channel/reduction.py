@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Quantity, fit
@@ -227,6 +227,7 @@ def _conventions(s: TwoChannelSetup) -> list[str]:
     ]
 
 
+@handling_errors.examined(handling_candidates.tumble, plain={"tilt": False})
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     result = reduce(record.windows, setup_of(record.run, specification))

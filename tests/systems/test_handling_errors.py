@@ -1,0 +1,135 @@
+"""Handling errors in measured records: named with both scatters, never passed; a clean record is not accused.
+
+The counts over all templates: tests/benchmarks/handling.py.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_tumble_measured import laboratory
+from tumbling import NAME, SHORT
+
+from gyrobench.bench import standard_folder
+from gyrobench.engine.session import Session
+
+Command = Callable[..., tuple[int, str, str]]
+LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'
+DIAGNOSIS = "Diagnosis of handling errors"
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    """A tumble of the default gyro, as a laboratory writes it; D_O = 0.1, D_S = -0.7 deg/h/g."""
+    with Session(NAME) as session:
+        record = session.run(SHORT, seed=7)
+    return laboratory(record).replace("latitude = -33.9deg", "latitude = 45.75deg") + "# type_b = none\n"
+
+
+def strict(
+    command: Command, folder: Path, system: str, text: str, judged: tuple[str, str], *more: str
+) -> tuple[int, dict[str, Any]]:
+    """Exit code and result of ``reduce --strict`` with limits that the coefficient ``judged`` (name, unit) keeps."""
+    (folder / "lab.csv").write_text(text, encoding="utf-8")
+    (folder / "limits.toml").write_text(LIMITS.format(*judged), encoding="utf-8")
+    given = ("--data", folder / "lab.csv", "--spec", folder / "limits.toml", "--out", folder / "out", "--force")
+    code, _, err = command("reduce", system, *given, "--strict", *more)
+    assert code in (0, 1), err
+    return code, json.loads((folder / "out" / "result.json").read_text("utf-8"))
+
+
+def exchanged(text: str, a: str, b: str) -> str:
+    return text.replace(f"= {a}\n", "= @\n").replace(f"= {b}\n", f"= {a}\n").replace("= @\n", f"= {b}\n")
+
+
+def scatters(warning: str) -> tuple[float, float]:
+    found = re.search(r"residual scatter (\S+) °/h as labelled, (\S+) °/h with", warning)
+    assert found, warning
+    return float(found[1]), float(found[2])
+
+
+def test_a_clean_record_passes(command: Command, text: str, tmp_path: Path) -> None:
+    code, found = strict(command, tmp_path, NAME, text, ("D_S", "deg/h/g"))
+    assert code == 0 and found["verdict"] == "pass" and not found["withheld"]
+    assert not any("Handling" in w or "tilt" in w for w in found["warnings"])
+    assert all(t["title"] != DIAGNOSIS for t in found["tables"])
+
+
+@pytest.mark.parametrize("more", [(), ("--set", "tilt=true")])
+def test_exchanged_mounts(command: Command, text: str, tmp_path: Path, more: tuple[str, ...]) -> None:
+    """D_O Y is of the wrong sign against the dwells: a step of 4 x 0.1 x sin(45.75 deg) = 0.29 deg/h between mounts,
+    which a tilt of the input axis would make, too; so it is found when that is estimated, and not advised.
+    """
+    clean = strict(command, tmp_path, NAME, text, ("D_S", "deg/h/g"))[1]
+    code, found = strict(command, tmp_path, NAME, exchanged(text, "mount 1", "mount 2"), ("D_S", "deg/h/g"), *more)
+    assert code == 1 and found["verdict"] == "inconclusive"
+    first = found["warnings"][0]
+    assert first.startswith("Handling error") and "mount 1 and mount 2 exchanged" in first
+    labelled, undone = scatters(first)
+    # the step between the two halves of the record; undone, the scatter of the record without the mistake
+    assert 0.09 < labelled < 0.2 and undone == pytest.approx(clean["residual_std"], rel=1e-2)
+    assert not any("tilt of the input axis" in w for w in found["warnings"])
+    table = next(t for t in found["tables"] if t["title"] == DIAGNOSIS)
+    assert table["rows"][0][0] == "as labelled" and len(table["rows"]) > 2
+    assert "A handling error explains the residuals" in found["withheld"][-1]
+
+
+def test_an_unknown_mistake_is_inconclusive(command: Command, text: str, tmp_path: Path) -> None:
+    """The currents of mount 2 four times as large: no mistake that is tried, and no verdict."""
+    *head, header, rest = text.partition("remark,")
+    lines = (header + rest).splitlines()
+    names = [n.split(" ")[0] for n in lines[0].split(",")]
+    phase = re.search(r"# phase (\d) = mount 2", text)
+    assert phase
+    out = [lines[0]]
+    for line in lines[1:]:
+        cells = line.split(",")
+        if not line.startswith("#") and cells[names.index("phase")] == phase[1]:
+            cells[names.index("mean")] = repr(4.0 * float(cells[names.index("mean")]))
+        out.append(",".join(cells))
+    code, found = strict(command, tmp_path, NAME, head[0] + "\n".join(out) + "\n", ("D_S", "deg/h/g"))
+    assert code == 1 and found["verdict"] == "inconclusive"
+    assert any("contradict" in w for w in found["warnings"])
+    assert not any(w.startswith("Handling error") for w in found["warnings"])
+
+
+def test_a_refused_record_says_what_would_make_it_one(command: Command, text: str, tmp_path: Path) -> None:
+    (tmp_path / "lab.csv").write_text(text.replace("angle_start [deg]", "angle_start [rad]").replace(
+        "angle_end [deg]", "angle_end [rad]"), encoding="utf-8")  # fmt: skip
+    code, _, err = command("reduce", NAME, "--data", tmp_path / "lab.csv", "--out", tmp_path / "out")
+    assert code in (2, 3) and "the angles in degrees, not in rad: was that mistaken?" in " ".join(err.split())
+
+
+def test_exchanged_currents_of_a_torquer(command: Command, tmp_path: Path) -> None:
+    """Eight rows, no test of residuals: currents of neighbouring rows exchanged make K_n of twice and half the size."""
+    table = (standard_folder() / "systems" / "torquer_scale_factor" / "book_table.csv").read_text("utf-8")
+    table += "# type_b = none\n"
+    code, found = strict(command, tmp_path, "torquer_scale_factor", table, ("K", "°/h/mA"))
+    assert code == 0 and not any(w.startswith("Handling error") for w in found["warnings"])
+    rows = [k for k, line in enumerate(table.splitlines()) if line[:1].isdigit()]
+    lines = table.splitlines()
+    a, b = lines[rows[3]].split(","), lines[rows[4]].split(",")
+    a[0], b[0] = b[0], a[0]
+    lines[rows[3]], lines[rows[4]] = ",".join(a), ",".join(b)
+    code, found = strict(command, tmp_path, "torquer_scale_factor", "\n".join(lines) + "\n", ("K", "°/h/mA"))
+    assert code == 1 and "the currents of rows 4 and 5 exchanged" in found["warnings"][0]
+
+
+def test_a_reversed_current_in_a_dwell(command: Command, tmp_path: Path) -> None:
+    """Thirty readings in one attitude, the leads exchanged from the 20th on: without a model of the test."""
+    noise = np.random.default_rng(2).normal(size=30) * 1e-4
+    mean = np.where(np.arange(30) < 19, 1.0, -1.0) * (0.6 + noise)
+    rows = [f"{120 * k},{120 * k + 120},{v!r}" for k, v in enumerate(mean.tolist())]
+    head = (
+        "# latitude = 45.75deg\n# k = 17.2deg/h/mA\n# attitude = N E\n# type_b = none\nt_start [s],t_end [s],mean [mA]"
+    )
+    code, found = strict(command, tmp_path, "fixed_position", "\n".join([head, *rows, ""]), ("ω_d", "deg/h"))
+    assert code == 1 and "of the opposite sign in rows 20 to 30" in found["warnings"][0]
+    # k times the scatter of the noise, 17.2 x 1e-4 deg/h = 0.0017
+    assert scatters(found["warnings"][0])[1] == pytest.approx(17.2 * float(np.std(noise, ddof=1)), rel=1e-2)
