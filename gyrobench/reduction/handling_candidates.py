@@ -256,7 +256,7 @@ def two_axes(record: Record) -> Iterator[Candidate]:
     for columns, words in ((OUTER, "the outer"), (INNER, "the inner"), (BOTH, "the outer and inner")):
         yield from reversed_columns(record, columns, f"{words} rotation", False)
     yield from wrong_hemisphere(record)
-    if record.run.plan and all(row.mode == "servo" for row in record.run.plan):
+    if any(row.mode == "servo" for row in record.run.plan):
         yield from scaled(record, BOTH, ANGLE)
         yield from scaled(record, TIMES, TIME, -1.0)
         return

@@ -102,7 +102,7 @@ def examined(
             reference, bare = result, record
             if plain and any(record.run.options.get(n, v) != v for n, v in plain.items()):
                 bare = with_options(record, plain)
-                reference = reduce(bare)
+                reference = _undone(reduce, bare) or result
             if _suspicious(reference, record.run.measured):
                 _diagnose(result, reference, reduce, list(candidates(bare)), plain or {}, advice)
             return result
@@ -132,12 +132,12 @@ def _correlated(result: DriftTestResult) -> bool:
     return any(t.name.startswith("Ljung-Box") and t.p is not None and t.p < 1e-3 for t in result.tests)
 
 
-def _undone(reduce: Reduce, candidate: Candidate) -> DriftTestResult | None:
-    """Return the result without a mistake; None where that makes nonsense of the record."""
+def _undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
+    """Return the result of a record with a mistake undone; None where that makes nonsense of it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         try:
-            return reduce(candidate.record)
+            return reduce(record)
         except IMPOSSIBLE:
             return None
 
@@ -160,7 +160,7 @@ def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
     """
     words = []
     for c in candidates:
-        found = _undone(reduce, c)
+        found = _undone(reduce, c.record)
         if found is not None and not _contradicted(found) and found.dof >= FEW:
             words.append(c.words)
     return " or ".join(words) if len(words) <= 3 else ""
@@ -173,7 +173,7 @@ def _diagnose(
     """Add to ``result`` what undoing each mistake does to the residuals, and name those that explain them."""
     tried = []
     for c in candidates:
-        found = _undone(reduce, c)
+        found = _undone(reduce, c.record)
         if found is None:
             continue
         scatter = found.residual_std / c.scale
