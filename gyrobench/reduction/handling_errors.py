@@ -5,7 +5,8 @@
 
 A record is examined where its residuals are not ordinary: a test of the fit contradicts model or noise, or, measured,
 they are correlated (a mistake may hide in what is taken for slow noise) or too few to say.  It is then reduced again
-with each mistake undone.  A mistake is named when
+with each mistake undone, and without the unknowns that are there for small errors of the set-up: a misalignment of
+minutes of arc can take a mistake in.  A mistake is named when
 
 1. the residual scatter with it undone is at least :data:`FACTOR` times smaller; :data:`SLOW` times where what is left
    is correlated, for it may be the rest of another mistake, taken for slow noise;
@@ -51,6 +52,8 @@ LEVEL = 1e-3  # of the F test, all mistakes together
 SLOW = 10.0  # the same where they are correlated
 FEW = 10.0  # degrees of freedom below which the tests of the residuals say nothing
 SHOWN = 6  # mistakes in the table
+#: options without unknowns for small errors of the set-up, which may take a mistake for one
+PLAIN = {"nuisances": "none", "tilt": "no"}
 IMPOSSIBLE = (GyrobenchError, ValueError, ArithmeticError)  # of a record that a mistake undone makes nonsense of
 
 
@@ -79,15 +82,8 @@ class _Tried:
         return [self.words, self.scatter, "ordinary" if self.ordinary else "not ordinary", self.p]
 
 
-def examined(
-    candidates: Callable[[Record], Iterable[Candidate]], plain: Mapping[str, Any] | None = None, advice: str = ""
-) -> Callable[[Reduce], Reduce]:
-    """Return a decorator for the from_record of a test, which adds the diagnosis to its result.
-
-    plain: options without the unknowns that are there for small errors of the set-up and can take a mistake for one
-    (the tilt of an axis); the mistakes are judged without them.  advice: beginning of warnings that are wrong advice
-    where a mistake is found.
-    """
+def examined(candidates: Callable[[Record], Iterable[Candidate]]) -> Callable[[Reduce], Reduce]:
+    """Return a decorator for the from_record of a test, which adds the diagnosis to its result."""
 
     def decorate(reduce: Reduce) -> Reduce:
         @functools.wraps(reduce)
@@ -99,17 +95,23 @@ def examined(
                     hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
                     raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
                 raise
-            reference, bare = result, record
-            if plain and any(record.run.options.get(n, v) != v for n, v in plain.items()):
-                bare = with_options(record, plain)
-                reference = _undone(reduce, bare) or result
+            reference, plain = result, record
+            if _hides(result, record) and (record.run.measured or _contradicted(result)):
+                plain = with_options(record, PLAIN)
+                reference = _undone(reduce, plain) or result
             if _suspicious(reference, record.run.measured):
-                _diagnose(result, reference, reduce, list(candidates(bare)), plain or {}, advice)
+                _diagnose(result, reference, reduce, list(candidates(plain)))
             return result
 
         return from_record
 
     return decorate
+
+
+def _hides(result: DriftTestResult, record: Record) -> bool:
+    """True where small errors of the set-up are among the unknowns."""
+    nuisances = any(t["title"].startswith("Nuisance model") for t in result.tables)
+    return nuisances or record.run.options.get("tilt") in (True, "yes")
 
 
 def with_options(record: Record, options: Mapping[str, Any]) -> Record:
@@ -166,11 +168,11 @@ def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
     return " or ".join(words) if len(words) <= 3 else ""
 
 
-def _diagnose(
-    result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[Candidate],
-    plain: Iterable[str], advice: str,
-) -> None:  # fmt: skip
-    """Add to ``result`` what undoing each mistake does to the residuals, and name those that explain them."""
+def _diagnose(result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[Candidate]) -> None:
+    """Add to ``result`` what undoing each mistake does to the residuals, and name those that explain them.
+
+    reference: the record as labelled, without unknowns for errors of the set-up.
+    """
     tried = []
     for c in candidates:
         found = _undone(reduce, c.record)
@@ -186,7 +188,8 @@ def _diagnose(
     better = [t for t in tried if t.p < LEVEL and FACTOR * t.scatter < reference.residual_std]
     named = [t for t in better if t.ordinary and t.factor * t.scatter < reference.residual_std]
     named = [t for t in named if float(special.fdtrc(t.nu, t.nu, (t.scatter / named[0].scatter) ** 2)) > LEVEL]
-    if not better and not _contradicted(reference):
+    explained = reference is not result and not _contradicted(result)  # by small errors of the set-up
+    if not named and (explained or not (better or _contradicted(reference))):
         return
     unit = reference.residual_unit
     result.tables.insert(0, {
@@ -204,12 +207,11 @@ def _diagnose(
             )
             uncertainty.withhold(result, [reason])
         return
-    if advice:
-        result.warnings[:] = [w for w in result.warnings if not w.startswith(advice)]
+    result.summary[:] = [text for text in result.summary if not text.startswith("In the model: ")]
     scatters = f"residual scatter {reference.residual_std:.3g} {unit} as labelled, {named[0].scatter:.3g} {unit} with "
     names = [t.words for t in named[:4]] + ([f"{len(named) - 4} more"] if len(named) > 4 else [])
     several = " The record cannot tell which of these." if len(named) > 1 else ""
-    hidden = "" if reference is result else f" As reduced, {', '.join(plain)} takes it for an error of the set-up."
+    hidden = " As reduced, it is taken for an error of the set-up." if explained else ""
     error = ", or ".join(names)
     uncertainty.withhold(result, [f"A handling error explains the residuals: {error}."])
     wrong = "The coefficients are wrong until the record is corrected."

@@ -223,7 +223,7 @@ def _summary(coefficients: list[Coefficient], found: Findings) -> list[str]:
     ]
 
 
-@handling_errors.examined(handling_candidates.tumble, plain={"tilt": False}, advice="The record shows a tilt")
+@handling_errors.examined(handling_candidates.tumble)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

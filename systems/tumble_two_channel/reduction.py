@@ -227,7 +227,7 @@ def _conventions(s: TwoChannelSetup) -> list[str]:
     ]
 
 
-@handling_errors.examined(handling_candidates.tumble, plain={"tilt": False})
+@handling_errors.examined(handling_candidates.tumble)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
     result = reduce(record.windows, setup_of(record.run, specification))
