@@ -201,7 +201,8 @@ def outcome(sheet: Sheet, mistake: str, clean: Result) -> Outcome:
     found = next((w for w in result.warnings if w.startswith("Handling error")), "")
     if found:
         return Outcome("named" if mistake and mistake in found else "wrong", found)
-    off = max(abs(a.estimate - b.estimate) / a.u for a, b in zip(result.coefficients, clean.coefficients, strict=True))
+    both = [(result[c.name], c) for c in clean.coefficients if c.name in result.names]  # not effects of the set-up
+    off = max(abs(a.estimate - b.estimate) / a.u for a, b in both)
     if result.verdict == "pass" and mistake and off < HARMLESS:
         return Outcome("harmless", f"{off:.1f} u")
     tests = "; ".join(t.name for t in result.tests if t.p is not None and t.p < 1e-3)
