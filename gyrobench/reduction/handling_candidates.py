@@ -24,6 +24,7 @@ from gyrobench.reduction.handling_errors import Candidate, with_options
 
 ANGLES = ("angle_start", "angle_end")
 TIMES = ("t_start", "t_end")
+MOST_SCALED = 4  # attitudes up to which each may be in a unit of its own
 MOST_PHASES = 16  # up to which they are exchanged by pairs
 DEGREE = math.pi / 180.0
 #: words of the mistake -> factor that undoes it
@@ -134,6 +135,17 @@ def scaled(
         yield Candidate(words, changed(record, **{n: record.windows[n] * f for n in columns}), f**power)
 
 
+def scaled_in_attitudes(record: Record, columns: Sequence[str], factors: Mapping[str, float]) -> Iterator[Candidate]:
+    """Columns in another unit, or in another range of the meter, in one of a few attitudes."""
+    names = list(dict.fromkeys(_attitude(row) for row in record.run.plan if _attitude(row)))
+    phase = np.asarray(record.windows["phase"]).astype(int)
+    for name in names if 1 < len(names) <= MOST_SCALED else ():
+        here = np.isin(phase, [row.phase for row in record.run.plan if _attitude(row) == name])
+        for words, f in factors.items():
+            columns_there = {n: np.where(here, record.windows[n] * f, record.windows[n]) for n in columns}
+            yield Candidate(f"{words}, in {name}", changed(record, **columns_there))
+
+
 def wrong_hemisphere(record: Record) -> Iterator[Candidate]:
     """The latitude with the wrong sign."""
     latitude = float(record.run.options["latitude"])
@@ -196,6 +208,7 @@ def tumble(record: Record) -> Iterator[Candidate]:
     yield from wrong_hemisphere(record)
     yield from scaled(record, ANGLES, ANGLE, 0.0)
     yield from scaled(record, means, CURRENT)
+    yield from scaled_in_attitudes(record, means, CURRENT)
     yield from shifted(record, means, "the current")
 
 

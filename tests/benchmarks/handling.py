@@ -143,7 +143,8 @@ DEGREES = "the angles in degrees, not in rad"
 MISTAKES: list[tuple[str, Callable[[Sheet, Rng], str]]] = [
     ("tumble_single_axis", labels("mount 1", "mount 2")),
     ("tumble_single_axis", labels("static 3", "static 4")),
-    ("tumble_single_axis", times("mean", 2.0, UNKNOWN, "mount 2")),
+    ("tumble_single_axis", times("mean", 2.0, "the current twice as large as it was, in mount 2", "mount 2")),
+    ("tumble_single_axis", block("mean", 2.0, UNKNOWN)),
     ("tumble_single_axis", times("mean", -1.0, "the current reversed in mount 1", "mount 1")),
     ("tumble_single_axis", late("mean", "the current belonging to the row before")),
     ("tumble_single_axis", hemisphere),
