@@ -26,6 +26,7 @@ from gyrobench.result import BudgetLine, Coefficient, Result
 SOURCE = "coupling step"
 RELATIVE = 1e-3  # of the estimate: an effect below it is in u without a warning
 FLOOR = 0.1  # amplitude at step zero over that at the step: no extrapolation beyond, 20 dB
+NOTED = 0.5  # effect over u from which the sentences, written before, are said to be without it
 LISTED = 3  # measures in a warning
 FINEST = 4  # the step recommended is at most that much shorter
 
@@ -75,6 +76,10 @@ def apply_step(result: Result, check: Mapping[str, Any]) -> None:
     if result.verdict == before:
         result.verdict = worst_verdict(c.verdict for c in result.coefficients)
     _correlate(result, old, parts)
+    if result.summary and worst is not None and worst > NOTED:
+        result.summary.append(
+            "What stands above is without the effect of the communication step; the table has it in u."
+        )
     warning = _warning(result, rows, float(check["step"]))
     if warning:
         result.warnings.append(warning)

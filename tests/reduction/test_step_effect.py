@@ -64,6 +64,7 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     assert c.interval == pytest.approx((10.0 - 0.98, 10.0 + 0.98), abs=1e-4)
     assert (c.verdict, r.verdict) == ("inconclusive", "inconclusive") and c.z == pytest.approx(2.0)
     assert math.hypot(*(b.contribution for b in r.budget)) == pytest.approx(c.u)
+    assert r.summary == []  # nothing was said before
     assert [b.source for b in r.budget] == ["noise and evaluation", "coupling step"]
     assert r.step_check["rows"][0]["ratio"] == pytest.approx(change / 0.3) == r.step_check["worst"]
 
@@ -72,12 +73,14 @@ def test_the_warning_says_what_to_do() -> None:
     """Above u it speaks; an effect of a thousandth of the estimate is in u without a word."""
     rows = [{"name": "isolation", "unit": "dB", "change": 3.2}, {"name": "S", "unit": "N·m/rad", "change": 5.0}]
     r = loop_result(coefficient(-72.56, 0.01, "isolation", "dB"), coefficient(16000.0, 0.1, "S", "N·m/rad"))
+    r.summary = ["It isolates by 72.56 ± 0.02 dB."]
     apply_step(r, {"step": 1e-4, "rows": rows})
     (text,) = r.warnings
     assert text.startswith(
         "The communication step of 0.1 ms moves isolation by 3.2 dB (u without it 0.01 dB): more than"
     )
     assert text.endswith("run with --step 25us.") and "S by" not in text
+    assert "without the effect of the communication step" in r.summary[-1]
     assert r["S"].u == pytest.approx(math.hypot(0.1, 5.0 / math.sqrt(3.0)))
     assert [step_text(x) for x in (5e-4, 2.5e-5, 1.0, 1e-2)] == ["0.5 ms", "25 us", "1 s", "10 ms"]
 
