@@ -77,9 +77,7 @@ def apply_step(result: Result, check: Mapping[str, Any]) -> None:
         result.verdict = worst_verdict(c.verdict for c in result.coefficients)
     _correlate(result, old, parts)
     if result.summary and worst is not None and worst > NOTED:
-        result.summary.append(
-            "What stands above is without the effect of the communication step; the table has it in u."
-        )
+        result.summary.append("These are without the effect of the communication step; the table has it in u.")
     warning = _warning(result, rows, float(check["step"]))
     if warning:
         result.warnings.append(warning)
