@@ -191,6 +191,8 @@ def _diagnose(result: DriftTestResult, reference: DriftTestResult, reduce: Reduc
     explained = reference is not result and not _contradicted(result)  # by small errors of the set-up
     if not named and (explained or not (better or _contradicted(reference))):
         return
+    if not named and not _contradicted(reference) and not _correlated(reference):  # few data, no sign of a mistake
+        return
     unit = reference.residual_unit
     result.tables.insert(0, {
         "title": "Diagnosis of handling errors",
