@@ -121,7 +121,7 @@ def test_scatter_of_a_change_knows_slow_noise() -> None:
 # ------------------------------------------------------------------------------------------- drift
 def test_drift_and_random_walk() -> None:
     """White rate of density N: the angle is a random walk N sqrt(t); rate over T has u = N/sqrt(T) = 1e-3/10 = 1e-4.
-    100 draws: |error| < 3 u in all but a few, mean u to 10 %, walk N to 10 %."""
+    60 draws: mean rate and its scatter, u with what 30 parts leave open, walk N to 15 %."""
     rng = np.random.default_rng(5)
     dt, n, density = 0.01, 10000, 1e-3
     t = dt * np.arange(n + 1)
@@ -131,7 +131,7 @@ def test_drift_and_random_walk() -> None:
         found.append(drift(t, np.concatenate([[0.0], np.cumsum(rate) * dt])))
     assert np.std([d.rate for d in found]) == pytest.approx(1e-4, rel=0.25)
     assert np.mean([d.rate for d in found]) == pytest.approx(2e-3, abs=4e-5)
-    assert np.mean([d.u for d in found]) == pytest.approx(1e-4, rel=0.1)
+    assert 1.0e-4 < np.mean([d.u for d in found]) < 1.5e-4  # the interval of 30 parts allows for drift too
     walks = [d.walk for d in found if d.walk is not None]
     assert len(walks) > 50
     assert np.median([w for w, _ in walks]) == pytest.approx(density, rel=0.15)
@@ -219,3 +219,18 @@ def test_noise_at_rest_does_not_move(seed: int) -> None:
     found = [step(t, 1.0 + 0.1 * rng.normal(size=t.size), 0.1 * rng.normal(size=1000)) for _ in range(40)]
     assert sum(s.moves > 0.0 for s in found) <= 1
     assert all(not s.unsettled or s.moves > 0.0 for s in found)
+
+def test_drift_intervals_hold_with_reading_errors_and_slow_drift() -> None:
+    """Holds of 30 s: white rate noise N, errors of the readings, drift of 0.6 N/sqrt(T) that stays in a hold (as the
+    Markov drift does).  1.96 times the scatter of ten parts over sqrt(10) held 0.87 of the true rates.
+    """
+    rng = np.random.default_rng(2)
+    n, dt, held, largest = 600, 0.05, 0, 0.0
+    for _ in range(150):
+        rate = rng.normal(size=n) / np.sqrt(dt) + 0.6 / np.sqrt(30.0) * rng.normal()
+        angle = np.concatenate([[0.0], np.cumsum(rate) * dt]) + 0.3 * rng.normal(size=n + 1)
+        found = drift(dt * np.arange(n + 1), angle)
+        held += abs(found.rate) < 1.959964 * found.u
+        largest = max(largest, abs(found.rate) / found.u)
+    assert 0.93 <= held / 150 <= 0.987
+    assert largest < 5.0

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.estimation import residual_series
+from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
@@ -304,17 +304,22 @@ class Drift:
     walk: tuple[float, float] | None
 
 
-def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
+def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
     """Return the drift of an angle (rad) in a hold phase.
 
-    The rate is (end - start) / time; its uncertainty the scatter of the rates of ``blocks`` equal parts over sqrt(n)
-    (independent parts: noise slower than a part is not in it).  Raises ReductionError for fewer than 4 samples a block.
+    The rate is the mean of the rates of ``blocks`` equal parts (10 where there are few samples) under the noise model
+    that they give: white, Gauss-Markov or both, with errors of the readings that neighbours share (noise_mixture_fit).
+    u is the half width of its 95 % interval over 1.96: parts do not know their noise better than 30 numbers can, and
+    drift slower than a part is allowed for.  Not in it: drift slower than half the phase.  Raises ReductionError for
+    fewer than 4 samples a block.
     """
+    blocks = blocks if t.size >= 4 * blocks else 10
     if t.size < 4 * blocks:
         raise ReductionError(f"a drift of {blocks} blocks needs {4 * blocks} samples, there are {t.size}")
     edges = np.linspace(0, t.size - 1, blocks + 1).astype(int)
-    rates = np.diff(angle[edges]) / np.diff(t[edges])
-    mean = float((angle[-1] - angle[0]) / (t[-1] - t[0]))
+    rates, start, end = np.diff(angle[edges]) / np.diff(t[edges]), t[edges[:-1]], t[edges[1:]]
+    est = noise_mixture_fit.fit(np.ones((blocks, 1)), rates, ["drift"], start, end, readings=True)
+    mean, u = float(est.beta[0]), float(est.half_width[0]) / noise_mixture_fit.NORMAL
     dt = float(t[1] - t[0])
     allan = residual_series.allan([(dt, np.diff(angle) / dt)])
     walk = None
@@ -324,7 +329,7 @@ def drift(t: Array, angle: Array, blocks: int = 10) -> Drift:
         last = falls.index(False, first) if False in falls[first:] else len(falls)
         tau, dev, low, high = (allan[n][last] for n in ("tau", "dev", "lo", "hi"))
         walk = (dev * math.sqrt(tau), (high - low) / (2.0 * residual_series.NORMAL) * math.sqrt(tau))
-    return Drift(mean, float(np.std(rates, ddof=1)) / math.sqrt(blocks), allan, walk)
+    return Drift(mean, u, allan, walk)
 
 
 # ------------------------------------------------------------------------------------------- axes
