@@ -22,7 +22,7 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation import repeatability
+from gyrobench.reduction.estimation import nuisances, repeatability
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
@@ -85,7 +85,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     names = drift.terms(9)
     share = drift.regressors(setup.xyz, names)
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
-    found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH)
+    found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
+                candidates=nuisances.temperature(windows) if setup.nuisances else ())  # fmt: skip
     trend = found.f_test(
         "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",
         "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
@@ -113,6 +114,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         f"Composite drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
         "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
         found.noise_sentence("readings"),
+        *found.nuisance_sentences(),
     ]
     return result
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.attitudes import attitude_problems, parse
-from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import ATTITUDE, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.plan import Phase, Plan
@@ -37,6 +37,7 @@ class FixedPosition(RebalanceTest):
             "settle": Option(10.0, "s", "wait before the readings", 1.0),
         }
         | TORQUER
+        | NUISANCES
         | type_b("attitude", "latitude", "scale_factor", "current")
     )
     measured_data = MEASURED

@@ -23,7 +23,7 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
@@ -88,7 +88,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         raise ReductionError(why)
     found = fit(
         [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
-        "drift rate", "°/h", DPH,
+        "drift rate", "°/h", DPH, candidates=nuisances.common(windows) if s.nuisances else (),
     )  # fmt: skip
     _model_test(found, theta)
     _cycle_test(found, theta)
@@ -126,6 +126,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         f"Constant drift {first.name} = {plus_minus(first)}.",
         f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         found.noise_sentence(),
+        *found.nuisance_sentences(),
     ]
     return result
 

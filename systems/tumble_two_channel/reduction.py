@@ -23,8 +23,10 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Quantity, fit
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -68,7 +70,8 @@ def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> DriftTestRes
     book, fits, why = _closed(s, phase, turning, y)
     results = {}
     for c in "xy":
-        results[f"{c} channel"] = _channel(s, c, phase, turning, y[c], current[OTHER[c]], book, fits.get(c, {}), why)
+        results[f"{c} channel"] = _channel(s, c, phase, turning, y[c], current[OTHER[c]], book, fits.get(c, {}), why,
+                                           windows)  # fmt: skip
     parts = list(results.values())
     coefficients = [c for r in parts for c in r.coefficients]
     linear = max((c for c in coefficients if c.unit == "°/h/g"), key=lambda c: abs(c.estimate))
@@ -76,19 +79,21 @@ def reduce(windows: Mapping[str, Array], setup: TwoChannelSetup) -> DriftTestRes
         f"Constant drift {' and '.join(f'{r.coefficients[0].name} = {plus_minus(r.coefficients[0])}' for r in parts)}.",
         f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         " ".join(f"{name}: {r.summary[0]}" for name, r in results.items()),
+        *(f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]),
     ]
     return merge(results, summary=summary, tables=_book_table(s, coefficients, book))
 
 
 def _channel(
     s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, y: Array, current: Array,
-    book: Mapping[str, float], fits: Mapping[str, Fit], why: str,
+    book: Mapping[str, float], fits: Mapping[str, Fit], why: str, windows: Mapping[str, Array],
 ) -> DriftTestResult:  # fmt: skip
     names = s.names(c)
     X = design(s, c, turning)
     found = fit(
         [_quantity(s, c, n, book) for n in names], X, y, turning.t_start, turning.t_end,
         evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
+        candidates=_candidates(s, c, phase, turning, windows),
     )  # fmt: skip
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
@@ -127,9 +132,25 @@ def _channel(
     )
 
 
+def _candidates(
+    s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, windows: Mapping[str, Array]
+) -> list[Candidate]:
+    """Set-up effects: tilt of the measuring axis, trend, temperature, constants from mount to mount."""
+    if not s.nuisances:
+        return []
+    along = window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, 2)
+    tilt = Candidate.of(geometry.TILT[c], _tilt_meaning(c), "arcsec", -along)
+    mounts = nuisances.scatter(f"σ_mount,{c}", nuisances.MOUNTS, nuisances.mounts(phase, s.faces))
+    return [*([tilt] if s.tilt is None else []), *nuisances.common(windows, f",{c}"), mounts]
+
+
+def _tilt_meaning(c: str) -> str:
+    return f"tilt of the {c} axis towards the spin axis"
+
+
 def _quantity(s: TwoChannelSetup, c: str, name: str, book: Mapping[str, float]) -> Quantity:
     if name == geometry.TILT[c]:
-        return Quantity.of(name, f"tilt of the {c} axis towards the spin axis", "arcsec")
+        return Quantity.of(name, _tilt_meaning(c), "arcsec")
     truth = None
     square, into = geometry.FOLD[c]
     folded = s.model == "nine" and s.fold and name in into

@@ -23,7 +23,7 @@ OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about
 @dataclass(frozen=True, kw_only=True)
 class TwoChannelSetup(setups.TumbleSetup):
     """k: scale factors of the torquers about x and y, rad/s/A.  model: simple or nine.  fold: Dx_yy and Dy_xx may be
-    there and are folded into others.  tilt: the tilts of the measuring axes towards the spin axis are estimated.
+    there and are folded into others.  tilt: those of the measuring axes towards the spin axis.
     quantum: resolution of each current reading.
     """
 

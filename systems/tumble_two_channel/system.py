@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift
-from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.families.tumble_test import TumbleTest
@@ -41,14 +41,16 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         | TumbleTest.tumble
         | {
             "fold": Option(False, bool, "accept that Dx_yy and Dy_xx are folded into the other squares, the constant"),
-            "tilt": Option(False, bool, "estimate the tilts of the measuring axes to the spin axis; needs both_senses"),
+            "tilt": Option("auto", str, "tilts of the measuring axes to the spin axis: estimated (yes; needs "
+                           "both_senses), zero (no), or weighed by the data (auto)"),
         }
+        | NUISANCES
         | type_b("axis", "mount", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | {
             f"k_{a}": Option(0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: that of the gyro", 0.0)
             for a in "xy"
         }
-    )
+    )  # fmt: skip
     measured_data = MEASURED
     windows = Windows(
         "sampler_x.count",
@@ -69,7 +71,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
 
     def check(self) -> list[str]:
         problems = geometry.refusals(self["latitude"], self["model"]) + super().check()
-        if self["tilt"] and not self["both_senses"]:
+        if self["tilt"].lower() in ("yes", "true") and not self["both_senses"]:
             problems.append(
                 "tilt: at one table rate the tilt of a measuring axis towards the spin axis cannot be told from Dx_z, "
                 "Dy_z; set both_senses=true"

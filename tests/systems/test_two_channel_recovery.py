@@ -110,7 +110,7 @@ def test_set_up_errors_shift_as_the_budget_predicts(session: Session, source: st
     taken for white with and without the error: else the weights change too, by less than 0.2 u.)
     """
     size = float(np.radians(arcsec / 3600.0))
-    values = {**SHORT, option: size}
+    values = {**SHORT, option: size, "nuisances": "none"}  # the budget is of one model
     more: dict[str, Any] = {
         "table axis off the pole, about east": {"table.tilt[1]": size},
         "table axis off the pole, about p × east": {"table.tilt[2]": size},
@@ -137,7 +137,14 @@ def test_encoder_harmonic_shifts_as_the_budget_predicts(session: Session, order:
     White noise of 3e-10 rad/s in a window keeps the weights as they are.
     """
     error = 1e-5
-    values = {**SHORT, **quiet(load()), **gyro(np.random.default_rng(4)), "gyro.white_x": 1e-9, "gyro.white_y": 1e-9}
+    values = {
+        "nuisances": "none",
+        **SHORT,
+        **quiet(load()),
+        **gyro(np.random.default_rng(4)),
+        "gyro.white_x": 1e-9,
+        "gyro.white_y": 1e-9,
+    }
     system = load().with_values({**values, f"u_angle{order}": error})
     wrong = {f"table.encoder_amplitude[{order}]": error, f"table.encoder_phase[{order}]": row * np.pi / 2.0}
     plain, off = (system.reduce(session.run({**values, f"u_angle{order}": error, **v})) for v in ({}, wrong))

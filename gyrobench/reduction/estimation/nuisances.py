@@ -11,7 +11,7 @@ they are reported with the coefficients, below it only the intervals hold them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -57,9 +57,9 @@ def trend(t_start: Array, t_end: Array) -> Candidate:
     return Candidate("trend", "linear change of the drift in time", "°/h/h", DPH, hours)
 
 
-def temperature(windows: Mapping[str, Array], rows: slice | Array = slice(None)) -> list[Candidate]:
+def temperature(windows: Mapping[str, Array]) -> list[Candidate]:
     """One candidate of each column temperature... of a record: its mean over all (K) and, of two, their difference."""
-    named = {n: np.asarray(v, dtype=float)[rows] for n, v in windows.items() if n.startswith("temperature")}
+    named = {n: np.asarray(v, dtype=float) for n, v in windows.items() if n.startswith("temperature")}
     values = list(named.values())
     if not values:
         return []
@@ -79,10 +79,13 @@ def scatter(name: str, meaning: str, groups: Sequence[object]) -> Candidate:
     return Candidate(name, meaning, "°/h", DPH, columns, scatter=True)
 
 
-def common(windows: Mapping[str, Array]) -> list[Candidate]:
-    """The candidates of every test: a trend and what thermometers read (columns temperature...)."""
+def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
+    """The candidates of every test: a trend and what thermometers read (columns temperature...).
+
+    channel: appended to their names, where several channels are reported together.
+    """
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    return [trend(t0, t1), *temperature(windows)]
+    return [replace(c, name=c.name + channel) for c in (trend(t0, t1), *temperature(windows))]
 
 
 def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:
