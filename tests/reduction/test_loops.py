@@ -220,6 +220,7 @@ def test_noise_at_rest_does_not_move(seed: int) -> None:
     assert sum(s.moves > 0.0 for s in found) <= 1
     assert all(not s.unsettled or s.moves > 0.0 for s in found)
 
+
 def test_drift_intervals_hold_with_reading_errors_and_slow_drift() -> None:
     """Holds of 30 s: white rate noise N, errors of the readings, drift of 0.6 N/sqrt(T) that stays in a hold (as the
     Markov drift does).  1.96 times the scatter of ten parts over sqrt(10) held 0.87 of the true rates.

@@ -33,7 +33,7 @@ WOBBLE = 1e-5  # rad
 def tumble(session: Session, system: System, **values: Any) -> Result:
     """A gyro with D_I and D_S alone, noise off."""
     ideal = {**SHORT, **quiet(load()), **{f"gyro.{n}": 0.0 for n in NAMES}}
-    ideal |= {"gyro.D_I": D_I * DPH, "gyro.D_S": D_S * DPH}
+    ideal |= {"gyro.D_I": D_I * DPH, "gyro.D_S": D_S * DPH} | {"nuisances": "none"}
     given = {**ideal, **{k.replace("__", "."): v for k, v in values.items()}}
     return system.with_values(given).reduce(session.run(given))
 
