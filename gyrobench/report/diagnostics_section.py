@@ -54,6 +54,33 @@ def residuals(doc: Json) -> list[Any]:
             half=True,
         ),
     )
+    blocks += _tests(doc, "Tests of the residuals. A small p is evidence against the model.")
+    spread = number_cell(doc, ("residual_std",))
+    dof = write_number(doc["dof"], significant=5).text
+    sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
+    return [Text(sentence), *blocks, *render_value(doc, ("noise",), "Noise model of the estimation.")]
+
+
+def innovations(doc: Json) -> list[Any]:
+    """Return what an estimator's errors and innovations say of it; nothing of a loop without an estimator's tests."""
+    if not doc["tests"]:
+        return []
+    spread = number_cell(doc, ("residual_std",)).text
+    unit = "" if doc["residual_unit"] == "1" else f" {doc['residual_unit']}"
+    sentence = f"Rms error of the estimate {spread}{unit} over {write_number(doc['dof'], significant=6).text} readings."
+    picture = Picture(
+        "acf",
+        plots.acf(doc["acf"], "acf", "readings") if doc["acf"] else "",
+        "Autocorrelation of the innovations. Band: 95 % bounds for white noise; bars outside it: the signal model of "
+        "the filter does not apply.",
+        "Autocorrelation of the innovations against lag, with bounds",
+        half=True,
+    )
+    caption = "Tests of errors and innovations. A small p is evidence against what the estimator states."
+    return [Text(sentence), *pictures(picture), *_tests(doc, caption)]
+
+
+def _tests(doc: Json, caption: str) -> list[Any]:
     rows = []
     for k, test in enumerate(doc["tests"]):
         mark = "warn" if test["p"] is not None and test["p"] < 0.01 else ""
@@ -75,12 +102,7 @@ def residuals(doc: Json) -> list[Any]:
         Column("p"),
         Column("finding", wide=True),
     ]
-    if rows:
-        blocks.append(Table(columns, rows, "Tests of the residuals. A small p is evidence against the model."))
-    spread = number_cell(doc, ("residual_std",))
-    dof = write_number(doc["dof"], significant=5).text
-    sentence = f"Residual standard deviation {spread.text} {doc['residual_unit']} with {dof} degrees of freedom."
-    return [Text(sentence), *blocks, *render_value(doc, ("noise",), "Noise model of the estimation.")]
+    return [Table(columns, rows, caption)] if rows else []
 
 
 def stability(doc: Json) -> list[Any]:

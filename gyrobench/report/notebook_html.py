@@ -103,7 +103,7 @@ def result_html(result: Result) -> str:
 
     doc = document(result)
     verdict = f"Verdict: {result.verdict}." if result.verdict != NO_VERDICT else f"{NO_VERDICT.capitalize()}."
-    head = [paragraph(result.title, strong=True), paragraph(" ".join([verdict, *result.summary[:1]]))]
+    head = [paragraph(result.title, strong=True), paragraph(verdict), *map(paragraph, result.summary)]
     methods = [paragraph(f"Methods: {result.suite.consistency}.")] if isinstance(result, SuiteResult) else []
     blocks = coefficients(doc)
     tables = [table_html(b) for b in blocks if isinstance(b, Table)]

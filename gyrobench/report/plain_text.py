@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
 from gyrobench.report.ranking_section import place_text
 from gyrobench.result import NO_VERDICT, Result, SuiteResult
+
+WIDTH, NARROW = 120, 30  # characters of a line with a meaning, and of a meaning at least
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "") -> list[str]:
@@ -19,8 +22,19 @@ def align_columns(rows: Sequence[Sequence[str]], left: set[int], indent: str = "
     ]
 
 
+def with_meanings(lines: Sequence[str], meanings: Sequence[str]) -> list[str]:
+    """Return the lines of a table (head first) with a last column of meanings, wrapped where the line gets long."""
+    start = max(map(len, lines)) + 2
+    out = [f"{lines[0].ljust(start)}meaning"]
+    for line, meaning in zip(lines[1:], meanings, strict=True):
+        wrapped = textwrap.wrap(meaning, max(NARROW, WIDTH - start)) or [""]
+        out.append(f"{line.ljust(start)}{wrapped[0]}".rstrip())
+        out += [" " * start + text for text in wrapped[1:]]
+    return out
+
+
 def format_result(result: Result) -> str:
-    """Return the coefficient table, the warnings and the verdict; of a suite also how far its methods agree."""
+    """Return the coefficient table, the answer, the warnings and the verdict; of a suite how far its methods agree."""
     truth = any(c.truth is not None for c in result.coefficients)
     judged = result.verdict != NO_VERDICT
     head = ["coefficient", "estimate", "u", "95 % interval", "unit"]
@@ -40,7 +54,9 @@ def format_result(result: Result) -> str:
         notes.append(f"verdict: {result.verdict}")
     left = {0, 4} | ({len(rows[0]) - 1} if judged else set())
     agreement = _agreement(result) if isinstance(result, SuiteResult) else []
-    return "\n".join([result.title, "", *align_columns(rows, left), "", *notes, *agreement])
+    table = with_meanings(align_columns(rows, left), [c.meaning for c in result.coefficients])
+    answer = [] if isinstance(result, SuiteResult) else [*result.summary, ""]
+    return "\n".join([result.title, "", *answer, *table, "", *notes, *agreement])
 
 
 def step_sentence(check: Mapping[str, Any]) -> str:

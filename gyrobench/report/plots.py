@@ -118,8 +118,8 @@ def residuals_in_time(series: Sequence[Json], key: str) -> str:
     return svg(fig, key, zoom=ax)
 
 
-def acf(data: Json, key: str) -> str:
-    """Return the autocorrelation of the residuals with its bounds for white noise."""
+def acf(data: Json, key: str, of: str = "windows") -> str:
+    """Return the autocorrelation of residuals (or of others, lag in ``of``) with its bounds for white noise."""
     lag, rho = finite(data["lag"], data["rho"])
     lag, rho = [m for m in lag if m > 0], [r for m, r in zip(lag, rho, strict=True) if m > 0]
     if not lag:
@@ -135,7 +135,7 @@ def acf(data: Json, key: str) -> str:
     zero_line(ax)
     ax.vlines(lag, 0, rho, color=BLUE, linewidth=1.2)
     ax.plot(lag, rho, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
-    ax.set_xlabel(axis_label("lag", "windows"))
+    ax.set_xlabel(axis_label("lag", of))
     ax.set_ylabel(axis_label("autocorrelation", "1"))
     ax.set_ylim(min(-0.5, min(rho) * 1.1), max(0.5, max(rho) * 1.1))
     ax.set_xlim(0, max(lag) + 0.5)

@@ -20,7 +20,8 @@ def blocks(doc: Json) -> list[Any]:
     for k, r in enumerate(doc.get("responses") or []):
         key = f"response-{k + 1}"
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
-        figures += pictures(Picture(key, draw([("measured", r)], key, curves=r["curves"]), r["caption"], alt))
+        label = r["name"] if r["name"] == r["y_name"] else "measured"
+        figures += pictures(Picture(key, draw([(label, r)], key, curves=r["curves"]), r["caption"], alt))
         if r["kind"] not in ("step", "time") and r["x"]:
             figures.append(CollapsedBlocks(f"Points of the {r['name']}", [_points(doc, k)]))
     return figures
@@ -127,8 +128,9 @@ def _steps(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json]) 
         x, y = finite(r["x"], r["y"])
         colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
         points = len(named) == 1 and r["kind"] == "step"
-        marks = {"marker": "o", "linestyle": "", "markersize": 2.4} if points else {"linestyle": "-"}
+        marks: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 2.4} if points else {"linestyle": "-"}
         every = max(1, len(x) // 120) if points else 1
+        marks |= {"linewidth": 0.6} if len(x) > 1000 else {}
         ax.plot(x[::every], y[::every], color=colour, markeredgewidth=0, label=short(label), zorder=3, **marks)
     for (colour, dashes), curve in zip(LINES, curves, strict=False):
         ax.plot(curve["x"], curve["y"], dashes, color=colour, linewidth=1.0, label=curve["label"])

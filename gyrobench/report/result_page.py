@@ -47,7 +47,7 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
             Section("Coefficients", "coefficients", coefficients(doc)),
             Section("Measurement data", "measured", _measured(doc, record or {})),
             Section("Validity of the results", "believed", []),
-            Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True),
+            _residuals(doc),
             Section(
                 "Stability: Allan deviation and spectrum", "stability", diagnostics_section.stability(doc), sub=True
             ),
@@ -62,6 +62,13 @@ def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
             Section("Statements and signatures", "signatures", signing(doc)),
         ]
     return Page(doc["title"], doc["report_id"], head(doc), sections).finish()
+
+
+def _residuals(doc: Json) -> Section:
+    """Return the section on the residuals of a fit, or on the errors and innovations of an estimator."""
+    if doc["kind"] == "loop":
+        return Section("Errors and innovations", "innovations", diagnostics_section.innovations(doc), sub=True)
+    return Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True)
 
 
 def head(doc: Json) -> list[tuple[str, str]]:
@@ -110,6 +117,7 @@ def answer(doc: Json) -> ResultSummary:
             Row(
                 [
                     text_cell(c["name"], "strong"),
+                    text_cell(c["meaning"]),
                     number_cell(doc, (*path, "estimate"), u),
                     number_cell(doc, ("derived", "U", k), u),
                     text_cell(c["unit"]),
@@ -120,6 +128,7 @@ def answer(doc: Json) -> ResultSummary:
         )
     columns = [
         Column("requirement"),
+        Column("meaning", wide=True),
         Column("estimate"),
         Column("U (95 %)"),
         Column("unit"),

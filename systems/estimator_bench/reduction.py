@@ -17,12 +17,12 @@ from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import estimator_result
 from gyrobench.reduction.loops.estimator_result import Measures, Signals
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import LoopResult, Response, Series, Specification
+from gyrobench.result import LoopResult, Response, Specification
 
 from .benchmarks import BENCHMARKS
 
 Array = NDArray[np.float64]
-SHOWN, COMPARED = 400, 1000  # readings in the pictures
+SHOWN, COMPARED = 1000, 1000  # intervals of the whole time, and readings of the close-up
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
@@ -94,7 +94,6 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Specificatio
             "Noise reduction is what is left beside the truth as it comes through; it means nothing without the gain.",
         ],
         coefficients=m.coefficients,
-        series=[picture(s)],
         dof=float(s.time.size),
         tests=m.tests,
         residual_std=float(np.sqrt(np.mean(m.error**2))),
@@ -114,18 +113,8 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Specificatio
         verdict=uncertainty.worst_verdict(c.verdict for c in m.coefficients),
         instrument=name,
         ranked_by=estimator_result.RANKED,
-        responses=[last_second(s)],
+        responses=[last_second(s), *errors_and_innovations(s)],
     )
-
-
-def picture(s: Signals) -> Series:
-    """The last readings (points), the estimate (line), and its error beneath."""
-    last = slice(-SHOWN, None)
-    t, z, x = s.time[last], s.z[last], s.estimate[last]
-    return Series(
-        "readings, estimate, its error", t.tolist(), "time", "s", z.tolist(),
-        x.tolist(), (x - s.truth[last]).tolist(), "signal", "1", t.tolist(), t.tolist(), x.tolist(),
-    )  # fmt: skip
 
 
 def last_second(s: Signals) -> Response:
@@ -137,3 +126,37 @@ def last_second(s: Signals) -> Response:
         "error that ranks; a shift along the time axis is the delay.", t, "time", "s", s.estimate[last].tolist(),
         "estimate", "1", curves=[{"label": "truth", "x": t, "y": truth, "phase": []}],
     )  # fmt: skip
+
+
+def over_the_run(name: str, caption: str, time: Array, y: Array, sigma: Array | None) -> Response:
+    """A figure of the whole time: y and, where it is stated, twice its standard deviation.
+
+    Of each of SHOWN intervals the least and the largest y are drawn, and the mean of the standard deviation.
+    """
+    parts = np.array_split(np.arange(y.size), min(SHOWN, y.size))
+    ends = np.unique([k for part in parts for k in (part[np.argmin(y[part])], part[np.argmax(y[part])])])
+    curves = [{"label": name, "x": time[ends].tolist(), "y": y[ends].tolist(), "phase": []}]
+    if sigma is not None:
+        middle = [float(time[part].mean()) for part in parts]
+        bound = np.array([float(np.sqrt(np.mean(sigma[part] ** 2))) for part in parts])
+        caption += " Lines beside it: twice the standard deviation that the estimator states, 95 % if it is right."
+        curves += [
+            {"label": f"{sign}2σ stated", "x": middle, "y": (factor * bound).tolist(), "phase": []}
+            for sign, factor in (("+", 2.0), ("−", -2.0))
+        ]
+    return Response(name, "time", caption, time[ends].tolist(), "time", "s", y[ends].tolist(), name, "1", curves=curves)
+
+
+def errors_and_innovations(s: Signals) -> list[Response]:
+    """Error of the estimate and innovations over the whole time that is evaluated."""
+    skipped = "The readings left out at the start are not shown."
+    sigma = np.sqrt(s.variance) if s.variance is not None and np.all(s.variance > 0.0) else None
+    caption = f"Error: estimate less truth of the same instant, the whole time. {skipped}"
+    figures = [over_the_run("error", caption, s.time, s.estimate - s.truth, sigma)]
+    if s.innovation is not None and np.any(s.innovation != 0.0):
+        made = s.innovation != 0.0  # a reading that is not used leaves none
+        known = s.nis is not None and bool(np.all(s.nis[made] > 0.0))
+        stated = np.abs(s.innovation[made]) / np.sqrt(s.nis[made]) if known and s.nis is not None else None
+        caption = f"Innovation: reading less its prediction by the filter, the whole time. {skipped}"
+        figures.append(over_the_run("innovation", caption, s.time[made], s.innovation[made], stated))
+    return figures

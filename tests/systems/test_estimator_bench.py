@@ -9,8 +9,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from gyrobench import report
 from gyrobench.engine.session import ParameterRefusedError, Session, run
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.report.comparison_page import comparison
@@ -238,3 +240,27 @@ def test_swap_and_compare(command: Command, tmp_path: Path) -> None:
     ]
     html = (tmp_path / "comparison.html").read_text()
     assert html.index("Ranking by error") < html.index("Components, parameters and settings that differ")
+
+
+def test_errors_and_innovations_stand_under_their_names_over_the_whole_time(tmp_path: Any) -> None:
+    """57 s are evaluated (3 s are skipped); the extremes of both are in their figures, which are no residuals of a fit.
+
+    2 sigma of the innovations: sqrt(y^2/NIS) of each.
+    """
+    record = run(load_system(NAME), {"estimator": "estimator_kalman_rate"}, values={"benchmark": "sine"}, seed=1)
+    r = load_system(NAME).reduce(record)
+    figures = {f.name: f for f in r.responses}
+    late = record.channels["time"] > 3.0 + 5e-4
+    error = (record.channels["estimator.estimate"] - record.channels["source.truth"])[late]
+    innovation = record.channels["estimator.innovation"][late]
+    for name, values in (("error", error), ("innovation", innovation)):
+        figure = figures[name]
+        assert figure.kind == "time" and figure.x[0] < 3.2 and figure.x[-1] > 59.9
+        assert max(figure.y) == values.max() and min(figure.y) == values.min()
+        upper, lower = (np.array(curve["y"]) for curve in figure.curves[1:])
+        share = np.mean(np.abs(values) < np.interp(record.channels["time"][late], figure.curves[1]["x"], upper))
+        assert np.all(upper == -lower) and 0.94 < share < 0.985  # it overstates its variance
+    assert r.series == []
+    html = report.write(r, tmp_path, ("html",))["html"].read_text(encoding="utf-8")
+    assert "Errors and innovations" in html and "Autocorrelation of the innovations" in html
+    assert ">Residuals<" not in html and "fitted model" not in html

@@ -1,0 +1,26 @@
+"""The table of a result in the terminal: names of measures have their meaning beside them."""
+
+from __future__ import annotations
+
+from gyrobench.report.plain_text import WIDTH, format_result
+from gyrobench.result import Coefficient, LoopResult
+
+
+def test_measures_have_their_meanings_beside_them() -> None:
+    long = "share of the gain at which the loop becomes unstable, " * 3
+    rows = [
+        Coefficient("θ*", "platform angle under the load, at rest", "″", 12.547, 0.037, 1.96, (12.47, 12.62)),
+        Coefficient("S", long.strip(), "N·m/rad", 16439.0, 49.0, 1.96, (16343.0, 16535.0)),
+    ]
+    result = LoopResult(
+        system="s", title="Loop", method="", sources=[], conventions=[], coefficients=rows, responses=[],
+        summary=["Crossover 10.15 ± 0.39 Hz (95 %)."],
+    )  # fmt: skip
+    text = format_result(result)
+    lines = text.splitlines()
+    head = next(k for k, line in enumerate(lines) if line.startswith("coefficient"))
+    at = lines[head].index("meaning")
+    assert lines[2] == "Crossover 10.15 ± 0.39 Hz (95 %)." and head == 4
+    assert lines[head + 1][at:] == "platform angle under the load, at rest"
+    assert " ".join(line[at:] for line in lines[head + 2 :]).strip() == long.strip()  # wrapped beneath itself
+    assert max(map(len, lines)) <= WIDTH
