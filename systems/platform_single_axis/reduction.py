@@ -13,6 +13,8 @@ from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins, told
 from gyrobench.result import LoopResult, Specification
 
+from .budget import ride_budget
+
 MRAD = 1e-3
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
@@ -77,12 +79,15 @@ def _ride(found: LoopFindings) -> str:
     meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
+    sources = ride_budget(found, ride, ANGLE, two)
     p = found.record.run.parameters
     k = p.get("gyro.k") or (1.0 / p["stabilizer.K_u"] if p.get("stabilizer.K_u") else None)  # or what the design took
     if k is not None:
         _estimator(found, ride, float(k))
     base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
-    return f"A base that {base} leaves {{platform error}} rms on the platform, and {{rate error}}."
+    limit = max(sources, key=lambda name: sources[name], default="")
+    by = f"; the largest part is {limit}, {sources[limit] / ARCSEC:.3g}″" if limit else ""
+    return f"A base that {base} leaves {{platform error}} rms on the platform, and {{rate error}}{by}."
 
 
 def _load(found: LoopFindings) -> str:

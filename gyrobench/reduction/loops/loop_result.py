@@ -269,7 +269,7 @@ class LoopFindings:
         def signal(g: Gate) -> Array:
             return g[output] + (g[plus] if plus else 0.0)
 
-        points = [response(g.t, g[reference], signal(g), g.f) for g in self.of(kind, axis, "sine")]
+        points = [response(g.t, g[reference], signal(g), g.f) for g in self.of(kind, axis, "sine") if g.amplitude]
         if not points:
             return []
         points.sort(key=lambda p: p.f)

@@ -130,19 +130,27 @@ def limiting(
 
     "" where the known ways do not make up the linear model's isolation, or that is not the measured one.
     """
-    ways = base_torques(found.record.run.parameters, f)
+    ways = base_ways(found, output, f, axis, plus, measured)
+    share = {name: way / sum(ways.values()) for name, way in ways.items()}
+    listed = [f"{n} ({100.0 * s:.0f} %)" for n, s in sorted(share.items(), key=lambda i: -i[1]) if s >= 0.005]
+    return f"by {' and '.join([', '.join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)}" if listed else ""
+
+
+def base_ways(
+    found: LoopFindings, output: str, f: float, axis: int = 1, plus: str | None = None, measured: float | None = None
+) -> dict[str, float]:
+    """Return by how much of the base's angle each way moves the platform at f; {} as :func:`limiting`."""
+    torques = base_torques(found.record.run.parameters, f)
     torque = found.excited("discrete", "torque", axis, output, [f])
     whole = found.excited("discrete", "motion", axis, output, [f], plus)
-    if not ways or torque is None or whole is None:
-        return ""
-    total = sum(ways.values()) * complex(torque[0])
+    if not torques or torque is None or whole is None:
+        return {}
+    total = sum(torques.values()) * complex(torque[0])
     if abs(total - whole[0]) > AGREES * abs(whole[0]) or (
         measured is not None and abs(abs(whole[0]) / measured - 1.0) > AGREES
     ):
-        return ""
-    share = {name: abs(way) / sum(map(abs, ways.values())) for name, way in ways.items()}
-    listed = [f"{n} ({100.0 * s:.0f} %)" for n, s in sorted(share.items(), key=lambda i: -i[1]) if s >= 0.005]
-    return f"by {' and '.join([', '.join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)}"
+        return {}
+    return {name: abs(way * complex(torque[0])) for name, way in torques.items()}
 
 
 def base_torques(p: Mapping[str, Any], f: float) -> dict[str, complex]:
