@@ -15,12 +15,13 @@ LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their orde
 
 
 def blocks(doc: Json) -> list[Any]:
-    """One figure for each response of a result document."""
+    """One figure for each response of a result document: what happened in the run, open loops, then the others."""
     figures: list[Any] = []
-    for k, r in enumerate(doc.get("responses") or []):
+    order = {"time": 0, "loop": 1}
+    for k, r in sorted(enumerate(doc.get("responses") or []), key=lambda item: order.get(item[1]["kind"], 2)):
         key = f"response-{k + 1}"
         alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
-        label = r["name"] if r["name"] == r["y_name"] else "measured"
+        label = r["name"] if r["kind"] == "step" and r["name"] == r["y_name"] else "measured"
         figures += pictures(Picture(key, draw([(label, r)], key, curves=r["curves"]), r["caption"], alt))
         if r["kind"] not in ("step", "time") and r["x"]:
             figures.append(CollapsedBlocks(f"Points of the {r['name']}", [_points(doc, k)]))

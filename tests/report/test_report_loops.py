@@ -17,7 +17,7 @@ from gyrobench.bench import Bench
 from gyrobench.report.assets import read_content
 from gyrobench.report.channel_figure import panels, scaled
 from gyrobench.report.comparison_page import comparison
-from gyrobench.report.responses import draw
+from gyrobench.report.responses import blocks, draw
 from gyrobench.report.result_json import document
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
@@ -90,6 +90,11 @@ def test_each_response_has_its_figure(written: Written) -> None:
     html = written.paths["html"].read_text(encoding="utf-8")
     for k in (1, 2, 3):
         assert f'id="figure-response-{k}"' in html
+    assert re.findall(r'id="figure-response-(\d)"', html) == ["1", "2", "3"]
+    turned = result()
+    turned.responses = turned.responses[::-1]  # step, ratio, open loop: the open loop comes first
+    keys = [b.items[0].key for b in blocks(document(turned)) if hasattr(b, "items")]
+    assert keys == ["response-3", "response-1", "response-2"]
     assert "The design matrix has rank" not in html and "Residual standard deviation" not in html
 
 
