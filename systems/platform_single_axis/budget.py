@@ -68,14 +68,14 @@ def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[
     shown.append(["platform error, measured", None, "", measured, None])
     if across is not None:
         size = rms * abs(complex(across[0])) / ARCSEC
-        shown.append(["not in the ride: the same motion about y, by output-axis coupling", degrees, "°", size, None])
+        shown.append(["not in the ride: base about y, output-axis coupling", degrees, "°", size, None])
     found.tables.append(
         {
             "title": TITLE,
-            "caption": f"Computed from the linear model for the ride at {ride.f:g} Hz; size: amplitude of the base, or "
-            "density of the noise (two-sided). The ways of the base add as phasors and share its variance as their "
-            "sizes, noise adds by squares.",
-            "columns": ["source", "size", "unit", "platform angle, rms / ″", "share of the variance / %"],
+            "caption": f"Angle of the platform computed from the linear model for the ride at {ride.f:g} Hz, and its "
+            "share of the variance. Size: amplitude of the base, or density of the noise (two-sided). The ways of the "
+            "base add as phasors and share its variance as their sizes, noise adds by squares.",
+            "columns": ["source", "size", "unit", "angle, rms / ″", "share / %"],
             "rows": shown,
         }
     )
