@@ -95,7 +95,11 @@ class Test:
 
 @dataclass
 class BudgetLine:
-    """One line of the error budget; contribution = |sensitivity| * size, all as standard uncertainties."""
+    """One line of the error budget; contribution = |sensitivity| * size, all as standard uncertainties.
+
+    sensitivity: the change of the estimate for one unit by which the set-up is off, with its sign; a source of several
+    independent errors has none.
+    """
 
     source: str
     size: float

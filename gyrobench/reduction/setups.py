@@ -37,12 +37,16 @@ class Setup:
     truth: Mapping[str, float] | None = None
     specification: Specification | None = None
     instrument: str = ""
+    corrections: str = ""  # measured errors of the set-up, see gyrobench.reduction.estimation.effects
 
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
         """Return the setup that a run.json describes; ``own``: the fields that are the test's own."""
+        shared = {"specification": specification, "instrument": run.instrument}
+        if corrections := str(run.options.get("corrections", "")):
+            shared["corrections"] = corrections
         sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
-        return cls(**{"specification": specification, "instrument": run.instrument, **sources, **own})
+        return cls(**{**shared, **sources, **own})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,8 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
@@ -178,15 +179,15 @@ def _effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float
     ) / (2.0 * step * s.gravity)
     slope = found.X[:, terms:].sum(axis=1)  # of the data per rad of angle
     station = np.rint(np.mod(v.angle + closed.EQUAL, 2.0 * math.pi) / (10.0 * closed.EQUAL)).astype(int)
-    alone = np.array([found.change(np.where(station == p, slope, 0.0)) for p in np.unique(station)])
-    offset = found.change(s.scale / G0)
+    alone = np.array([found.error(np.where(station == p, slope, 0.0)) for p in np.unique(station)])
+    offset = found.error(s.scale / G0)
     return [
-        Effect("scale λ", s.u_scale, "1", found.change(v.y), "relative"),
+        Effect("scale λ", s.u_scale, "1", found.error(v.y), "relative"),
         Effect("zero of the current meter", s.u_current, "A", offset),
         Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
-        Effect("gravity", s.u_gravity, "m/s²", found.change(dX=stretched)),
+        Effect("gravity", s.u_gravity, "m/s²", found.error(dX=stretched)),
         Effect(
-            "positions of the head", s.u_angle, "rad", np.sqrt(np.sum(alone**2, axis=0)),
+            "positions of the head", s.u_angle, "rad", alone,
             "independent, the same in each turn and mount",
         ),
     ]  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.linear_fit import Findings
 
 from . import model, positions
@@ -31,17 +31,17 @@ def turned(axis: str, angle: float, numbers: tuple[int, ...]) -> dict[int, Array
     return {n: R.T @ positions.ATTITUDES[n] for n in numbers}
 
 
-def attitude_change(
+def attitude_error(
     channel: str, setup: model.Setup, found: Findings, lin: model.Linear, position: NDArray[np.int_],
     attitudes: dict[int, Array],
 ) -> Array:  # fmt: skip
-    """Change (q,) of the estimates when the positions truly were ``attitudes`` while the nominal ones are believed."""
+    """What the data (n,) are wrong by when the positions were ``attitudes`` and the nominal ones are believed."""
     believed = model.directions(position, setup.latitude)
     real = model.directions(position, setup.latitude, attitudes)
     # y = w - k I is formed with the believed w while k I = w_real - drift_real
     dw = model.rate(channel, real, setup.earth_rate) - model.rate(channel, believed, setup.earth_rate)
     D = model.drift_columns(channel, real, setup.terms) - model.drift_columns(channel, believed, setup.terms)
-    return found.change(D @ lin.start - dw)
+    return found.error(D @ lin.start - dw)
 
 
 def effects(
@@ -50,7 +50,7 @@ def effects(
     """All sources with their sensitivities for one current (A); sizes come from ``setup`` and may be 0."""
 
     def turn(axis: str, numbers: tuple[int, ...]) -> Array:
-        return attitude_change(channel, setup, found, lin, position, turned(axis, SMALL, numbers)) / SMALL
+        return attitude_error(channel, setup, found, lin, position, turned(axis, SMALL, numbers)) / SMALL
 
     every = tuple(positions.ATTITUDES)
     alone = np.array([turn(axis, (n,)) for n in every for axis in AXES])
@@ -58,7 +58,7 @@ def effects(
     d0, d1 = (model.directions(position, s.latitude) for s in (setup, step))
     dw = model.rate(channel, d1, setup.earth_rate) - model.rate(channel, d0, setup.earth_rate)
     full = float(np.max(np.abs(current))) or 1.0
-    offset = found.change(-lin.k0)
+    offset = found.error(-lin.k0)
     quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
     return [
         Effect(
@@ -69,12 +69,12 @@ def effects(
             Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turn(axis, every))
             for axis in AXES
         ),
-        Effect("latitude", setup.u_latitude, "rad", found.change(-dw) / SMALL),
+        Effect("latitude", setup.u_latitude, "rad", found.error(-dw) / SMALL),
         Effect(f"zero of the {channel} current meter", setup.u_current, "A", offset),
         Effect(f"resolution of the {channel} current meter", quantum, "A", offset, "as if never dithered"),
         Effect(
             f"nonlinearity of the torquer about {channel}", setup.u_nonlinearity, "1",
-            found.change(-lin.k0 * current * np.abs(current) / full),
+            found.error(-lin.k0 * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
     ]  # fmt: skip

@@ -22,6 +22,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import repeatability, residual_series
+from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, fit
 from gyrobench.reduction.merge_channels import merge
@@ -143,6 +144,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     jitter = 0.4 * (np.arange(position.size) / max(position.size - 1, 1) - 0.5)  # side by side, by time
     shown = Group(f"current about {channel}", order, (position + jitter)[order], "position", "")
     found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH)
+    found = corrected(found, budget.effects(channel, setup, found, lin, current, position), setup.corrections)
     other = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
     found.f_test(
         "positions", other, "differences between positions that the model does not hold",

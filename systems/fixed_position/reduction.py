@@ -23,7 +23,8 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, repeatability
-from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -129,12 +130,12 @@ def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
         text = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.change(rate), text))
-    offset = found.change(-s.k)
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(rate), text))
+    offset = found.error(-s.k)
     return [
         *turned,
-        Effect("latitude", s.u_latitude, "rad", found.change(by_latitude)),
-        Effect("torquer scale factor", s.u_scale_factor, "1", found.change(-s.k * current), "relative"),
+        Effect("latitude", s.u_latitude, "rad", found.error(by_latitude)),
+        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current), "relative"),
         Effect("offset of the current reading", s.u_current, "A", offset),
         Effect("resolution of the current reading", s.quantum / 12.0**0.5, "A", offset, "as if never dithered"),
     ]

@@ -30,7 +30,8 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -206,13 +207,13 @@ def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
     for axis, name in ((1, "output"), (2, "spin")):
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.change(rate)))
-    whole = found.change(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(rate)))
+    whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
     return [
         *turned,
-        Effect("latitude", s.u_latitude, "rad", found.change(float(by_latitude))),
+        Effect("latitude", s.u_latitude, "rad", found.error(float(by_latitude))),
         Effect("angle between first and last reading", s.u_angle, "rad", whole),
-        Effect("float gain H/C", s.u_float_gain, "1", found.change(-coupled), "Earth rate along the spin axis times b"),
+        Effect("float gain H/C", s.u_float_gain, "1", found.error(-coupled), "Earth rate along the spin axis times b"),
     ]
 
 

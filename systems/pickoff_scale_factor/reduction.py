@@ -29,7 +29,8 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.setups import Setup
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -154,13 +155,13 @@ def _effects(found: Findings, s: PickoffSetup, both: bool) -> list[Effect]:
     wrong = np.zeros_like(found.X)
     wrong[:, 0] = found.X[:, 0]
     effects = [
-        Effect("gain H/C", s.u_gain, "1", only, "relative"),
-        Effect("angle scale of the table", s.u_angle, "1", found.change(dX=wrong), "relative"),
-        Effect("voltmeter", s.u_voltage, "1", found.change(found.y), "relative"),
+        Effect("gain H/C", s.u_gain, "1", None, "relative", values=only),
+        Effect("angle scale of the table", s.u_angle, "1", found.error(dX=wrong), "relative"),
+        Effect("voltmeter", s.u_voltage, "1", found.error(found.y), "relative"),
     ]
     if not both:
         note = "not told from the slope by angles gone over once; bound taken as two standard uncertainties"
-        effects.append(Effect("drift during the test", s.drift / 2.0, "rad/s", found.change(slope), note))
+        effects.append(Effect("drift during the test", s.drift / 2.0, "rad/s", found.error(slope), note))
     return effects
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.run_metadata import Site
 
@@ -38,7 +38,7 @@ def effects(
         dy, dX = np.zeros_like(y), np.zeros_like(X)
         dy[rows] = (other.inertial(site)[:, channel] - y)[rows]
         dX[rows] = (other.design(site, names) - X)[rows]
-        return found.change(dy, dX) / SMALL
+        return found.error(dy, dX) / SMALL
 
     def mount(k: int) -> Array:
         turned = replace(seen, base=_turned(k) @ seen.base)
@@ -57,8 +57,10 @@ def effects(
             read(axis, lambda a: np.cos(n * a), lambda a: -n * np.sin(n * a)),
         ])  # fmt: skip
 
-    each = "each mount set up by itself"
-    out = [Effect(f"table set up, about {a}", sizes["u_axis"], "rad", mount(k), each) for k, a in enumerate("XYZ")]
+    each, mounts = "each mount set up by itself", tuple(f"mount {p}" for p in np.unique(phase))
+    out = [
+        Effect(f"table set up, about {a}", sizes["u_axis"], "rad", mount(k), each, mounts) for k, a in enumerate("XYZ")
+    ]
     out += [
         Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(replace(seen, body=_turned(k))))
         for k, a in enumerate("xyz")
@@ -66,14 +68,16 @@ def effects(
     out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(replace(seen, square=SMALL))))
     for n, often in ((1, "once"), (2, "twice")):
         out += [
-            Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder")
+            Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder", SINES)
             for k, name in enumerate(AXES)
         ]
     for k, name in enumerate(AXES):
         both = [replace(seen, wobble=(SMALL * (k == 0), SMALL * (k == 1), p)) for p in (0.0, np.pi / 2.0)]
         change = -np.array([moved(one) for one in both])
         out.append(
-            Effect(f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase")
+            Effect(
+                f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase", PHASES
+            )
         )
     slow = replace(seen, rate=(1.0 - SMALL) * seen.rate)
     return [*out, Effect("time base", sizes["u_time"], "1", moved(slow), "relative")]

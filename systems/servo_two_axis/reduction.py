@@ -24,6 +24,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.merge_channels import merge
@@ -76,6 +77,9 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             quantities, X[c], rates[:, j], seen.t_start, seen.t_end, _groups(phase, labels, seen), "drift rate", "°/h",
             DPH, noise="readings", limit=1e6,
         )  # fmt: skip
+        names, sizes = drift.terms_2dof(c, terms), run_metadata.sizes(run.options, budget.SIZES)
+        effects = budget.effects(j, found[c], seen, phase, site, names, sizes)
+        found[c] = corrected(found[c], effects, str(run.options.get("corrections", "")))
         _mount_test(found[c], phase)
         results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, run, terms, truth, specification)
     tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]

@@ -23,8 +23,9 @@ from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import composite, servo_regression
+from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
@@ -60,6 +61,13 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     truth = run_metadata.truth_of(run, drift.NAMES)
     quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
     found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings")
+    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(run.options, SIZES)}
+
+    def effects_of(found: Findings) -> list[Effect]:
+        every = servo_regression.effects(held, site, found, columns, phase, sizes)
+        return [e for e in every if "a turn" not in e.source]
+
+    found = corrected(found, effects_of(found), str(run.options.get("corrections", "")))
     statistics: dict[str, composite.Composite | str] = {}
     for p, label in labels.items():
         rows = phase == p
@@ -67,10 +75,6 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
         bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
         statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
-    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(run.options, SIZES)}
-    effects = [
-        e for e in servo_regression.effects(held, site, found, columns, phase, sizes) if "a turn" not in e.source
-    ]
     warnings = refusals.unseen(list(labels.values()))
     both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
     worst = float(
@@ -95,7 +99,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         ],
         equation=servo_regression.equation(seen.names),
         conventions=servo_regression.CONVENTIONS,
-        effects=effects,
+        effects=effects_of(found),
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL
+from gyrobench.system.families.option_groups import CORRECTIONS
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
@@ -36,12 +37,16 @@ class ServoVerticalLevel(ServoTest):
     spec = ("TEST-SERVO-VERT", "TEST-SERVO-LEVEL", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
     reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
-    options = ServoTest.options | {
-        "attitudes": Option("six", str, "three, six, vertical, level, all, or names separated by semicolons"),
-        "cycles": Option(2, int, "times the attitudes are gone through", 1, 12),
-        "dwell": Option(600.0, "s", "time in each attitude", 1e-3),
-        "windows": Option(10, int, "windows in each dwell", 1, 200),
-    }
+    options = (
+        ServoTest.options
+        | CORRECTIONS
+        | {
+            "attitudes": Option("six", str, "three, six, vertical, level, all, or names separated by semicolons"),
+            "cycles": Option(2, int, "times the attitudes are gone through", 1, 12),
+            "dwell": Option(600.0, "s", "time in each attitude", 1e-3),
+            "windows": Option(10, int, "windows in each dwell", 1, 200),
+        }
+    )
     measured_data = MEASURED
 
     def attitudes(self) -> list[str]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import window_regressors
-from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings
 
 from .setup import TumbleSetup
@@ -54,17 +54,18 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
     def geometry(base: Array, turned: window_regressors.Turning) -> Array:
         dX = design(setup, turned, names, base) - X
         drate = window_regressors.axis_rate(turned, base, setup.latitude, setup.earth_rate) - rate
-        return found.change(drate, dX) / SMALL
+        return found.error(drate, dX) / SMALL
 
     def axis(direction: Array) -> Array:
-        return geometry(setup.base @ frames.rotation(direction, SMALL).T, turning)
+        # the reduction believes the axis to be where it is not
+        return -geometry(setup.base @ frames.rotation(direction, SMALL).T, turning)
 
     def mount(direction: Array) -> Array:
         tilt = frames.rotation(direction, SMALL)
         return geometry(setup.base, replace(turning, face=tilt @ turning.face))
 
     def read(di: Array) -> Array:
-        return found.change(-setup.k * di)
+        return found.error(-setup.k * di)
 
     def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
         return np.array([geometry(setup.base, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
@@ -78,9 +79,11 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
         Effect(TOWARDS_OUTPUT, setup.u_mount, "rad", mount(along_s)),
         Effect("input axis towards spin axis", setup.u_mount, "rad", mount(-along_o)),
         Effect("gyro turned about its input axis", setup.u_mount, "rad", mount(along_i)),
-        Effect("wobble of the table axis, twice a turn", setup.u_wobble, "rad", _wobble(setup, turning, found)),
-        Effect("angle error, once a turn", setup.u_angle1, "rad", angles(1), "encoder"),
-        Effect("angle error, twice a turn", setup.u_angle2, "rad", angles(2), "encoder"),
+        Effect(
+            "wobble of the table axis, twice a turn", setup.u_wobble, "rad", _wobble(setup, turning, found), "", PHASES
+        ),
+        Effect("angle error, once a turn", setup.u_angle1, "rad", angles(1), "encoder", SINES),
+        Effect("angle error, twice a turn", setup.u_angle2, "rad", angles(2), "encoder", SINES),
         Effect("torquer scale factor", setup.u_scale_factor, "1", read(current), "relative, the same for all currents"),
         Effect(
             "torquer nonlinearity", setup.u_nonlinearity, "1", read(current * np.abs(current) / full),
@@ -118,5 +121,5 @@ def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findi
         dX = window_regressors.average(still - drift.regressors(seen(up - SMALL * np.cross(q, up)), terms)) / SMALL
         if TILT in names:
             dX = np.column_stack([dX, rate[:, 1]])
-        changes.append(found.change(-rate[:, 0], dX))
+        changes.append(found.error(-rate[:, 0], dX))
     return np.array(changes)

@@ -27,6 +27,7 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -86,13 +87,14 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         DPH,
         candidates=_candidates(setup, turning, phase, windows),
     )
+    found = corrected(found, budget.effects(setup, turning, current, found), setup.corrections)
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
     turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
     turns.test()
     effects = budget.effects(setup, turning, current, found)
     tilt_line = next(e for e in effects if e.source == budget.TOWARDS_OUTPUT)
     j = names.index("D_O") if "D_O" in names else 0
-    dominant = abs(float(tilt_line.change[j])) * tilt_line.size > float(found.u[j])
+    dominant = abs(float(tilt_line.changes(found)[0, j])) * tilt_line.size > float(found.u[j])
     warnings = []
     if setup.fold:
         warnings.append(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift, frames
-from gyrobench.system.families.option_groups import FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.tumble_test import TumbleTest
@@ -37,6 +37,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         | {
             "terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9),
         }
+        | CORRECTIONS
         | type_b("axis", "mount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | TORQUER
     )

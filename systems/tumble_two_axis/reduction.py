@@ -24,7 +24,8 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.fit_result import Effect, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -90,6 +91,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
         "drift rate", "°/h", DPH, candidates=nuisances.common(windows) if s.nuisances else (),
     )  # fmt: skip
+    found = corrected(found, _effects(s, found, outer, inner, C, current), s.corrections)
     _model_test(found, theta)
     _cycle_test(found, theta)
     warnings = []
@@ -257,7 +259,7 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
     earth = frames.earth_rate_local(s.latitude, s.earth_rate)
 
     def changed(other: Array) -> Array:
-        return found.change((other - C)[:, 0] @ earth, _design(s, other) - found.X) / SMALL
+        return found.error((other - C)[:, 0] @ earth, _design(s, other) - found.X) / SMALL
 
     def tilted(direction: Array) -> Array:
         return changed(C @ frames.rotation(direction, SMALL).T)
@@ -277,16 +279,16 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
             for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)
         ),
         Effect(
-            "torquer scale factor", s.u_scale_factor, "1", found.change(-s.k * current),
+            "torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current),
             "relative, the same for all currents",
         ),
         Effect(
-            "torquer nonlinearity", s.u_nonlinearity, "1", found.change(-s.k * current * np.abs(current) / full),
+            "torquer nonlinearity", s.u_nonlinearity, "1", found.error(-s.k * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect("offset of the current reading", s.u_current, "A", found.change(-s.k * one)),
+        Effect("offset of the current reading", s.u_current, "A", found.error(-s.k * one)),
         Effect(
-            "resolution of the current reading", s.quantum / 12.0**0.5, "A", found.change(-s.k * one),
+            "resolution of the current reading", s.quantum / 12.0**0.5, "A", found.error(-s.k * one),
             "as if never dithered",
         ),
     ]  # fmt: skip

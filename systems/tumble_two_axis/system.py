@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift
-from gyrobench.system.families.option_groups import FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
 from gyrobench.system.families.table_test import Array, sampled
@@ -59,6 +59,7 @@ class TumbleTwoAxis(RebalanceTest):
         | SETTLE
         | FOLD
         | NUISANCES
+        | CORRECTIONS
         | type_b("square", "mount", "scale_factor", "nonlinearity", "current", axis="standard uncertainty of the outer "
                  "axis against the pole")
         | TORQUER

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.fit_result import Effect
+from gyrobench.reduction.estimation.effects import SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings, Group
 
 from . import geometry
@@ -82,7 +82,7 @@ def effects(
     def geometric(base: Array, turned: window_regressors.Turning) -> Array:
         dX = design(s, c, turned, base) - X
         drate = window_regressors.axis_rate(turned, base, s.latitude, s.earth_rate, axis) - rate
-        return found.change(drate, dX) / SMALL
+        return found.error(drate, dX) / SMALL
 
     def tilted(direction: Array) -> Array:
         return geometric(s.base @ frames.rotation(direction, SMALL).T, turning)
@@ -103,19 +103,19 @@ def effects(
             Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
             for n, d in zip("xyz", np.eye(3), strict=True)
         ),
-        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder"),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder"),
+        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder", SINES),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder", SINES),
         Effect(
-            "torquer scale factor", s.u_scale_factor, "1", found.change(-k * current),
+            "torquer scale factor", s.u_scale_factor, "1", found.error(-k * current),
             "relative, the same for all currents",
         ),
         Effect(
-            "torquer nonlinearity", s.u_nonlinearity, "1", found.change(-k * current * np.abs(current) / full),
+            "torquer nonlinearity", s.u_nonlinearity, "1", found.error(-k * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect("offset of the current reading", s.u_current, "A", found.change(-k * one)),
+        Effect("offset of the current reading", s.u_current, "A", found.error(-k * one)),
         Effect(
-            "resolution of the current reading", quantum / 12.0**0.5, "A", found.change(-k * one),
+            "resolution of the current reading", quantum / 12.0**0.5, "A", found.error(-k * one),
             "as if never dithered",
         ),
     ]  # fmt: skip

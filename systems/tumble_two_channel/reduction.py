@@ -24,6 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -95,6 +96,7 @@ def _channel(
         evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
         candidates=_candidates(s, c, phase, turning, windows),
     )  # fmt: skip
+    found = corrected(found, evidence.effects(s, c, found, turning, current), s.corrections)
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
     if s.model == "nine" and s.fold:

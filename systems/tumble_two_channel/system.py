@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift
-from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.families.tumble_test import TumbleTest
@@ -45,6 +45,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
                            "both_senses), zero (no), or weighed by the data (auto)"),
         }
         | NUISANCES
+        | CORRECTIONS
         | type_b("axis", "mount", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | {
             f"k_{a}": Option(0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: that of the gyro", 0.0)

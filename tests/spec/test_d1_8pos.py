@@ -344,7 +344,7 @@ def test_attitude_shift_as_predicted() -> None:
         lin = M.linear("x", w["mean_x"], d, s)
         found = R.fit([str(j) for j in range(6)], lin.X, lin.y, w["t_start"], w["t_end"], [], "", "", DPH)
         found = M.reported(found, M.quantities("x", s, {}), s, lin.k0)
-        change = budget.attitude_change("x", s, found, lin, position, turned)
+        change = found.gain @ budget.attitude_error("x", s, found, lin, position, turned)
         for j, name in enumerate(("k_x", "R_x", "u_y", "u_zx")):
             scale = KU if name == "k_x" else DPH
             shift = (moved[name].closed - plain[name].closed) * scale  # all readings weigh alike

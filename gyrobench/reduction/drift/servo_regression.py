@@ -25,7 +25,8 @@ from gyrobench import drift, frames
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
-from gyrobench.reduction.estimation.fit_result import Effect, Findings
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
+from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.run_metadata import Site
 from gyrobench.reduction.window_checks import ReductionError
 
@@ -154,7 +155,7 @@ def effects(
         dy, dX = np.zeros_like(y), np.zeros_like(X)
         dy[rows] = (drift_rate(other, site) - y)[rows]
         dX[rows] = (columns(other) - X)[rows]
-        return fit.change(dy, dX) / SMALL
+        return fit.error(dy, dX) / SMALL
 
     def axis(k: int) -> Array:
         tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
@@ -173,7 +174,7 @@ def effects(
     def order(n: int) -> Array:
         length = held.t_end - held.t_start
         ends = n * held.angle_start, n * held.angle_end
-        return np.array([fit.change((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
+        return np.array([fit.error((f(ends[1]) - f(ends[0])) / length) for f in (np.sin, np.cos)])
 
     def unbalance() -> Array:
         down = held.axes @ np.array([0.0, 0.0, -site.g])
@@ -182,23 +183,28 @@ def effects(
             c, s = np.cos(a), np.sin(a)
             ends.append((c * down[:, 1] + s * down[:, 2], c * down[:, 2] - s * down[:, 1]))
         length = held.t_end - held.t_start
-        return np.array([fit.change((late - early) / length) for early, late in zip(*ends, strict=True)])
+        y, z = (fit.error((late - early) / length) for early, late in zip(*ends, strict=True))
+        return np.array([-y, z])  # a mass along z pulls with its weight along y, one along y against that along z
 
     def mount(k: int) -> Array:
         return moved(replace(held, body=frames.rotation(np.eye(3)[k], SMALL)))
 
+    each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [
-        Effect("table axis about y", sizes["u_axis"], "rad", axis(1), "each phase set up by itself"),
-        Effect("table axis about z", sizes["u_axis"], "rad", axis(2), "each phase set up by itself"),
-        Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), "each phase set up by itself"),
-        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble()),
+        Effect("table axis about y", sizes["u_axis"], "rad", axis(1), each, phases),
+        Effect("table axis about z", sizes["u_axis"], "rad", axis(2), each, phases),
+        Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), each, phases),
+        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble(), "", PHASES),
         Effect("input axis towards output axis", sizes["u_mount"], "rad", mount(2)),
-        Effect("input axis towards spin axis", sizes["u_mount"], "rad", mount(1)),
-        Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder"),
-        Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder"),
-        Effect("unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis"),
-        Effect("time base", sizes["u_time"], "1", fit.change(-held.rate), "relative"),
-    ]
+        Effect("input axis towards spin axis", sizes["u_mount"], "rad", -mount(1)),
+        Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder", SINES),
+        Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder", SINES),
+        Effect(
+            "unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis",
+            ("mass along z", "mass along y"),
+        ),
+        Effect("time base", sizes["u_time"], "1", fit.error(-held.rate), "relative"),
+    ]  # fmt: skip
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:

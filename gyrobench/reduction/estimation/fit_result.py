@@ -1,7 +1,7 @@
 """From a linear fit to a result: what every test method needs beside its design matrix, its formulas and its tables.
 
     fitted = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
-    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", fitted.change(-k * current))]
+    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", fitted.error(-k * current))]
     result = linear_result(fitted, system="...", title="...", ..., effects=effects, specification=limits)
 
 Two channels measured at once: one result each, then gyrobench.reduction.merge_channels.  Everything inside is SI; what
@@ -12,40 +12,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import outliers, regression, uncertainty
+from gyrobench.reduction.estimation.effects import Effect, budget_rows, correction_table, standard_changes
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 
-__all__ = ["Effect", "Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
+__all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
 
 Array = NDArray[np.float64]
 CONDITION = 100.0  # above this a warning names the weakest direction
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One source of type B: its standard uncertainty and the change (q,) of each estimate (SI) for one unit of it,
-    as :meth:`Findings.change` gives it; (m, q) for m errors of this size that have nothing to do with one another.
-    """
-
-    source: str
-    size: float
-    unit: str
-    change: Array
-    note: str = ""
-
-    @property
-    def sensitivity(self) -> Array:
-        """(q,) SI per unit of the source, without sign; independent errors add as squares."""
-        out: Array = np.sqrt(np.sum(np.square(np.atleast_2d(self.change)), axis=0))
-        return out
 
 
 def linear_result(
@@ -65,7 +47,9 @@ def linear_result(
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
     robust: a table with a robust fit beside this one.
     """
-    coefficients = [_coefficient(fit, j, effects, specification or {}) for j in range(len(fit.quantities))]
+    by_source = [standard_changes(fit, e) for e in effects]
+    rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])
+    coefficients = [_coefficient(fit, j, rows[:, j].tolist(), specification or {}) for j in range(rows.shape[1])]
     design = fit.est.design
     odd = outliers.find(fit)
     beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust else [])]
@@ -99,9 +83,9 @@ def linear_result(
         psd=fit.psd(),
         harmonics=list(harmonics),
         budget=_budget(fit, effects, random),
-        type_b=_type_b(fit, effects),
+        type_b=_type_b(fit, effects, by_source),
         repeatability=dict(repeatability or {}),
-        tables=[*_closed_table(fit, closed_caption), *tables, *fit.nuisance_tables(), *beside],
+        tables=[*correction_table(fit), *_closed_table(fit, closed_caption), *tables, *fit.nuisance_tables(), *beside],
         warnings=[*fit_warnings, *warnings],
         summary=[*summary, *fit.nuisance_sentences()],
         decision_rule=uncertainty.DECISION_RULE,
@@ -128,9 +112,8 @@ def plus_minus(c: Coefficient) -> str:
     return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
 
 
-def _coefficient(fit: Findings, j: int, effects: Sequence[Effect], limits: Specification) -> Coefficient:
+def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: Specification) -> Coefficient:
     q, r = fit.quantities[j], fit.reported
-    contributions = [float(e.sensitivity[j]) * e.size for e in effects]
     u, U = uncertainty.combine_uncertainties(float(r.u[j]), float(r.half_width[j]), contributions)
     limit = limits.get(q.title, limits.get(q.name))
     estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
@@ -161,29 +144,23 @@ def _coefficient(fit: Findings, j: int, effects: Sequence[Effect], limits: Speci
 def _budget(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
     lines = []
     note = "Type A, from the residuals" + ("" if fit.white else " under the estimated noise model")
+    sources = [(e.unit, *row) for e in effects for row in budget_rows(fit, e)]
     for j, q in enumerate(fit.quantities):
         u_a = float(fit.u[j]) / q.scale
         lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
-        for e in effects:
-            change = float(e.sensitivity[j]) / q.scale
-            if e.size > 0.0 and change * e.size > 1e-9 * u_a:
-                per = q.unit if e.unit == "1" else f"{q.unit}/{e.unit}"
-                lines.append(
-                    BudgetLine(e.source, e.size, e.unit, change, per, change * e.size, q.unit, q.title, e.note)
-                )
+        for unit, source, size, changes, said in sources:
+            change = float(changes[j]) / q.scale
+            if size > 0.0 and abs(change) * size > 1e-9 * u_a:
+                per = q.unit if unit == "1" else f"{q.unit}/{unit}"
+                lines.append(BudgetLine(source, size, unit, change, per, abs(change) * size, q.unit, q.title, said))
     return lines
 
 
-def _type_b(fit: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
-    """The standard uncertainties of the sources with their signs, which the budget does not show: what one source does
-    to two estimates belongs together.
-    """
+def _type_b(fit: Findings, effects: Sequence[Effect], changes: Sequence[Array]) -> list[dict[str, Any]]:
+    """What one standard uncertainty of each source does to all estimates together: its independent parts in rows."""
     scale = np.array([q.scale for q in fit.quantities])
-    return [
-        {"source": e.source, "changes": (np.atleast_2d(e.change) * e.size / scale).tolist()}
-        for e in effects
-        if e.size > 0.0
-    ]
+    pairs = zip(effects, changes, strict=True)
+    return [{"source": e.source, "changes": (c / scale).tolist()} for e, c in pairs if np.any(c)]
 
 
 def _closed_table(fit: Findings, caption: str) -> list[dict[str, Any]]:

@@ -196,6 +196,7 @@ class Findings:
     linear: tuple[Quantity, ...] = ()  # those of the columns of X
     mode: str = "estimated"  # noise, as of fit()
     function: Callable[[Array], ArrayLike] | None = None  # of derive()
+    corrections: tuple[Any, ...] = ()  # what was taken out of the data, see gyrobench.reduction.estimation.effects
 
     def __post_init__(self) -> None:
         dof = self.dof
@@ -230,11 +231,21 @@ class Findings:
         """(q, n): how the reported values change with the data."""
         return self.reported.gain
 
-    def change(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
-        """Change (q,) of the reported values, to first order, when the data and the design X were wrong by dy, dX."""
+    def error(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
+        """What the data (n,) are wrong by, to first order, when data and design X are wrong by dy, dX."""
         error = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
-        out: Array = self.gain @ (error if dX is None else error - dX @ self.est.beta[: dX.shape[1]])
-        return out
+        return error if dX is None else error - dX @ self.est.beta[: dX.shape[1]]
+
+    def without(self, error: Array) -> Findings:
+        """The same fit of the data less ``error`` (n,)."""
+        weighed = [*self.candidates, *(h.candidate for h in self.hidden)]
+        again = fit(
+            self.linear, self.X, self.y - error, self.t_start, self.t_end, self.groups, self.y_name, self.y_unit,
+            self.y_scale, noise=self.mode, weights=self.weights, limit=math.inf, candidates=weighed,
+        )  # fmt: skip
+        if self.function is None:
+            return again
+        return again.derive(self.quantities[: len(self.quantities) - len(self.joined)], self.function)
 
     def derive(self, quantities: Sequence[Quantity], function: Callable[[Array], ArrayLike]) -> Findings:
         """The same fit reported as ``function`` (of the linear unknowns, SI) with uncertainties to first order.

@@ -23,6 +23,9 @@ NUISANCES = {
 TILT = {
     "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)"),
 }
+CORRECTIONS = {
+    "corrections": Option("", str, "measured set-up errors, names as in the budget: SOURCE = VALUE(U) UNIT; ..."),
+}
 FOLD = {"fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS")}
 SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 0.0)}
 ATTITUDE = {

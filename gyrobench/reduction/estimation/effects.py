@@ -1,0 +1,149 @@
+"""Sources of type B: what an error of the set-up does to the data, and measured errors, which are taken out of them.
+
+    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.error(-k * current))]
+    found = corrected(found, effects, "torquer scale factor = 1.2e-4 (2e-5)")
+
+A correction is linear in the error, as the budget is; what the data are wrong by is taken from them and the fit made
+again, noise model included, so a known error neither biases the coefficients nor widens their intervals.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) = 12(2) arcsec'"
+_ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")
+SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
+PHASES = ("phase 0°", "phase 90°")  # of a wobble
+APART = 2  # parts of a source up to which each has a line of its own
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One source of type B: its standard uncertainty, and what the data are wrong by for one unit of it.
+
+    error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
+    reduction knows nothing of it; (m, n) for m errors of this size that have nothing to do with one another, which
+    ``parts`` names.  values: (q,) change of the reported values, of a source that is not in the data.
+    """
+
+    source: str
+    size: float
+    unit: str
+    error: Array | None
+    note: str = ""
+    parts: tuple[str, ...] = ()
+    values: Array | None = None
+
+    def changes(self, fit: Findings) -> Array:
+        """Return the change (m, q) of the reported values for one unit of each part, SI."""
+        if self.error is None:
+            return np.atleast_2d(np.zeros(fit.value.size) if self.values is None else self.values)
+        out: Array = np.atleast_2d(self.error) @ fit.gain.T
+        return out
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the parts, as a correction uses them; none for parts that have no name."""
+        if self.error is None:
+            return []
+        if np.ndim(self.error) == 1:
+            return [self.source]
+        return [f"{self.source} ({part})" for part in self.parts]
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A measured error of the set-up, SI, with its standard uncertainty, which replaces that of its source."""
+
+    source: str
+    value: float
+    u: float
+    unit: str
+
+
+def corrected(found: Findings, effects: Sequence[Effect], text: str) -> Findings:
+    """Return the fit of the data less the errors that ``text`` states, :data:`FORM`.
+
+    Raises ReductionError for text of another form, and for a source or unit that the test does not have.
+    """
+    if not text.strip():
+        return found
+    errors = {n: row for e in effects if e.names for n, row in zip(e.names, np.atleast_2d(e.error), strict=True)}  # type: ignore[arg-type]
+    unit = {n: e.unit for e in effects for n in e.names}
+    taken = [_read(one, unit) for one in text.split(";") if one.strip()]
+    if len({c.source for c in taken}) < len(taken):
+        raise ReductionError(f"corrections: a source stands twice in '{text}'")
+    again = found.without(sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
+    return replace(again, corrections=tuple(taken), tests=list(again.tests))
+
+
+def _read(text: str, unit: dict[str, str]) -> Correction:
+    match = _ONE.fullmatch(text)
+    if match is None:
+        raise ReductionError(f"corrections: '{text.strip()}' is not of the form {FORM}")
+    source = match["source"]
+    if source not in unit:
+        near = difflib.get_close_matches(source, unit, 1, 0.4)
+        meant = f"; meant is perhaps '{near[0]}'" if near else ""
+        raise ReductionError(f"corrections: no source '{source}'{meant}; this test has: {'; '.join(unit)}")
+    try:
+        given = [units.parse_quantity(f"{match[k]}{match['unit']}", unit[source]) for k in ("value", "u")]
+    except ValueError as error:
+        raise ReductionError(f"corrections: {source}: {error}") from None
+    if not given[1] >= 0.0:
+        raise ReductionError(f"corrections: {source}: its standard uncertainty {match['u']} must not be negative")
+    return Correction(source, given[0], given[1], unit[source])
+
+
+def standard_changes(fit: Findings, effect: Effect) -> Array:
+    """Return the changes (m, q) by one standard uncertainty of each part: the source's, or that of its correction."""
+    own = {c.source: c.u for c in fit.corrections}
+    changes = effect.changes(fit)
+    sizes = [own.get(name, effect.size) for name in effect.names or [""] * len(changes)]
+    out: Array = changes * np.array(sizes)[:, None]
+    return out
+
+
+def budget_rows(fit: Findings, effect: Effect) -> Iterator[tuple[str, float, Array, str]]:
+    """Yield name, standard uncertainty, sensitivity (q,) with its sign, and note of each line of the budget.
+
+    Many parts share a line, whose sensitivity is their root sum of squares and has no sign.
+    """
+    changes = effect.changes(fit)
+    own = {c.source: c for c in fit.corrections}
+    if len(effect.names) != len(changes) or (len(changes) > APART and not own.keys() & set(effect.names)):
+        together = f"root sum of squares of {len(changes)} independent errors"
+        note = "; ".join(filter(None, [effect.note, together if len(changes) > 1 else ""]))
+        yield effect.source, effect.size, np.sqrt(np.sum(changes**2, axis=0)) if len(changes) > 1 else changes[0], note
+        return
+    for name, change in zip(effect.names, changes, strict=True):
+        size = own[name].u if name in own else effect.size
+        yield name, size, change, "; ".join(filter(None, [effect.note, "corrected" if name in own else ""]))
+
+
+def correction_table(fit: Findings) -> list[dict[str, Any]]:
+    """Return the table of the corrections; none without."""
+    if not fit.corrections:
+        return []
+    return [
+        {
+            "title": "Corrections",
+            "caption": "Measured errors of the set-up, whose effect was taken out of the data before the fit; the "
+            "closed formulas use the data as they are.",
+            "columns": ["source", "value", "u", "unit"],
+            "rows": [[c.source, c.value, c.u, c.unit] for c in fit.corrections],
+        }
+    ]
