@@ -95,9 +95,9 @@ def test_effects_and_verdicts() -> None:
     second column is 1 % too small makes b 1 % too large.
     """
     found = line(60, 0.001)
-    one = found.change(0.1 * DPH)
-    small = found.change(dX=found.X * [0.0, 0.01])
-    assert small == pytest.approx([0.0, -0.01 * found.value[1]], abs=1e-12 * DPH)
+    one = found.error(0.1 * DPH)
+    small = found.error(dX=found.X * [0.0, 0.01])
+    assert found.gain @ small == pytest.approx([0.0, -0.01 * found.value[1]], abs=1e-12 * DPH)
     effects = [Effect("offset", 0.5, "1", one), Effect("scale of x", 0.0, "1", small)]
     limits = {"a": (0.0, 1.0), "b": (-0.1, None)}
     r = result(found, effects=effects, specification=limits, warnings=["Mind the step."])
@@ -141,7 +141,7 @@ def test_derived_quantities() -> None:
     assert c.value == pytest.approx([b / a])
     assert c.u == pytest.approx([math.sqrt((ub / a) ** 2 + (b / a**2 * ua) ** 2)], rel=1e-8)
     assert c.reported.half_width / c.u == pytest.approx(found.reported.half_width[:1] / ua)
-    assert c.change(0.02) == pytest.approx([-b / a**2 * 0.02], rel=1e-8)
+    assert c.gain @ c.error(0.02) == pytest.approx([-b / a**2 * 0.02], rel=1e-8)
     r = result(c)
     assert r.rank == 2 and len(r.coefficients) == 1 and r.coefficients[0].dof == 19.0
 

@@ -21,11 +21,12 @@ PHASES = {1: "static 3", 2: "mount 1", 3: "static 4", 4: "mount 2"}
 
 
 def setup(latitude: float = 45.75, **changes: Any) -> Any:
-    """TumbleSetup at ``latitude`` (deg) with the four attitudes of Hu 1981."""
+    """TumbleSetup at ``latitude`` (deg) with the four attitudes of Hu 1981; one model, without nuisances."""
     phi = math.radians(latitude)
     faces = frames.tumble_faces(phi)
     values: dict[str, Any] = {
         "latitude": phi, "gravity": 9.8, "k": K, "faces": {p: faces[n] for p, n in PHASES.items()},
+        "nuisances": False,
         "labels": PHASES, "modes": {p: "rate" if n.startswith("mount") else "dwell" for p, n in PHASES.items()},
     }  # fmt: skip
     return reduction.TumbleSetup(**{**values, **changes})

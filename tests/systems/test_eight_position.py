@@ -327,7 +327,7 @@ def test_days_of_turn_on(session: Session, command: Command, tmp_path: Path) -> 
     assert by["R_y"].interval[1] - by["R_y"].estimate == pytest.approx(half)
     p = {t.name: t.p for t in result.tests}
     assert p["day to day, R_y"] < 1e-6 and p["day to day, u_x"] > 1e-3
-    assert len(result.tables[0]["rows"]) == 8
+    assert len(next(t for t in result.tables if t["title"] == "Estimates by day")["rows"]) == 8
 
     day = {p.phase: 1 + [f.name for f in folders].index(p.day) for p in combined.run.plan}
     again = from_file(command, tmp_path / "lab", laboratory(combined, day=day))
