@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL, assess_conformity, worst_verdict
+from gyrobench.reduction.loops.loop_summary import Sentence
 from gyrobench.result import BudgetLine, Coefficient, Result
 
 SOURCE = "coupling step"
@@ -76,7 +77,8 @@ def apply_step(result: Result, check: Mapping[str, Any]) -> None:
     if result.verdict == before:
         result.verdict = worst_verdict(c.verdict for c in result.coefficients)
     _correlate(result, old, parts)
-    if result.summary and worst is not None and worst > NOTED:
+    stated = any("±" in s and not isinstance(s, Sentence) for s in result.summary)  # the others are renewed
+    if stated and worst is not None and worst > NOTED:
         result.summary.append("These are without the effect of the communication step; the table has it in u.")
     warning = _warning(result, rows, float(check["step"]))
     if warning:

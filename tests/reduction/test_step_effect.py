@@ -10,6 +10,7 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.loop_summary import renew, told
 from gyrobench.reduction.step_effect import apply_step, step_effects, step_text
 from gyrobench.result import Coefficient, DriftTestResult, LoopResult
 from gyrobench.system.system import load_system
@@ -67,6 +68,15 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     assert r.summary == []  # nothing was said before
     assert [b.source for b in r.budget] == ["noise and evaluation", "coupling step"]
     assert r.step_check["rows"][0]["ratio"] == pytest.approx(change / 0.3) == r.step_check["worst"]
+
+
+def test_sentences_that_are_renewed_need_no_note() -> None:
+    """u = 0.3 and a part of 0.4: the sentence has U = 0.98 as the table, and nothing is said of a missing effect."""
+    r = loop_result(coefficient(10.0, 0.3))
+    r.summary = told(r.coefficients, "It is {m}.")
+    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": 0.4 * math.sqrt(3.0)}]})
+    renew(r)
+    assert r.summary == ["It is 10.00 ± 0.98 (95 %)."]
 
 
 def test_the_warning_says_what_to_do() -> None:

@@ -96,7 +96,8 @@ def _gain(found: LoopFindings, loop: str) -> str:
 def isolation(found: LoopFindings, name: str, output: str, axis: int = 1, plus: str | None = None) -> list[str]:
     """Return how much smaller a motion of the base is on the platform, at 1 Hz and at worst, and what carries it over.
 
-    name: of the response "ratio".  output, plus: its channels, see LoopFindings.ratio.
+    name: of the response "ratio", whose uncertainty is that of the noise.  output, plus: its channels, see
+    LoopFindings.ratio.
     """
     measured = next((r for r in found.responses if r.name == name and r.kind == "ratio"), None)
     if measured is None or not all(y > 0.0 for y in measured.y):
@@ -108,11 +109,11 @@ def isolation(found: LoopFindings, name: str, output: str, axis: int = 1, plus: 
     text = f"Base motion at {measured.x[k]:.3g} Hz reaches the platform {_attenuated(measured, k)}"
     if 20.0 * math.log10(measured.y[worst] / measured.y[k]) > SAME:
         text += f", at {measured.x[worst]:.3g} Hz, the worst of the sweep, {_attenuated(measured, worst)}"
-    text += " (95 %)" if "±" in text else ""
+    text += " (95 %, noise only)" if "±" in text else ""
     by = limiting(found, output, measured.x[k], axis, plus, measured.y[k])
     dry = friction_of(found.record.run)
     cause = f"; it is carried over {by}" if by else f"; dry friction ({dry}) is beyond the linear model" if dry else ""
-    return [f"{text}{cause}."]
+    return [Sentence(f"{text}{cause}.", ())]
 
 
 def _attenuated(r: Response, k: int) -> str:
