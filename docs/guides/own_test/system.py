@@ -33,7 +33,7 @@ class SixPosition(RebalanceTest):
         groups = [Group("six positions", np.arange(rate.size), w["t_start"] / 60.0, "time", "min")]
         found = fit([Quantity.drift(n, true.get(n)) for n in NAMES], columns, rate - k * w["mean"], w["t_start"],
                     w["t_end"], groups, "drift rate", "°/h", units.factor("deg/h"))  # fmt: skip
-        scale = Effect("torquer scale factor", run.options["u_scale_factor"], "1", found.change(-k * w["mean"]))
+        scale = Effect("torquer scale factor", run.options["u_scale_factor"], "1", found.error(-k * w["mean"]))
         return linear_result(found, system=self.name, title=self.title, method="Least squares over six positions",
                              sources=[], equation='omega_d = omega_"IA" - k i', conventions=["k i = ω_IA − ω_d"],
                              effects=[scale], specification=specification, site=site.shown(),
