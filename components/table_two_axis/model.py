@@ -23,9 +23,11 @@ class TableTwoAxis(Component):
 
         w <- R w + q' e        alpha <- R alpha - q' e x (R w) + q'' e        f <- R f
 
-    omega is the exact derivative of the attitude and alpha that of omega, wobble included.
+    omega is the exact derivative of the attitude and alpha that of omega, wobble included.  Each axis reads
 
-    Not modelled: servo error and bandwidth, bearing torque, sag under load, encoder errors other than the quantum,
+        q_read = q + a_1 sin(q + p_1) + a_2 sin(2 q + p_2), rounded to the quantum
+
+    Not modelled: servo error and bandwidth, bearing torque, sag under load, encoder errors of other orders,
     acceleration of the mounted instrument (it stands where the axes meet), time of a change of mount.
     Source: Hu 1981, eq. 3-47, 3-94..3-99, section 5.4; frames: CONV-FRAMES, TUM2AX-GEOM, SERVO2-A.
     """
@@ -42,6 +44,8 @@ class TableTwoAxis(Component):
     wobble = Parameter([0.0, 0.0], "rad", "wobble amplitude of the outer and the inner axis", min=0.0, max=0.1)
     wobble_order = Parameter([2, 2], int, "its cycles per turn", min=1, max=1000)
     wobble_phase = Parameter([0.0, 0.0], "rad", "its phase at angle 0")
+    encoder_amplitude = Parameter([[0.0, 0.0], [0.0, 0.0]], "rad", "encoder error; rows: axes, columns: orders 1 and 2")
+    encoder_phase = Parameter([[0.0, 0.0], [0.0, 0.0]], "rad", "their phases at angle 0")
     quantum = Parameter(0.0, "rad", "quantum of both readings; 0: none", min=0.0)
 
     f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
@@ -56,8 +60,8 @@ class TableTwoAxis(Component):
     angle_y = Output("rad", "inner angle, cumulative")
     rate_x = Output("rad/s", "outer rate")
     rate_y = Output("rad/s", "inner rate")
-    angle_x_read = Output("rad", "outer angle rounded to the quantum")
-    angle_y_read = Output("rad", "inner angle rounded to the quantum")
+    angle_x_read = Output("rad", "outer angle as its encoder reads it")
+    angle_y_read = Output("rad", "inner angle as its encoder reads it")
     omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
     alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
     f = Output("m/s2", "specific force, face axes", shape=(3,))
@@ -111,8 +115,14 @@ class TableTwoAxis(Component):
             "inner axis: {asked} rad is beyond limits_y, it has run against its stop",
         )
 
-    def rounded(self, angle: Number) -> Number:
-        return self.quantum * floor(angle / self.quantum + 0.5) if self.quantum > 0.0 else angle
+    def indicated(self, axis: Number, angle: Number) -> Number:
+        """Return the angle as the encoder of the axis (0 outer, 1 inner) reads it."""
+        seen = angle
+        for k in range(2):
+            size = self.encoder_amplitude[index(axis)][k]
+            if size != 0.0:
+                seen = seen + size * sin((k + 1) * angle + self.encoder_phase[index(axis)][k])
+        return self.quantum * floor(seen / self.quantum + 0.5) if self.quantum > 0.0 else seen
 
     def outputs(self) -> None:
         # elementary rotations from the base to the plate: axis (0 X, 1 Y, 2 Z), angle and its derivatives
@@ -162,6 +172,6 @@ class TableTwoAxis(Component):
         self.angle_y = self.inner.x
         self.rate_x = self.outer.v
         self.rate_y = self.inner.v
-        self.angle_x_read = self.rounded(self.outer.x)
-        self.angle_y_read = self.rounded(self.inner.x)
+        self.angle_x_read = self.indicated(0.0, self.outer.x)
+        self.angle_y_read = self.indicated(1.0, self.inner.x)
         self.in_position = self.outer.arrived * self.inner.arrived

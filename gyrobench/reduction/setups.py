@@ -144,6 +144,7 @@ class TumbleSetup(RebalanceSetup):
     labels: Mapping[int, str] = field(default_factory=dict)
     modes: Mapping[int, str] | None = None
     tilt: bool | None = None
+    u_wobble: float = 0.0
     u_angle1: float = 0.0
     u_angle2: float = 0.0
 

@@ -1,9 +1,9 @@
 """Type B uncertainties of the eight positions: each source's effect on every coefficient, by perturbing the model.
 
 An attitude error turns the gyro by a small angle about one of its axes in one position (independent: the squares of
-the eight add up) or in all of them (mount).  Largest: W eps, 7.3e-4 deg/h for 10 arcsec.  A latitude error delta
-changes k by -tan(latitude) delta relative.  Not modelled: products of gravity components that an attitude error lets
-in (D_xy eps and the like), drift of the meters.
+the eight add up; an error of the index head is one of them) or in all of them (mount).  Largest: W eps, 7.3e-4 deg/h
+for 10 arcsec.  A latitude stated too large by delta changes k by -tan(latitude) delta relative.  Not modelled: products
+of gravity components that an attitude error lets in (D_xy eps and the like), drift of the meters.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from . import model, positions
 
 Array = NDArray[np.float64]
 SMALL = 1e-5  # rad
+STATED = "positive where the stated one is too large"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -44,6 +45,12 @@ def attitude_error(
     return found.error(D @ lin.start - dw)
 
 
+def own_sources(channel: str) -> tuple[str, str, str]:
+    """Zero, resolution and nonlinearity of the current about ``channel``, which the other channel does not have."""
+    meter = f"of the {channel} current meter"
+    return f"zero {meter}", f"resolution {meter}", f"nonlinearity of the torquer about {channel}"
+
+
 def effects(
     channel: str, setup: model.Setup, found: Findings, lin: model.Linear, current: Array, position: NDArray[np.int_]
 ) -> list[Effect]:
@@ -60,20 +67,22 @@ def effects(
     full = float(np.max(np.abs(current))) or 1.0
     offset = found.error(-lin.k0)
     quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
+    zero, resolution, nonlinearity = own_sources(channel)
     return [
         Effect(
             "attitude of each position", setup.u_attitude, "rad", alone,
             "about each axis, the positions independent of one another",
+            tuple(f"position {n} about {axis}" for n in every for axis in AXES),
         ),
         *(
             Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turn(axis, every))
             for axis in AXES
         ),
-        Effect("latitude", setup.u_latitude, "rad", found.error(-dw) / SMALL),
-        Effect(f"zero of the {channel} current meter", setup.u_current, "A", offset),
-        Effect(f"resolution of the {channel} current meter", quantum, "A", offset, "as if never dithered"),
+        Effect("latitude", setup.u_latitude, "rad", found.error(dw) / SMALL, STATED),
+        Effect(zero, setup.u_current, "A", offset),
+        Effect(resolution, quantum, "A", offset, "as if never dithered"),
         Effect(
-            f"nonlinearity of the torquer about {channel}", setup.u_nonlinearity, "1",
+            nonlinearity, setup.u_nonlinearity, "1",
             found.error(-lin.k0 * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),

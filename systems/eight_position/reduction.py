@@ -144,10 +144,11 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     jitter = 0.4 * (np.arange(position.size) / max(position.size - 1, 1) - 0.5)  # side by side, by time
     shown = Group(f"current about {channel}", order, (position + jitter)[order], "position", "")
     found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH)
-    found = corrected(found, budget.effects(channel, setup, found, lin, current, position), setup.corrections)
-    other = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
+    other = budget.own_sources("y" if channel == "x" else "x")
+    found = corrected(found, budget.effects(channel, setup, found, lin, current, position), setup.corrections, other)
+    each = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
     found.f_test(
-        "positions", other, "differences between positions that the model does not hold",
+        "positions", each, "differences between positions that the model does not hold",
         "the positions differ by more than the model and the noise: attitude errors or terms left out",
         "the model explains all eight positions",
     )  # fmt: skip

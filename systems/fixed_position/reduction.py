@@ -23,7 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, repeatability
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
@@ -35,6 +35,7 @@ __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 Array = NDArray[np.float64]
 DPH, DEG = units.factor("deg/h"), units.factor("deg")
 LEAST = 8  # readings
+STATED = "positive where the stated one is too large"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +89,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
                 candidates=nuisances.temperature(windows) if setup.nuisances else ())  # fmt: skip
+    found = corrected(found, _effects(setup, found, i), setup.corrections)
     trend = found.f_test(
         "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",
         "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
@@ -130,12 +132,12 @@ def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
         text = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(rate), text))
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate), text))
     offset = found.error(-s.k)
     return [
         *turned,
-        Effect("latitude", s.u_latitude, "rad", found.error(by_latitude)),
-        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current), "relative"),
+        Effect("latitude", s.u_latitude, "rad", found.error(by_latitude), STATED),
+        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current), f"relative, {STATED}"),
         Effect("offset of the current reading", s.u_current, "A", offset),
         Effect("resolution of the current reading", s.quantum / 12.0**0.5, "A", offset, "as if never dithered"),
     ]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.attitudes import attitude_problems, parse
-from gyrobench.system.families.option_groups import ATTITUDE, NUISANCES, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.plan import Phase, Plan
@@ -38,6 +38,7 @@ class FixedPosition(RebalanceTest):
         }
         | TORQUER
         | NUISANCES
+        | CORRECTIONS
         | type_b("attitude", "latitude", "scale_factor", "current")
     )
     measured_data = MEASURED

@@ -207,11 +207,17 @@ def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
     for axis, name in ((1, "output"), (2, "spin")):
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(rate)))
+        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate)))
     whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
     return [
         *turned,
-        Effect("latitude", s.u_latitude, "rad", found.error(float(by_latitude))),
+        Effect(
+            "latitude",
+            s.u_latitude,
+            "rad",
+            found.error(float(by_latitude)),
+            "positive where the stated one is too large",
+        ),
         Effect("angle between first and last reading", s.u_angle, "rad", whole),
         Effect("float gain H/C", s.u_float_gain, "1", found.error(-coupled), "Earth rate along the spin axis times b"),
     ]

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, frames
+from gyrobench import frames
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings
@@ -84,7 +84,10 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
         ),
         Effect("angle error, once a turn", setup.u_angle1, "rad", angles(1), "encoder", SINES),
         Effect("angle error, twice a turn", setup.u_angle2, "rad", angles(2), "encoder", SINES),
-        Effect("torquer scale factor", setup.u_scale_factor, "1", read(current), "relative, the same for all currents"),
+        Effect(
+            "torquer scale factor", setup.u_scale_factor, "1", read(current),
+            "relative, positive where the stated one is too large",
+        ),
         Effect(
             "torquer nonlinearity", setup.u_nonlinearity, "1", read(current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
@@ -95,31 +98,11 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
 
 
 def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findings) -> Array:
-    """Changes (2, p) by a table that goes round a cone twice a turn, per rad: q = (cos a, sin a, 0) in table axes at
-    angle 0, a = 2 theta and 2 theta + 90 degrees, as of the part axis_wobble.
-
-    The table then sees v - q x v of a vector v, and turns with q' besides; the reduction knows of neither.
-    """
-    theta = turning.nodes()
-    c, s = np.cos(theta), np.sin(theta)
-    turn = ((turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start))[:, None]
-
-    def seen(v: Array) -> Array:  # along the gyro axes, of (n, 12, 3) in table axes at angle 0
-        x, y, z = (v[..., k] for k in range(3))
-        return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
-
+    """Errors (2, n) by a table axis that wobbles, at the phases 0 and 90 degrees, per rad."""
     names = found.est.names[: found.X.shape[1]]
     terms = tuple(n for n in names if n != TILT)
-    up = np.broadcast_to(setup.base @ np.array([0.0, 0.0, -setup.gravity / frames.G0]), (*theta.shape, 3))
-    earth = setup.base @ (setup.earth_rate * frames.pole(setup.latitude))
-    still = drift.regressors(seen(up), terms)
-    changes = []
-    for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
-        q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
-        going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
-        rate = window_regressors.average(seen(going - np.cross(q, earth)))  # what is there and not believed
-        dX = window_regressors.average(still - drift.regressors(seen(up - SMALL * np.cross(q, up)), terms)) / SMALL
-        if TILT in names:
-            dX = np.column_stack([dX, rate[:, 1]])
-        changes.append(found.error(-rate[:, 0], dX))
-    return np.array(changes)
+    errors = []
+    for rate, dX in window_regressors.wobbles(turning, setup.base, setup.site, terms, SMALL):
+        believed = np.column_stack([dX, rate[:, 1]]) if TILT in names else dX
+        errors.append(found.error(-rate[:, 0], believed))
+    return np.array(errors)

@@ -20,7 +20,6 @@ class TumbleSetup(setups.TumbleSetup):
     k: float
     terms: int = 9
     quantum: float = 0.0
-    u_wobble: float = 0.0
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> TumbleSetup:

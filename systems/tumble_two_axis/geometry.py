@@ -33,12 +33,34 @@ def base(latitude: float) -> Array:
     return np.array([p, inner, np.cross(p, inner)])
 
 
-def attitude(latitude: float, outer: Array, inner: Array, squareness: float = 0.0) -> Array:
-    """Gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]"""
-    cx, sx, cy, sy = np.cos(outer), np.sin(outer), np.cos(inner), np.sin(inner)
-    one, zero = np.ones_like(cx), np.zeros_like(cx)
-    x = np.array([[one, zero, zero], [zero, cx, sx], [zero, -sx, cx]]).transpose(2, 0, 1)
-    y = np.array([[cy, zero, -sy], [zero, one, zero], [sy, zero, cy]]).transpose(2, 0, 1)
+def _turned(axis: int, angle: Array) -> Array:
+    """Passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
+    j, m = (axis + 1) % 3, (axis + 2) % 3
+    R = np.zeros((angle.size, 3, 3))
+    R[:, axis, axis] = 1.0
+    R[:, j, j] = R[:, m, m] = np.cos(angle)
+    R[:, j, m] = np.sin(angle)
+    R[:, m, j] = -R[:, j, m]
+    return R
+
+
+def _wobble(axis: int, angle: Array, size: float, phase: float) -> Array:
+    """Rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part table_two_axis."""
+    a = 2.0 * angle + phase
+    return _turned((axis + 2) % 3, size * np.sin(a)) @ _turned((axis + 1) % 3, size * np.cos(a))
+
+
+def attitude(
+    latitude: float, outer: Array, inner: Array, squareness: float = 0.0,
+    wobble: tuple[float, float] = (0.0, 0.0), phase: float = 0.0,
+) -> Array:  # fmt: skip
+    """Gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]
+
+    wobble: of the outer and the inner axis, twice a turn, at this phase at angle 0.
+    """
+    x, y = _turned(0, outer), _turned(1, inner)
+    if any(wobble):
+        x, y = x @ _wobble(0, outer, wobble[0], phase), y @ _wobble(1, inner, wobble[1], phase)
     out: Array = FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude)
     return out
 

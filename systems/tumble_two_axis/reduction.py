@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
@@ -56,6 +56,9 @@ class TwoAxisSetup(RebalanceSetup):
     harmonic: bool = False
     quantum: float = 0.0
     u_square: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+    u_wobble: float = 0.0
 
 
 def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
@@ -258,17 +261,29 @@ def _cycle_test(found: Findings, theta: Array) -> None:
 def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Array, current: Array) -> list[Effect]:
     earth = frames.earth_rate_local(s.latitude, s.earth_rate)
 
-    def changed(other: Array) -> Array:
+    def believed(other: Array) -> Array:  # the gyro axes are C, and are taken for these
         return found.error((other - C)[:, 0] @ earth, _design(s, other) - found.X) / SMALL
 
     def tilted(direction: Array) -> Array:
-        return changed(C @ frames.rotation(direction, SMALL).T)
+        return -believed(C @ frames.rotation(direction, SMALL).T)
 
     def mounted(direction: Array) -> Array:
-        return changed(frames.rotation(direction, SMALL) @ C)
+        return believed(frames.rotation(direction, SMALL) @ C)
+
+    def read(axis: int, n: int) -> Array:  # an encoder that reads too much by sin n q, and by cos n q
+        q = (outer, inner)[axis]
+        wrong = [q + SMALL * wave(n * q) for wave in (np.sin, np.cos)]
+        both = [(w, inner) if axis == 0 else (outer, w) for w in wrong]
+        return np.array([believed(geometry.attitude(s.latitude, *angles)) for angles in both])
+
+    def wobbling(axis: int) -> Array:
+        sizes = (SMALL * (axis == 0), SMALL * (axis == 1))
+        turned = [geometry.attitude(s.latitude, outer, inner, 0.0, sizes, p) for p in (0.0, math.pi / 2.0)]
+        return -np.array([believed(one) for one in turned])
 
     axes = geometry.base(s.latitude)
-    square = changed(geometry.attitude(s.latitude, outer, inner, SMALL))
+    square = -believed(geometry.attitude(s.latitude, outer, inner, SMALL))
+    names = ("outer", "inner")
     full, one = float(np.max(np.abs(current))) or 1.0, np.ones_like(current)
     return [
         Effect("outer axis off the pole, about east", s.u_axis, "rad", tilted(axes[2])),
@@ -278,9 +293,18 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
             Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
             for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)
         ),
+        *(
+            Effect(f"{name} angle error, {often} a turn", size, "rad", read(k, n), "encoder", SINES)
+            for n, often, size in ((1, "once", s.u_angle1), (2, "twice", s.u_angle2))
+            for k, name in enumerate(names)
+        ),
+        *(
+            Effect(f"wobble of the {name} axis, twice a turn", s.u_wobble, "rad", wobbling(k), "unknown phase", PHASES)
+            for k, name in enumerate(names)
+        ),
         Effect(
             "torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current),
-            "relative, the same for all currents",
+            "relative, positive where the stated one is too large",
         ),
         Effect(
             "torquer nonlinearity", s.u_nonlinearity, "1", found.error(-s.k * current * np.abs(current) / full),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings, Group
 
 from . import geometry
@@ -73,6 +73,12 @@ def left_out(
     ]
 
 
+def own_sources(c: str) -> tuple[str, str, str, str]:
+    """Scale factor and nonlinearity of the torquer that measures a channel, zero and resolution of its current."""
+    torquer, meter = f"of the torquer about {OTHER[c]}", f"of the {OTHER[c]} current meter"
+    return f"scale factor {torquer}", f"nonlinearity {torquer}", f"zero {meter}", f"resolution {meter}"
+
+
 def effects(
     s: TwoChannelSetup, c: str, found: Findings, turning: window_regressors.Turning, current: Array
 ) -> list[Effect]:
@@ -85,7 +91,8 @@ def effects(
         return found.error(drate, dX) / SMALL
 
     def tilted(direction: Array) -> Array:
-        return geometric(s.base @ frames.rotation(direction, SMALL).T, turning)
+        # the reduction believes the axis to be where it is not
+        return -geometric(s.base @ frames.rotation(direction, SMALL).T, turning)
 
     def mounted(direction: Array) -> Array:
         return geometric(s.base, replace(turning, face=frames.rotation(direction, SMALL) @ turning.face))
@@ -93,9 +100,18 @@ def effects(
     def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
         return np.array([geometric(s.base, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
 
+    def wobbling() -> Array:
+        names = geometry.terms(s.model, c)
+        errors = []
+        for rates, dX in window_regressors.wobbles(turning, s.base, s.site, names, SMALL):
+            believed = np.column_stack([dX, rates[:, 2]]) if s.tilt else dX
+            errors.append(found.error(-rates[:, axis], believed))
+        return np.array(errors)
+
     k, full = s.k[OTHER[c]], float(np.max(np.abs(current))) or 1.0
     quantum = s.quantum.get(OTHER[c], 0.0)
     one = np.ones_like(current)
+    scale_factor, nonlinearity, zero, resolution = own_sources(c)
     return [
         Effect("table axis off the pole, about east", s.u_axis, "rad", tilted(s.base[0])),
         Effect("table axis off the pole, about p × east", s.u_axis, "rad", tilted(s.base[1])),
@@ -103,19 +119,20 @@ def effects(
             Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
             for n, d in zip("xyz", np.eye(3), strict=True)
         ),
+        Effect("wobble of the table axis, twice a turn", s.u_wobble, "rad", wobbling(), "", PHASES),
         Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder", SINES),
         Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder", SINES),
         Effect(
-            "torquer scale factor", s.u_scale_factor, "1", found.error(-k * current),
-            "relative, the same for all currents",
+            scale_factor, s.u_scale_factor, "1", found.error(-k * current),
+            "relative, positive where the stated one is too large",
         ),
         Effect(
-            "torquer nonlinearity", s.u_nonlinearity, "1", found.error(-k * current * np.abs(current) / full),
+            nonlinearity, s.u_nonlinearity, "1", found.error(-k * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect("offset of the current reading", s.u_current, "A", found.error(-k * one)),
+        Effect(zero, s.u_current, "A", found.error(-k * one)),
         Effect(
-            "resolution of the current reading", quantum / 12.0**0.5, "A", found.error(-k * one),
+            resolution, quantum / 12.0**0.5, "A", found.error(-k * one),
             "as if never dithered",
         ),
     ]  # fmt: skip

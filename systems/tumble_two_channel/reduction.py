@@ -96,7 +96,8 @@ def _channel(
         evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
         candidates=_candidates(s, c, phase, turning, windows),
     )  # fmt: skip
-    found = corrected(found, evidence.effects(s, c, found, turning, current), s.corrections)
+    other = evidence.own_sources(OTHER[c])
+    found = corrected(found, evidence.effects(s, c, found, turning, current), s.corrections, other)
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
     if s.model == "nine" and s.fold:

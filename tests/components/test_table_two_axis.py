@@ -144,12 +144,17 @@ def test_omega_and_alpha_are_derivatives(errors):
 
 
 # --------------------------------------------------------------------------------------------- motion
-def test_each_axis_moves_as_table_rate():
+def test_each_axis_moves_as_table_rate_and_is_read_as_it():
+    wrong = [
+        {"encoder_amplitude": [3e-3, -2e-3], "encoder_phase": [0.4, 1.1]},
+        {"encoder_amplitude": [1e-3, 4e-3], "encoder_phase": [-0.3, 2.0]},
+    ]
+    both = {name: [one[name] for one in wrong] for name in wrong[0]}
     commands = [(2.0, 0.2), (1.0, 1.5), (2.0, -0.3), (0.0, 0.0), (1.0, -0.2)]
-    part = started(acceleration=[0.4, 0.2], index_rate=[0.1, 0.3], angle0=[0.3, -0.1], quantum=1e-4)
+    part = started(acceleration=[0.4, 0.2], index_rate=[0.1, 0.3], angle0=[0.3, -0.1], quantum=1e-4, **both)
     lone = [
-        TableRate(acceleration=0.4, index_rate=0.1, angle0=0.3, quantum=1e-4),
-        TableRate(acceleration=0.2, index_rate=0.3, angle0=-0.1, quantum=1e-4),
+        TableRate(acceleration=0.4, index_rate=0.1, angle0=0.3, quantum=1e-4, **wrong[0]),
+        TableRate(acceleration=0.2, index_rate=0.3, angle0=-0.1, quantum=1e-4, **wrong[1]),
     ]
     for one in lone:
         one.initialize()

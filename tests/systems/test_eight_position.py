@@ -195,6 +195,30 @@ def test_budget_predicts_a_turned_gyro(session: Session) -> None:
         assert abs(shift) == pytest.approx(lines.get(n, 0.0), rel=0.1, abs=4e-5), n
 
 
+def test_corrections_of_one_position_and_of_one_meter(session: Session) -> None:
+    """Position 3 turned by 60 arcsec about its z axis: W cos phi eps less along x; both faults are taken out, and the zero of
+    one meter leaves the other channel alone.
+    """
+    eps, values = 60.0 * DPH, {**SHORT, **QUIET}  # rad: 60 arcsec
+    faces = [np.asarray(f, dtype=float) for f in load().plan().faces.values()]
+    faces[2] = frames.rotation([0.0, 0.0, 1.0], eps).T @ faces[2]
+    wrong = {"sequencer.faces": [f.ravel().tolist() for f in faces]}
+    zero = 1e-6  # A
+    plain, record = named(reduced(session, values)), session.run({**values, **wrong})
+    windows = {**record.windows, "mean_x": record.windows["mean_x"] + zero}
+    source = f"attitude of each position (position 3 about z) = {eps!r}(1e-6) rad"
+    off, right = (
+        named(load().reduce(Record(windows, {}, record.run.replace(options={**record.run.options, "corrections": c}))))
+        for c in ("", f"{source}; zero of the x current meter = 1(0.1) uA")
+    )
+    k = plain["k_x"].estimate * 1e-3  # deg/h/uA
+    assert off["R_x"].estimate - plain["R_x"].estimate == pytest.approx(-k, rel=0.02)
+    shifts = {n: off[n].estimate - c.estimate for n, c in plain.items()}
+    assert abs(shifts["u_x"]) > 4e-4
+    for n, c in plain.items():
+        assert abs(right[n].estimate - c.estimate) < 2e-5, (n, shifts[n])
+
+
 # ------------------------------------------------------------------------------------------ refusals
 REFUSED = [
     ({"latitude": math.radians(86.0)}, "to 85° north or south"),

@@ -159,6 +159,21 @@ def test_budget_by_hand(session: Session) -> None:
     assert shift == pytest.approx(north * eps, rel=0.1)
 
 
+def test_a_measured_attitude_is_taken_out(session: Session) -> None:
+    """Input axis up, the gyro turned about its output axis (east) by 60 arcsec: I gains -N, the Earth rate along it
+    falls by W cos phi eps, and what is missing is taken for drift.  A gyro without g terms.
+    """
+    eps, phi = 60.0 * DPH, math.radians(50.0)
+    values = {**SHORT, **QUIET, "latitude": phi, "attitude": "U E", **{f"gyro.{n}": 0.0 for n in drift.terms(9)}}
+    wrong = {**values, "gyro.mount": frames.rotation([0.0, 1.0, 0.0], eps).T.tolist()}
+    text = f"gyro turned about its output axis = {eps!r}(1e-6) rad"
+    (plain,), (off,), (right,) = (
+        reduced(session, v).coefficients for v in (values, wrong, {**wrong, "corrections": text})
+    )
+    assert off.estimate - plain.estimate == pytest.approx(W * math.cos(phi) * eps / DPH, rel=1e-3)
+    assert right.estimate == pytest.approx(plain.estimate, abs=1e-5)
+
+
 # ------------------------------------------------------------------------------------------ refusals
 def test_refusals(session: Session) -> None:
     for values, said in (

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from servoing import DAY50, DPH, QUIET, W50
+from tumbling import WOBBLE
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.system.sockets import Connector, Socket
 from gyrobench.system.system import Slot, System, load_system
 
 NAME = "servo_polar"
@@ -63,20 +63,7 @@ class Wobbling(type(load_system(NAME))):  # type: ignore[misc]
 
     slots: ClassVar[dict[str, Slot]] = {
         **load_system(NAME).slots,
-        "wobble": Slot(
-            Socket(
-                "Wobble",
-                "wobble of the table axis",
-                (
-                    Connector("angle", "input", "rad", "table angle"),
-                    Connector("f_base", "input", "m/s2", "specific force", (3,)),
-                    Connector("omega_base", "input", "rad/s", "inertial rate", (3,)),
-                    Connector("f", "output", "m/s2", "specific force, wobbling axes", (3,)),
-                    Connector("omega", "output", "rad/s", "inertial rate, wobbling axes", (3,)),
-                ),
-            ),
-            "axis_wobble",
-        ),
+        "wobble": Slot(WOBBLE, "axis_wobble"),
     }
     wires = load_system(NAME).wires.replace(
         "stand -> table: f=f_local omega=omega_local",

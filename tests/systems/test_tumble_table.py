@@ -5,18 +5,16 @@ formula says, and the error budget of a run without the error has said it before
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
-from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet
+from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet, wobbling
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.result import Result
-from gyrobench.system.part_values import PartValues
-from gyrobench.system.sockets import Connector, Socket
-from gyrobench.system.system import Slot, System
+from gyrobench.system.system import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 PHI = math.radians(45.75)
@@ -116,53 +114,6 @@ def test_encoder_in_phase_once_a_turn(session: Session, plain: Result) -> None:
     check(shift, dict(zip(NAMES, predicted, strict=True)), 0.1)
 
 
-class Wobbling(type(load())):  # type: ignore[misc]
-    """The test with the part axis_wobble before the table, and before that a stand along whose axes it wobbles: those
-    of the table, which needs no base of its own.
-    """
-
-    slots: ClassVar[dict[str, Slot]] = {
-        **load().slots,
-        "stand": Slot(
-            Socket(
-                "PolarStand",
-                "the polar axes of the table",
-                (
-                    Connector("f_face", "input", "m/s2", "specific force, ENU", (3,)),
-                    Connector("omega_face", "input", "rad/s", "Earth rate, ENU", (3,)),
-                    Connector("f", "output", "m/s2", "specific force, polar axes", (3,)),
-                    Connector("omega", "output", "rad/s", "Earth rate, polar axes", (3,)),
-                ),
-            ),
-            "fixture",
-        ),
-        "wobble": Slot(
-            Socket(
-                "Wobble",
-                "wobble of the table axis",
-                (
-                    Connector("angle", "input", "rad", "table angle"),
-                    Connector("f_base", "input", "m/s2", "specific force", (3,)),
-                    Connector("omega_base", "input", "rad/s", "inertial rate", (3,)),
-                    Connector("f", "output", "m/s2", "specific force, wobbling axes", (3,)),
-                    Connector("omega", "output", "rad/s", "inertial rate, wobbling axes", (3,)),
-                ),
-            ),
-            "axis_wobble",
-        ),
-    }
-    wires = load().wires.replace(
-        "site -> table: f=f_local omega=omega_local",
-        "site -> stand: f=f_face omega=omega_face\n    stand -> wobble: f=f_base omega=omega_base\n"
-        "    wobble -> table: f=f_local omega=omega_local\n    table -> wobble: angle",
-    )
-
-    def parameters(self, parts: PartValues) -> dict[str, Any]:
-        east, p_cross_east = 1, -5  # directions of the part fixture
-        mount = {"stand.mounts[1,1]": east, "stand.mounts[1,2]": p_cross_east, "stand.latitude": self["latitude"]}
-        return {**super().parameters(parts), "table.base": np.eye(3), "wobble.axis": 3, **mount}
-
-
 @pytest.mark.parametrize("phase", [0.0, HALF])
 def test_wobble(phase: float) -> None:
     """The axis goes round a cone of A twice a turn.  Its rate, 2 A a' (-sin(2a + p), cos(2a + p)), stands along the
@@ -170,9 +121,7 @@ def test_wobble(phase: float) -> None:
     phase with X it is D_I by -2 A R/(gamma c), with p = 90 degrees D_OS by -2 A R/(gamma2 s c).  What tilted gravity
     and Earth rate add is of the order W/R = 1/274, and of the drift.  The budget has it all.
     """
-    base = load()
-    system = Wobbling()
-    system.name, system.folder = base.name, base.folder
+    system = wobbling(load())
     with Session(system) as session:
         before = tumble(session, system, u_wobble=WOBBLE)
         found = tumble(session, system, wobble__amplitude=WOBBLE, wobble__phase=phase)

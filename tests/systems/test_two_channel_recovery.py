@@ -106,8 +106,8 @@ def test_halving_the_step_and_engines(session: Session) -> None:
     ("gyro turned about its x axis", "u_mount", 1.0), ("gyro turned about its y axis", "u_mount", 1.0),
 ])  # fmt: skip
 def test_set_up_errors_shift_as_the_budget_predicts(session: Session, source: str, option: str, arcsec: float) -> None:
-    """Put into the parts, they move the coefficients by what the budget names, within 10 %.  (A seed whose noise is
-    taken for white with and without the error: else the weights change too, by less than 0.2 u.)
+    """Put into the parts, they move the coefficients, with sign, by what the budget names, within 10 %.  (A seed whose
+    noise is taken for white with and without the error: else the weights change too, by less than 0.2 u.)
     """
     size = float(np.radians(arcsec / 3600.0))
     values = {**SHORT, option: size, "nuisances": "none"}  # the budget is of one model
@@ -121,13 +121,12 @@ def test_set_up_errors_shift_as_the_budget_predicts(session: Session, source: st
     }[source]  # fmt: skip
     system = load().with_values(values)
     plain, off = (system.reduce(session.run({**values, **v}, seed=33)) for v in ({}, more))
-    lines = {b.coefficient: b.contribution for b in plain.budget if b.source == source}
-    largest = max(lines.values())
+    lines = {b.coefficient: b.sensitivity * size for b in plain.budget if b.source == source}
+    largest = max(map(abs, lines.values()))
     assert largest > 4e-3  # W times 60 arcsec is 0.0044 deg/h, the table rate times 1 arcsec 0.015 deg/h
     for a, b in zip(plain.coefficients, off.coefficients, strict=True):
-        assert abs(b.estimate - a.estimate) == pytest.approx(lines.get(a.name, 0.0), rel=0.1, abs=0.05 * largest), (
-            a.name
-        )
+        shift = b.estimate - a.estimate
+        assert shift == pytest.approx(lines.get(a.name, 0.0), rel=0.1, abs=0.05 * largest), a.name
 
 
 @pytest.mark.parametrize(("order", "row"), [(1, 0), (1, 1), (2, 0), (2, 1)])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.system.system import System, load_system
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.sockets import Connector, Socket
+from gyrobench.system.system import Slot, System, load_system
 
 NAME = "tumble_single_axis"
 DPH = math.pi / 180.0 / 3600.0  # 1 deg/h in rad/s
@@ -79,3 +81,53 @@ def drift_in(face: str, values: dict[str, Any], latitude: float, gravity: float,
     xyz = frames.to_face(local, frames.tumble_faces(latitude)[face], frames.polar_base(latitude), angle)
     row = drift.regressors(xyz, NAMES)
     return float(sum(r * values[f"gyro.{n}"] for r, n in zip(row, NAMES, strict=True)))
+
+
+_STAND = Socket(
+    "PolarStand",
+    "the polar axes of the table",
+    (
+        Connector("f_face", "input", "m/s2", "specific force, ENU", (3,)),
+        Connector("omega_face", "input", "rad/s", "Earth rate, ENU", (3,)),
+        Connector("f", "output", "m/s2", "specific force, polar axes", (3,)),
+        Connector("omega", "output", "rad/s", "Earth rate, polar axes", (3,)),
+    ),
+)
+WOBBLE = Socket(
+    "Wobble",
+    "wobble of the table axis",
+    (
+        Connector("angle", "input", "rad", "table angle"),
+        Connector("f_base", "input", "m/s2", "specific force", (3,)),
+        Connector("omega_base", "input", "rad/s", "inertial rate", (3,)),
+        Connector("f", "output", "m/s2", "specific force, wobbling axes", (3,)),
+        Connector("omega", "output", "rad/s", "inertial rate, wobbling axes", (3,)),
+    ),
+)
+
+
+def wobbling(base: System) -> System:
+    """A tumble with the part axis_wobble before the table, and before that a stand along whose axes it wobbles: those
+    of the table, which needs no base of its own.
+    """
+
+    class Wobbling(type(base)):  # type: ignore[misc]
+        slots: ClassVar[dict[str, Slot]] = {
+            **base.slots,
+            "stand": Slot(_STAND, "fixture"),
+            "wobble": Slot(WOBBLE, "axis_wobble"),
+        }
+        wires = base.wires.replace(
+            "site -> table: f=f_local omega=omega_local",
+            "site -> stand: f=f_face omega=omega_face\n    stand -> wobble: f=f_base omega=omega_base\n"
+            "    wobble -> table: f=f_local omega=omega_local\n    table -> wobble: angle",
+        )
+
+        def parameters(self, parts: PartValues) -> dict[str, Any]:
+            east, p_cross_east = 1, -5  # directions of the part fixture
+            mount = {"stand.mounts[1,1]": east, "stand.mounts[1,2]": p_cross_east, "stand.latitude": self["latitude"]}
+            return {**super().parameters(parts), "table.base": np.eye(3), "wobble.axis": 3, **mount}
+
+    system: System = Wobbling()
+    system.name, system.folder = base.name, base.folder
+    return system

@@ -18,6 +18,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from gyrobench import drift
 from gyrobench.frames import G0, pole
+from gyrobench.reduction.run_metadata import Site
 
 Array = NDArray[np.float64]
 NODES, _WEIGHTS = leggauss(12)
@@ -112,3 +113,34 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
     out: Array = earth + turning.face[:, axis, 2] * table
     return out
+
+
+def wobbles(
+    turning: Turning, base: Array, site: Site, names: tuple[str, ...], size: float
+) -> list[tuple[Array, Array]]:  # fmt: skip
+    """Return what a table axis that goes round a cone twice a turn does, per rad, at the phases 0 and 90 degrees.
+
+    Rates (n, 3) along the gyro axes that are there beside those of a true axis, and means (n, p) of the regressors of a
+    true axis less those that are there.  The cone: q = (cos a, sin a, 0) in table axes at angle 0, a = 2 theta and 2
+    theta + 90 degrees, as of the part axis_wobble; the table then sees v - q x v of a vector v, and turns with q'
+    besides.
+    """
+    theta = turning.nodes()
+    c, s = np.cos(theta), np.sin(theta)
+    turn = ((turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start))[:, None]
+
+    def seen(v: Array) -> Array:  # along the gyro axes, of (n, 12, 3) in table axes at angle 0
+        x, y, z = (v[..., k] for k in range(3))
+        return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
+
+    up = np.broadcast_to(base @ np.array([0.0, 0.0, -site.g]), (*theta.shape, 3))
+    earth = base @ (site.earth_rate * pole(site.latitude))
+    still = drift.regressors(seen(up), names)
+    found = []
+    for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
+        q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
+        going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
+        rate = average(seen(going - np.cross(q, earth)))
+        dX = average(still - drift.regressors(seen(up - size * np.cross(q, up)), names)) / size
+        found.append((rate, dX))
+    return found

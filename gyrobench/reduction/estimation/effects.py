@@ -35,8 +35,9 @@ class Effect:
     """One source of type B: its standard uncertainty, and what the data are wrong by for one unit of it.
 
     error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
-    reduction knows nothing of it; (m, n) for m errors of this size that have nothing to do with one another, which
-    ``parts`` names.  values: (q,) change of the reported values, of a source that is not in the data.
+    reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
+    (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
+    change of the reported values, of a source that is not in the data.
     """
 
     source: str
@@ -74,16 +75,18 @@ class Correction:
     unit: str
 
 
-def corrected(found: Findings, effects: Sequence[Effect], text: str) -> Findings:
+def corrected(found: Findings, effects: Sequence[Effect], text: str, elsewhere: Sequence[str] = ()) -> Findings:
     """Return the fit of the data less the errors that ``text`` states, :data:`FORM`.
 
-    Raises ReductionError for text of another form, and for a source or unit that the test does not have.
+    elsewhere: sources of another channel, whose corrections are left to it.  Raises ReductionError for text of another
+    form, and for a source or unit that the test does not have.
     """
     if not text.strip():
         return found
     errors = {n: row for e in effects if e.names for n, row in zip(e.names, np.atleast_2d(e.error), strict=True)}  # type: ignore[arg-type]
     unit = {n: e.unit for e in effects for n in e.names}
-    taken = [_read(one, unit) for one in text.split(";") if one.strip()]
+    stated = [one for one in text.split(";") if one.strip()]
+    taken = [_read(one, unit) for one in stated if one.rpartition("=")[0].strip() not in elsewhere]
     if len({c.source for c in taken}) < len(taken):
         raise ReductionError(f"corrections: a source stands twice in '{text}'")
     again = found.without(sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
