@@ -196,8 +196,8 @@ def test_budget_predicts_a_turned_gyro(session: Session) -> None:
 
 
 def test_corrections_of_one_position_and_of_one_meter(session: Session) -> None:
-    """Position 3 turned by 60 arcsec about its z axis: W cos phi eps less along x; both faults are taken out, and the zero of
-    one meter leaves the other channel alone.
+    """Position 3 turned by 60 arcsec about its z axis: W cos phi eps less along x; both faults are taken out, and the
+    zero of one meter leaves the other channel alone.
     """
     eps, values = 60.0 * DPH, {**SHORT, **QUIET}  # rad: 60 arcsec
     faces = [np.asarray(f, dtype=float) for f in load().plan().faces.values()]
