@@ -140,3 +140,26 @@ def test_wobble_of_the_two_channel_tumble(row: int) -> None:
     source = "wobble of the table axis, twice a turn"
     right = reduced(system, record, f"{source} (phase {(0, 90)[row]}°) = {size}(1e-7) rad")
     check(plain, wrong, right, told(plain, source, row))
+
+
+def test_each_torquer_and_each_meter_is_corrected_by_itself() -> None:
+    """The scale factor of the torquer about y stated too large by 1e-3, its meter reading 1 uA too much: both are of
+    the x channel, whose Dx_0 falls by k times 1 uA (0.0172 deg/h); the y channel does not know of them.
+    """
+    base = two_channels.load()
+    values = {**two_channels.SHORT, **two_channels.quiet(base), **two_channels.gyro(np.random.default_rng(4))}
+    values |= {"nuisances": "none", "gyro.white_x": 1e-9, "gyro.white_y": 1e-9}
+    with Session(base) as prepared:
+        record = prepared.run(values)
+    k = float(record.run.parameters["gyro.k_y"])
+    plain = base.reduce(record)
+    windows = {**record.windows, "mean_y": record.windows["mean_y"] + 1e-6}
+    run = record.run.replace(options={**record.run.options, "k_y": 1.001 * k})
+    off = reduced(base, Record(windows, {}, run))
+    known = "scale factor of the torquer about y = 1e-3(1e-5); zero of the y current meter = 1(0.1) uA"
+    right = reduced(base, Record(windows, {}, run), known)
+    shift = {c.name: off[c.name].estimate - c.estimate for c in plain.coefficients}
+    assert shift["Dx_0"] == pytest.approx(-k * 1e-6 / DPH, rel=0.1)
+    for c in plain.coefficients:
+        assert abs(right[c.name].estimate - c.estimate) < 3e-5, c.name
+        assert c.name.startswith("Dx") or shift[c.name] == 0.0
