@@ -195,6 +195,19 @@ def test_budget_predicts_a_turned_gyro(session: Session) -> None:
         assert abs(shift) == pytest.approx(lines.get(n, 0.0), rel=0.1, abs=4e-5), n
 
 
+def test_a_latitude_stated_too_large(session: Session) -> None:
+    """By delta: W cos phi is taken for less, and k by tan phi delta with it; the budget says so with sign."""
+    delta, phi = 1e-4, math.radians(45.75)
+    record = session.run({**SHORT, **QUIET, "latitude": phi, "u_latitude": delta})
+    stated = record.run.replace(options={**record.run.options, "latitude": phi + delta})
+    plain, off = load().reduce(record), named(load().reduce(Record(record.windows, {}, stated)))
+    lines = {b.coefficient: b.sensitivity * delta for b in plain.budget if b.source == "latitude"}
+    k = named(plain)["k_x"].estimate
+    assert off["k_x"].estimate - k == pytest.approx(-math.tan(phi) * delta * k, rel=1e-2)
+    for c in plain.coefficients:
+        assert off[c.name].estimate - c.estimate == pytest.approx(lines.get(c.name, 0.0), rel=0.02, abs=1e-6), c.name
+
+
 def test_corrections_of_one_position_and_of_one_meter(session: Session) -> None:
     """Position 3 turned by 60 arcsec about its z axis: W cos phi eps less along x; both faults are taken out, and the
     zero of one meter leaves the other channel alone.

@@ -17,6 +17,7 @@ from gyrobench import drift, frames
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
+from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
@@ -121,6 +122,26 @@ def test_budget_by_hand(session: Session) -> None:
     span = next(r[1] for r in result.tables[-1]["rows"] if r[0] == "time between them")
     assert lines["latitude"] == pytest.approx(W * math.cos(phi) / DPH * eps, rel=1e-3)
     assert lines["angle between first and last reading"] == pytest.approx(1.0 / span, rel=1e-2)  # 1 arcsec/s = 1 deg/h
+
+
+def test_signs_of_attitude_and_latitude(session: Session) -> None:
+    """Input axis up, output axis east, a gyro without g terms.  Turned about its output axis the input axis gains -N: W
+    cos phi eps less of the Earth rate, taken for drift.  A latitude stated too large: W cos phi eps too much of it.
+    """
+    eps, phi = 1e-4, math.radians(40.0)
+    values = {**SHORT, **QUIET, **{f"gyro.{n}": 0.0 for n in drift.terms(9)}, "attitude": "U E", "latitude": phi}
+    values |= {"u_latitude": eps, "u_attitude": eps}
+    record = session.run(values)
+    plain = load().reduce(record)
+    stated = load().reduce(
+        Record(record.windows, {}, record.run.replace(options={**record.run.options, "latitude": phi + eps}))
+    )
+    turned = reduced(session, {**values, "gyro.mount": frames.rotation([0.0, 1.0, 0.0], eps).T.tolist()})
+    size = W * math.cos(phi) / DPH * eps
+    for other, source in ((stated, "latitude"), (turned, "gyro turned about its output axis")):
+        line = next(b for b in plain.budget if b.source == source)
+        assert line.sensitivity * eps == pytest.approx(size, rel=1e-3)
+        assert other.coefficients[0].estimate - plain.coefficients[0].estimate == pytest.approx(size, rel=2e-2)
 
 
 # ------------------------------------------------------------------------------------------ refusals
