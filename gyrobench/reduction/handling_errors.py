@@ -88,18 +88,20 @@ def examined(candidates: Callable[[Record], Iterable[Candidate]]) -> Callable[[R
     def decorate(reduce: Reduce) -> Reduce:
         @functools.wraps(reduce)
         def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
+            if not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
+                return reduce(record, specification)
             try:
                 result = reduce(record, specification)
             except GyrobenchError as error:
-                if record.run.measured and (named := _cures(reduce, candidates(record))):
+                if named := _cures(reduce, candidates(record)):
                     hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
                     raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
                 raise
             reference, plain = result, record
-            if _hides(result, record) and (record.run.measured or _contradicted(result)):
+            if _hides(result, record):
                 plain = with_options(record, PLAIN)
                 reference = _undone(reduce, plain) or result
-            if _suspicious(reference, record.run.measured):
+            if _suspicious(reference):
                 _diagnose(result, reference, reduce, list(candidates(plain)))
             return result
 
@@ -124,10 +126,10 @@ def _contradicted(result: DriftTestResult) -> bool:
     return any(reason != NO_TYPE_B for reason in result.withheld)
 
 
-def _suspicious(result: DriftTestResult, measured: bool) -> bool:
+def _suspicious(result: DriftTestResult) -> bool:
     if result.residual_std <= 0.0 or str(result.noise.get("model", "")).startswith("none"):
         return False
-    return _contradicted(result) or (measured and (_correlated(result) or result.dof < FEW))
+    return _contradicted(result) or _correlated(result) or result.dof < FEW
 
 
 def _correlated(result: DriftTestResult) -> bool:

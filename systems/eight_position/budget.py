@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.linear_fit import Findings
 
 from . import model, positions
@@ -56,11 +56,9 @@ def effects(
 ) -> list[Effect]:
     """All sources with their sensitivities for one current (A); sizes come from ``setup`` and may be 0."""
 
-    def turn(axis: str, numbers: tuple[int, ...]) -> Array:
-        return attitude_error(channel, setup, found, lin, position, turned(axis, SMALL, numbers)) / SMALL
-
     every = tuple(positions.ATTITUDES)
-    alone = np.array([turn(axis, (n,)) for n in every for axis in AXES])
+    turns = {a: attitude_error(channel, setup, found, lin, position, turned(a, SMALL, every)) / SMALL for a in AXES}
+    alone = np.vstack([one_by_one(turn, position) for turn in turns.values()])
     step = replace(setup, latitude=setup.latitude + SMALL)
     d0, d1 = (model.directions(position, s.latitude) for s in (setup, step))
     dw = model.rate(channel, d1, setup.earth_rate) - model.rate(channel, d0, setup.earth_rate)
@@ -75,7 +73,7 @@ def effects(
             tuple(f"position {n} about {axis}" for n in every for axis in AXES),
         ),
         *(
-            Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turn(axis, every))
+            Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turns[axis])
             for axis in AXES
         ),
         Effect("latitude", setup.u_latitude, "rad", found.error(dw) / SMALL, STATED),

@@ -145,7 +145,9 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     shown = Group(f"current about {channel}", order, (position + jitter)[order], "position", "")
     found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH)
     other = budget.own_sources("y" if channel == "x" else "x")
-    found = corrected(found, budget.effects(channel, setup, found, lin, current, position), setup.corrections, other)
+    found = corrected(
+        found, lambda f: budget.effects(channel, setup, f, lin, current, position), setup.corrections, other
+    )
     each = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
     found.f_test(
         "positions", each, "differences between positions that the model does not hold",

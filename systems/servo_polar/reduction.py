@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, fit
 from gyrobench.reduction.window_checks import ReductionError
@@ -77,14 +77,16 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
     except ReductionError as error:
         raise ReductionError([*error.problems, refusals.turned_words(held, phase, labels)]) from None
-    sizes, columns = run_metadata.sizes(run.options, SIZES), lambda h: model.columns(h, site)
-    of_setup = servo_regression.effects(held, site, found, columns, phase, sizes)
-    found = corrected(found, of_setup, str(run.options.get("corrections", "")))
+    sizes = run_metadata.sizes(run.options, SIZES)
+
+    def effects_of(found: Findings) -> list[Effect]:
+        return servo_regression.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
+
+    found = corrected(found, effects_of, str(run.options.get("corrections", "")))
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)
     statistics = _composite(found, labels, phase, held, site)
-    effects = servo_regression.effects(held, site, found, columns, phase, sizes)
     together = {n: model.words(n, book=True) for n in model.fitted}
     warnings = refusals.unseen(route, mounts, which)
     missing = [n for n in drift.NAMES if n not in model.names and (truth or {}).get(n, 0.0) != 0.0]
@@ -107,7 +109,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             *servo_regression.CONVENTIONS,
             "Harmonics: a cosine, b sine of θ; Hu 1981 has them the other way.",
         ),
-        effects=effects,
+        effects=effects_of(found),
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.run_metadata import Site
 
@@ -34,15 +34,11 @@ def effects(
     """
     y, X = seen.inertial(site)[:, channel], seen.design(site, names)
 
-    def moved(other: Track, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
-        dy, dX = np.zeros_like(y), np.zeros_like(X)
-        dy[rows] = (other.inertial(site)[:, channel] - y)[rows]
-        dX[rows] = (other.design(site, names) - X)[rows]
-        return found.error(dy, dX) / SMALL
+    def moved(other: Track) -> Array:
+        return found.error(other.inertial(site)[:, channel] - y, other.design(site, names) - X) / SMALL
 
     def mount(k: int) -> Array:
-        turned = replace(seen, base=_turned(k) @ seen.base)
-        return -np.array([moved(turned, phase == p) for p in np.unique(phase)])
+        return one_by_one(-moved(replace(seen, base=_turned(k) @ seen.base)), phase)
 
     def read(axis: int, error: Callable[[Array], Array], slope: Callable[[Array], Array]) -> Array:
         angle, rate = seen.angle.copy(), seen.rate.copy()

@@ -11,6 +11,7 @@ Not modelled: change of the coefficients with time (mount against mount shows it
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +25,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.merge_channels import merge
@@ -77,9 +78,8 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             quantities, X[c], rates[:, j], seen.t_start, seen.t_end, _groups(phase, labels, seen), "drift rate", "°/h",
             DPH, noise="readings", limit=1e6,
         )  # fmt: skip
-        names, sizes = drift.terms_2dof(c, terms), run_metadata.sizes(run.options, budget.SIZES)
-        effects = budget.effects(j, found[c], seen, phase, site, names, sizes)
-        found[c] = corrected(found[c], effects, str(run.options.get("corrections", "")))
+        effects_of = functools.partial(_effects, j, seen, phase, site, run, drift.terms_2dof(c, terms))
+        found[c] = corrected(found[c], effects_of, str(run.options.get("corrections", "")))
         _mount_test(found[c], phase)
         results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, run, terms, truth, specification)
     tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]
@@ -98,6 +98,13 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         " ".join(f"{c} channel: {found[c].noise_sentence()}" for c in "xy"),
     ]
     return run_metadata.finish(result, record)
+
+
+def _effects(
+    channel: int, seen: Track, phase: NDArray[np.int_], site: run_metadata.Site, run: RunDocument,
+    names: tuple[str, ...], found: Findings,
+) -> list[Effect]:  # fmt: skip
+    return budget.effects(channel, found, seen, phase, site, names, run_metadata.sizes(run.options, budget.SIZES))
 
 
 def _problems(
@@ -155,7 +162,7 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=CONVENTIONS,
-        effects=budget.effects(j, found, seen, phase, site, names, run_metadata.sizes(run.options, budget.SIZES)),
+        effects=_effects(j, seen, phase, site, run, names, found),
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

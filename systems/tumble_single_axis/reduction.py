@@ -87,7 +87,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         DPH,
         candidates=_candidates(setup, turning, phase, windows),
     )
-    found = corrected(found, budget.effects(setup, turning, current, found), setup.corrections)
+    found = corrected(found, lambda f: budget.effects(setup, turning, current, f), setup.corrections)
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
     turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
     turns.test()

@@ -94,7 +94,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
         "drift rate", "°/h", DPH, candidates=nuisances.common(windows) if s.nuisances else (),
     )  # fmt: skip
-    found = corrected(found, _effects(s, found, outer, inner, C, current), s.corrections)
+    found = corrected(found, lambda f: _effects(s, f, outer, inner, C, current), s.corrections)
     _model_test(found, theta)
     _cycle_test(found, theta)
     warnings = []

@@ -97,7 +97,7 @@ def _channel(
         candidates=_candidates(s, c, phase, turning, windows),
     )  # fmt: skip
     other = evidence.own_sources(OTHER[c])
-    found = corrected(found, evidence.effects(s, c, found, turning, current), s.corrections, other)
+    found = corrected(found, lambda f: evidence.effects(s, c, f, turning, current), s.corrections, other)
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
     if s.model == "nine" and s.fold:

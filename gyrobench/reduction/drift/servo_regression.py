@@ -14,6 +14,7 @@ rate along y and z at angle 0; 5e-7 deg/h at most, nothing with the table axis a
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,7 +26,7 @@ from gyrobench import drift, frames
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.run_metadata import Site
 from gyrobench.reduction.window_checks import ReductionError
@@ -61,10 +62,21 @@ class Held:
         out: Array = (self.angle_end - self.angle_start) / (self.t_end - self.t_start)
         return out
 
+    @functools.cached_property
+    def nodes(self) -> Array:
+        """Angles (n, 12) at which the windows are averaged."""
+        return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
+
+    def turned(self, **axes_or_body: Array) -> Held:
+        """The same windows on other axes or of another gyro."""
+        other = replace(self, **axes_or_body)
+        other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
+        return other
+
     def seen(self, local: Array) -> Array:
         """Return a vector in ENU in gyro axes at the 12 nodes of each window: (n, 12, 3)."""
         v = self.axes @ local
-        a = window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
+        a = self.nodes
         c, s = np.cos(a), np.sin(a)
         x, y, z = (v[:, k, None] for k in range(3))
         out: Array = np.stack([np.broadcast_to(x, a.shape), c * y + s * z, c * z - s * y], axis=-1)
@@ -151,15 +163,11 @@ def effects(
     """
     y, X = drift_rate(held, site), columns(held)
 
-    def moved(other: Held, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
-        dy, dX = np.zeros_like(y), np.zeros_like(X)
-        dy[rows] = (drift_rate(other, site) - y)[rows]
-        dX[rows] = (columns(other) - X)[rows]
-        return fit.error(dy, dX) / SMALL
+    def moved(other: Held) -> Array:
+        return fit.error(drift_rate(other, site) - y, columns(other) - X) / SMALL
 
     def axis(k: int) -> Array:
-        tilted = replace(held, axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)
-        return np.array([moved(tilted, phase == p) for p in np.unique(phase)])
+        return one_by_one(moved(held.turned(axes=frames.rotation(np.eye(3)[k], SMALL) @ held.axes)), phase)
 
     def wobble() -> Array:  # q about y, z is (cos, sin) of 2 theta + phase, as of the part axis_wobble
         middle = held.angle_start + held.angle_end
@@ -168,7 +176,7 @@ def effects(
             q = np.column_stack([np.zeros_like(a), np.cos(a), np.sin(a)])
             # the reduction takes the axis as still: against the axis as it is, it is turned by -q
             turned = held.axes + SMALL * np.cross(q[:, None, :], np.swapaxes(held.axes, 1, 2)).swapaxes(1, 2)
-            cases.append(moved(replace(held, axes=turned)))
+            cases.append(moved(held.turned(axes=turned)))
         return np.array(cases)
 
     def order(n: int) -> Array:
@@ -187,7 +195,7 @@ def effects(
         return np.array([-y, z])  # a mass along z pulls with its weight along y, one along y against that along z
 
     def mount(k: int) -> Array:
-        return moved(replace(held, body=frames.rotation(np.eye(3)[k], SMALL)))
+        return moved(held.turned(body=frames.rotation(np.eye(3)[k], SMALL)))
 
     each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [

@@ -1,7 +1,7 @@
 """Sources of type B: what an error of the set-up does to the data, and measured errors, which are taken out of them.
 
     effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.error(-k * current))]
-    found = corrected(found, effects, "torquer scale factor = 1.2e-4 (2e-5)")
+    found = corrected(found, lambda f: [Effect(...)], "torquer scale factor = 1.2e-4 (2e-5)")
 
 A correction is linear in the error, as the budget is; what the data are wrong by is taken from them and the fit made
 again, noise model included, so a known error neither biases the coefficients nor widens their intervals.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,14 +75,17 @@ class Correction:
     unit: str
 
 
-def corrected(found: Findings, effects: Sequence[Effect], text: str, elsewhere: Sequence[str] = ()) -> Findings:
-    """Return the fit of the data less the errors that ``text`` states, :data:`FORM`.
+def corrected(
+    found: Findings, effects_of: Callable[[Findings], Sequence[Effect]], text: str, elsewhere: Sequence[str] = ()
+) -> Findings:
+    """Return the fit of the data less the errors that ``text`` states, :data:`FORM`; effects_of: the test's sources.
 
     elsewhere: sources of another channel, whose corrections are left to it.  Raises ReductionError for text of another
     form, and for a source or unit that the test does not have.
     """
     if not text.strip():
         return found
+    effects = effects_of(found)
     errors = {n: row for e in effects if e.names for n, row in zip(e.names, np.atleast_2d(e.error), strict=True)}  # type: ignore[arg-type]
     unit = {n: e.unit for e in effects for n in e.names}
     stated = [one for one in text.split(";") if one.strip()]
@@ -109,6 +112,11 @@ def _read(text: str, unit: dict[str, str]) -> Correction:
     if not given[1] >= 0.0:
         raise ReductionError(f"corrections: {source}: its standard uncertainty {match['u']} must not be negative")
     return Correction(source, given[0], given[1], unit[source])
+
+
+def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:
+    """Return an error (n,) of the data as errors (m, n) of its m groups of rows, each by itself; ``group``: (n,)."""
+    return np.array([np.where(group == g, error, 0.0) for g in np.unique(group)])
 
 
 def standard_changes(fit: Findings, effect: Effect) -> Array:
