@@ -70,7 +70,7 @@ def effects(
         Effect(
             "attitude of each position", setup.u_attitude, "rad", alone,
             "about each axis, the positions independent of one another",
-            tuple(f"position {n} about {axis}" for n in every for axis in AXES),
+            tuple(f"position {n} about {axis}" for axis in AXES for n in np.unique(position)),
         ),
         *(
             Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turns[axis])

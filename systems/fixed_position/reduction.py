@@ -89,7 +89,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
                 candidates=nuisances.temperature(windows) if setup.nuisances else ())  # fmt: skip
-    found = corrected(found, _effects(setup, found, i), setup.corrections)
+    found = corrected(found, lambda f: _effects(setup, f, i), setup.corrections)
     trend = found.f_test(
         "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",
         "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
