@@ -99,7 +99,8 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     code, _, err = gyrobench("compare", "a", "c")
     assert code == 0 and "runs of different systems (estimator_bench, other)" in err
     code, out, err = gyrobench("compare", "c", "a")
-    assert code == 0 and [line.split()[:2] for line in out.splitlines()[1:3]] == [["1", "c"], ["2", "a"]]
+    rows = out[out.index("ratio to the smallest") :].splitlines()[1:3]
+    assert code == 0 and ["c" in rows[0].split(), "a" in rows[1].split()] == [True, True]
 
 
 def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Call) -> None:
@@ -122,8 +123,11 @@ def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
     for data, message in (
         (("# operator = M\xfcller\n" + head).encode("latin-1"), "row 1: not UTF-8 text; save the table as CSV (UTF-8)"),
         ((head + "1;17\n").encode("utf-16"), "row 1: not UTF-8 text"),
-        ((head + "1,5;17;17\n").encode(), "'1,5' is not a finite number; the decimal sign is a point"),
-        ((head + "1;17\n" * 30).encode(), "row 9: 2 cells, the header has 3\n  - and 22 more rows\n"),
+        ((head + "1,5;17;17\n").encode(), "1 currents: at least 3 are needed"),  # a decimal comma is one
+        (
+            (head + "1;17\n" * 30).encode(),
+            "rows 2, 3, 4, 5, 6, 7, 8, 9 and 22 more (30 rows): 2 cells, the header has 3\n",
+        ),
     ):
         Path("t.csv").write_bytes(data)
         code, out, err = gyrobench(*reduce)

@@ -26,10 +26,11 @@ PHASES = {
 
 
 def setup(latitude: float = 45.75, model: str = "nine", **changes: Any) -> Any:
-    """TwoChannelSetup at ``latitude`` (deg) with the attitudes of Hu 1981."""
+    """TwoChannelSetup at ``latitude`` (deg) with the attitudes of Hu 1981; one model, without nuisances."""
     phi = math.radians(latitude)
     faces, phases = geometry.faces(model, phi), PHASES[model]
     values: dict[str, Any] = {
+        "nuisances": False,
         "latitude": phi, "gravity": 9.8, "k": K, "model": model, "faces": {p: faces[n] for p, n in phases.items()},
         "labels": phases, "modes": {p: "rate" if n.startswith("mount") else "dwell" for p, n in phases.items()},
     }  # fmt: skip
