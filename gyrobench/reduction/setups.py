@@ -66,7 +66,7 @@ class SiteSetup(Setup):
         site = Site.of(run)
         place: dict[str, Any] = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
         place["robust"] = bool(run.options.get("robust", False))
-        place["nuisances"] = choice(run, "nuisances", ("auto", "none"), "auto") == "auto"
+        place["nuisances"] = weighed(run)
         return super().of(run, specification, **{**place, **own})
 
     @property
@@ -227,6 +227,11 @@ def choice(run: RunDocument, option: str, known: tuple[str, ...], default: str) 
     if word not in known:
         raise ReductionError(f"{option} = {word}: unknown; available: {', '.join(known)}")
     return word
+
+
+def weighed(run: RunDocument) -> bool:
+    """Return the option nuisances: whether set-up effects are weighed.  Raises ReductionError."""
+    return choice(run, "nuisances", ("auto", "none"), "auto") == "auto"
 
 
 def scale_factor_problems(k: float, name: str = "k") -> list[str]:

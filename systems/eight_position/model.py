@@ -162,16 +162,17 @@ def made_of(name: str, setup: Setup) -> dict[str, float]:
 
 def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -> Findings:
     """The unknowns of :class:`Linear` in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
-    r, factor, offset = found.reported, np.ones(len(wanted)), np.zeros(len(wanted))
+    r, after = found.reported, found.quantities[len(wanted) :]  # effects of the nuisance model stay as they are
+    factor, offset = np.ones(r.value.size), np.zeros(r.value.size)
     offset[0] = k0
-    factor[4:] = np.array([1.0 / setup.gamma**2, 1.0 / setup.gamma])[: len(wanted) - 4]
+    factor[4 : len(wanted)] = np.array([1.0 / setup.gamma**2, 1.0 / setup.gamma])[: len(wanted) - 4]
     p = np.array(r.p)
     p[0] = 2.0 * special.stdtr(min(float(r.dof[0]), 1e9), -k0 / r.u[0]) if r.u[0] > 0.0 else 0.0
     values = Estimates(
         offset + factor * r.value, r.covariance * np.outer(factor, factor), r.u * factor, r.half_width * factor, p,
         r.dof, factor[:, None] * r.gain,
     )  # fmt: skip
-    return replace(found, quantities=tuple(wanted), reported=values)
+    return replace(found, quantities=(*wanted, *after), reported=values)
 
 
 def truth(setup: Setup) -> dict[str, float]:

@@ -7,7 +7,7 @@ weigh alike.  Repeats on several days are reduced day by day and then together.
 [TEST-8POS, POS8-MODEL+REDUCE, POS8-LS; Hu 1981, eq. 3-1..3-11, Table 3-1, corrected by E17-E19]
 
 Not modelled: products of two components of gravity (no position shows them), drift that changes over the cycles
-otherwise than as noise, motion between the positions.
+otherwise than evenly or as noise, motion between the positions.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation import repeatability, residual_series
+from gyrobench.reduction.estimation import nuisances, repeatability, residual_series
 from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, fit
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
@@ -106,14 +107,16 @@ def averaged(windows: Mapping[str, Array]) -> dict[str, Array]:
     keys = np.stack([np.asarray(windows[n]).astype(int) for n in ("cycle", "position")], axis=1)
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    found: dict[str, list[float]] = {n: [] for n in ("position", "t_start", "t_end", "mean_x", "mean_y")}
+    means = ["mean_x", "mean_y", *(n for n in windows if n.startswith("temperature"))]
+    found: dict[str, list[float]] = {n: [] for n in ("cycle", "position", "t_start", "t_end", *means)}
     for k in np.argsort(first):
         mine = np.flatnonzero(group.ravel() == k)
+        found["cycle"].append(int(keys[mine[0], 0]))
         found["position"].append(int(keys[mine[0], 1]))
         found["t_start"].append(float(t0[mine].min()))
         found["t_end"].append(float(t1[mine].max()))
-        for c in "xy":
-            found[f"mean_{c}"].append(float(np.average(windows[f"mean_{c}"][mine], weights=(t1 - t0)[mine])))
+        for n in means:
+            found[n].append(float(np.average(windows[n][mine], weights=(t1 - t0)[mine])))
     return {n: np.array(v) for n, v in found.items()}
 
 
@@ -143,7 +146,8 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     order = np.argsort(position, kind="stable")
     jitter = 0.4 * (np.arange(position.size) / max(position.size - 1, 1) - 0.5)  # side by side, by time
     shown = Group(f"current about {channel}", order, (position + jitter)[order], "position", "")
-    found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH)
+    weighed = _candidates(channel, data, setup, d, lin) if setup.nuisances else ()
+    found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH, candidates=weighed)
     other = budget.own_sources("y" if channel == "x" else "x")
     found = corrected(
         found, lambda f: budget.effects(channel, setup, f, lin, current, position), setup.corrections, other
@@ -176,6 +180,22 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
         closed_caption="Mean of the readings of each position in the corrected formulas 3-10, 3-11",
         warnings=_warnings(channel, setup),
     )
+
+
+def _candidates(channel: str, data: Mapping[str, Array], s: Setup, d: Array, lin: model.Linear) -> list[Candidate]:
+    """Set-up effects of a current: misalignment of its measuring axis towards the other one, trend, temperature and,
+    where the single readings are data, constants that differ from standing to standing.
+
+    Readings averaged by position and cycle hold one datum of each standing, whose scatter is in their white noise.
+    """
+    axes = "yx" if channel == "x" else "xy"  # the current about x measures the y channel
+    across = s.earth_rate * d[:, 0, "xyz".index(axes[1])]
+    text = f"misalignment of the {axes[0]} axis towards the {axes[1]} axis"
+    found = [Candidate.of(f"ε_{axes}", text, "arcsec", -across), *nuisances.common(data, f",{channel}")]
+    standing = list(zip(np.asarray(data["cycle"]).tolist(), np.asarray(data["position"]).tolist(), strict=True))
+    if len(set(standing)) < len(standing):
+        found.append(nuisances.scatter(f"σ_mount,{channel}", nuisances.MOUNTS, standing))
+    return found
 
 
 def _warnings(channel: str, s: Setup) -> list[str]:
@@ -211,6 +231,7 @@ def _summary(each: Mapping[str, DriftTestResult]) -> list[str]:
         f"Scale factors k_x = {_shown(c['k_x'])}, k_y = {_shown(c['k_y'])}.",
         f"Constant terms R_x = {_shown(c['R_x'])}, R_y = {_shown(c['R_y'])}.",
         f"Largest unbalance {worst.name} = {_shown(worst)}.",
+        *(f"{name}: {text}" for name, r in each.items() for text in r.summary),
     ]
 
 

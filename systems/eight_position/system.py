@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.plan import Phase, Plan
@@ -43,6 +43,7 @@ class EightPosition(TwoChannelTest):
             "terms": Option(6, int, "unknowns of a channel: 4 (Hu 1981) or 6 (with two compliance differences)", 4, 6),
         }
         | CORRECTIONS
+        | NUISANCES
         | type_b("latitude", "current", "nonlinearity", attitude="standard uncertainty of each position, about each "
                  "axis, independent", mount="standard uncertainty of the gyro in its fixture, about each axis")
     )  # fmt: skip

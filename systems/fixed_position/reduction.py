@@ -6,7 +6,7 @@ mean over the readings under a noise model estimated from them.  One attitude: n
 Repeats on several days are reduced day by day and then together (gyrobench.reduction.estimation.repeatability).
 [TEST-FIXED; Hu 1981, ch. 3 par. 2.2; RED-GLS]
 
-Not modelled: drift slower than the record beyond what the trend test shows, change of the attitude under load.
+Not modelled: drift slower than the record beyond a linear trend, change of the attitude under load.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.estimation import nuisances, repeatability
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
@@ -88,12 +88,9 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     share = drift.regressors(setup.xyz, names)
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
-                candidates=nuisances.temperature(windows) if setup.nuisances else ())  # fmt: skip
+                candidates=nuisances.common(windows) if setup.nuisances else ())  # fmt: skip
     found = corrected(found, lambda f: _effects(setup, f, i), setup.corrections)
-    trend = found.f_test(
-        "trend", ((middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9))[:, None], "drift that changes with time",
-        "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
-    )  # fmt: skip
+    trend = _trend(found, middle)
     result = linear_result(
         found,
         system="fixed_position",
@@ -109,9 +106,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         tables=[_table(setup, i, t0, t1, book)],
     )  # fmt: skip
     if trend is not None:
-        span = float(np.ptp(middle))
-        result.repeatability = {"trend over the record / (°/h)": float(trend[0][0]) / DPH,
-                                "u of it / (°/h)": float(trend[1][0]) / DPH, "record / s": span}  # fmt: skip
+        result.repeatability = {"trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
+                                "record / s": float(np.ptp(middle))}  # fmt: skip
     c = result.coefficients[0]
     result.summary = [
         f"Composite drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
@@ -120,6 +116,22 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         *found.nuisance_sentences(),
     ]
     return result
+
+
+def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
+    """Return the change of the drift over the record and its u, rad/s: of the nuisance model where the trend is in it,
+    else of an F test, which is added; None for ideal data.
+    """
+    span = max(float(np.ptp(middle)), 1e-9)
+    names = [q.name for q in found.quantities]
+    if "trend" in names:
+        j, hours = names.index("trend"), span / 3600.0
+        return float(found.value[j]) * hours, float(found.u[j]) * hours
+    tested = found.f_test(
+        "trend", ((middle - middle.mean()) / span)[:, None], "drift that changes with time",
+        "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
+    )  # fmt: skip
+    return None if tested is None else (float(tested[0][0]), float(tested[1][0]))
 
 
 def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:

@@ -30,6 +30,7 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Group, Quantity, fit
@@ -151,7 +152,11 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
     ones = np.ones((y.size, 1))  # the intervals share their readings, and so the errors of these
-    found = fit([wanted], ones, y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH, noise="readings")
+    between_readings = {n: (v[1:] + v[:-1]) / 2.0 for n, v in windows.items() if n.startswith("temperature")}
+    weighed = nuisances.common({**between_readings, "t_start": t[:-1], "t_end": t[1:]}) if setup.nuisances else []
+    found = fit(
+        [wanted], ones, y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH, noise="readings", candidates=weighed
+    )
     used = float(np.max(np.abs(theta - null)))
     coupled = float(cross @ dt) / span / max(setup.float_gain, 1e-9)
     result = linear_result(
@@ -183,6 +188,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         f"Drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
         f"Range of the pickoff used: {used / ARCSEC:.4g}″ of case angle{reach}.",
         found.noise_sentence("intervals"),
+        *found.nuisance_sentences(),
     ]
     return result
 

@@ -5,7 +5,7 @@
 Least squares over all windows, regressors averaged over each; noise white, Gauss-Markov and of the angle readings,
 estimated from the same record.  The formulas of Hu 1981 stand beside.  [TEST-SERVO-POLAR, TEST-COMPOSITE]
 
-Not modelled: change of the coefficients with time (turns compared show it); see
+Not modelled: change of the coefficients per g with time (turns compared show it); see
 gyrobench.reduction.drift.servo_regression.
 """
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, units
 from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import Effect, corrected
@@ -72,9 +72,12 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     book, fits, why = closed.reduce(start, end, t1 - t0, groups, site.latitude, site.g, site.earth_rate, route)
     truth = run_metadata.truth_of(run, drift.NAMES)
     fitted, reported = model.quantities(site, truth, book)
+    weighed = [] if not setups.weighed(run) else servo_regression.candidates(
+        held, site, lambda h: model.columns(h, site), phase, {n: np.asarray(v)[rows] for n, v in windows.items()}
+    )  # fmt: skip
     shown = [_group(labels, p, phase, held, site, model) for p in labels]
     try:
-        found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings")
+        found = fit(fitted, X, y, t0, t1, shown, "drift rate", "°/h", DPH, noise="readings", candidates=weighed)
     except ReductionError as error:
         raise ReductionError([*error.problems, refusals.turned_words(held, phase, labels)]) from None
     sizes = run_metadata.sizes(run.options, SIZES)
@@ -125,6 +128,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         harmonics=turns.harmonics(fits),
         repeatability=turns.repeatability(),
         warnings=warnings,
+        robust=bool(options.get("robust", False)),
     )  # fmt: skip
     result.summary = _summary(result, statistics, found)
     return run_metadata.finish(result, record)
@@ -219,4 +223,4 @@ def _summary(
         out.append(
             f"Random drift σ = {worst.sigma / DPH:.3g} °/h over windows of {worst.dT:g} s ({name}), correlation {time}."
         )
-    return [*out, found.noise_sentence()]
+    return [*out, found.noise_sentence(), *found.nuisance_sentences()]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.system.families.option_groups import CORRECTIONS, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, type_b
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
@@ -40,6 +40,7 @@ class ServoPolar(ServoTest):
             "terms": Option(9, int, "terms of the model: 4 (low grades), 8 (Hu 1981), 9 (with D_O)", 4, 9),
         }
         | CORRECTIONS
+        | NUISANCES
         | type_b("wobble", "angle1", "angle2")
     )
     shorter = "give that time, or turns=0 for as much of a turn as the time gives, or turns=1"

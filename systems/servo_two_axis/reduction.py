@@ -6,7 +6,7 @@ Each channel is a least squares problem of its own over all windows; rates and r
 (windows.py), the noise (white, Gauss-Markov, errors of shared readings) is estimated from the same record.  The Hu 1981
 route, its formulas at the middles of the windows, stands beside.  [TEST-SERVO2-2DOF]
 
-Not modelled: change of the coefficients with time (mount against mount shows it), noise common to both channels.
+Not modelled: change of the coefficients per g with time (mount against mount shows it), noise common to both channels.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 from gyrobench import drift, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import servo_regression
-from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
@@ -76,7 +77,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         quantities = [Quantity.drift(n, (truth or {}).get(n), book[n]) for n in drift.terms_2dof(c, terms)]
         found[c] = fit(
             quantities, X[c], rates[:, j], seen.t_start, seen.t_end, _groups(phase, labels, seen), "drift rate", "°/h",
-            DPH, noise="readings", limit=1e6,
+            DPH, noise="readings", limit=1e6, candidates=_candidates(run, record.windows, held, phase, c),
         )  # fmt: skip
         effects_of = functools.partial(_effects, j, seen, phase, site, run, drift.terms_2dof(c, terms))
         found[c] = corrected(found[c], effects_of, str(run.options.get("corrections", "")))
@@ -96,6 +97,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         f"Constant drift {' and '.join(f'{v[0].name} = {plus_minus(v[0])}' for v in first.values())}.",
         f"Largest drift per g: {linear.name} = {plus_minus(linear)}.",
         " ".join(f"{c} channel: {found[c].noise_sentence()}" for c in "xy"),
+        *(f"{c} channel: {text}" for c in "xy" for text in found[c].nuisance_sentences()),
     ]
     return run_metadata.finish(result, record)
 
@@ -105,6 +107,20 @@ def _effects(
     names: tuple[str, ...], found: Findings,
 ) -> list[Effect]:  # fmt: skip
     return budget.effects(channel, found, seen, phase, site, names, run_metadata.sizes(run.options, budget.SIZES))
+
+
+def _candidates(
+    run: RunDocument, windows: Mapping[str, Array], held: NDArray[np.bool_], phase: NDArray[np.int_], c: str
+) -> list[Candidate]:
+    """Set-up effects of a channel: trend, temperature, constants that differ from mount to mount.
+
+    A misalignment of the gyro on the plate is none of them: z stays among the stars, and what x and y see of it is
+    nearly what the coefficients of the other axis make (a line of the budget).
+    """
+    if not setups.weighed(run):
+        return []
+    rows = {n: np.asarray(v)[held] for n, v in windows.items()}
+    return [*nuisances.common(rows, f",{c}"), nuisances.scatter(f"σ_mount,{c}", nuisances.MOUNTS, phase.tolist())]
 
 
 def _problems(
@@ -167,6 +183,7 @@ def _channel(
         site=site.shown(),
         instrument=run.instrument,
         simulated=truth is not None,
+        robust=bool(run.options.get("robust", False)),
         closed_caption="The formulas of Hu 1981 at the middles of the same windows, ordinary least squares",
         warnings=warnings,
     )  # fmt: skip
@@ -195,7 +212,7 @@ def _groups(phase: NDArray[np.int_], labels: Mapping[int, str], seen: Track) -> 
 def _mount_test(found: Findings, phase: NDArray[np.int_]) -> None:
     """Is the constant drift that of the first mount in all others?"""
     others = np.unique(phase)[1:]
-    if others.size:
+    if others.size and not any(c.scatter for c, _ in found.joined):
         columns = (phase[:, None] == others).astype(float)
         found.f_test(
             "mount to mount", columns, "change of the constant drift between mounts",

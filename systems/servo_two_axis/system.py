@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.system.families.option_groups import CORRECTIONS, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM, physical_drift
 from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
 from gyrobench.system.families.servo_test import SITE_AND_STAND, TRACKING
@@ -60,6 +60,7 @@ class ServoTwoAxis(TableTest):
         }
         | TRACKING
         | CORRECTIONS
+        | NUISANCES
         | type_b("square", "angle1", "angle2", "wobble", "time", "mount", axis="standard uncertainty of each mount, "
                  "about each of its axes")
     )  # fmt: skip

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames, units
 from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.record import Record
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -60,7 +60,11 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     book = closed.formulas(means, site.g)
     truth = run_metadata.truth_of(run, drift.NAMES)
     quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
-    found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings")
+    weighed = [] if not setups.weighed(run) else servo_regression.candidates(
+        held, site, columns, phase, {n: np.asarray(v)[rows] for n, v in windows.items()}
+    )  # fmt: skip
+    found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings",
+                candidates=weighed)  # fmt: skip
     sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(run.options, SIZES)}
 
     def effects_of(found: Findings) -> list[Effect]:
@@ -112,10 +116,12 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             *composite.tables(statistics, DPH, "°/h"),
         ],
         warnings=warnings,
+        robust=bool(options.get("robust", False)),
     )  # fmt: skip
     result.summary = [
         *(f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {plus_minus(c)}." for c in result.coefficients[:2]),
         found.noise_sentence(),
+        *found.nuisance_sentences(),
     ]
     return run_metadata.finish(result, record)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL
-from gyrobench.system.families.option_groups import CORRECTIONS
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
@@ -40,6 +40,7 @@ class ServoVerticalLevel(ServoTest):
     options = (
         ServoTest.options
         | CORRECTIONS
+        | NUISANCES
         | {
             "attitudes": Option("six", str, "three, six, vertical, level, all, or names separated by semicolons"),
             "cycles": Option(2, int, "times the attitudes are gone through", 1, 12),

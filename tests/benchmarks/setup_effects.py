@@ -1,9 +1,11 @@
-"""How often the tumble's 95 % intervals hold the truth where the set-up is not ideal, with and without nuisance model.
+"""How often 95 % intervals hold the truth where the set-up is not ideal, with and without nuisance model.
 
     python tests/benchmarks/setup_effects.py [CASE ...] --runs 500 [--seed 1] [--white]
 
 No co-simulation: windows of the single-axis tumble are written from its equations (tests/reduction/coverage.py), with
-noise of the population (--white: white noise), a misalignment of the input axis, a ramp, constants from mount to mount.
+noise of the population (--white: white noise), a misalignment of the input axis, a ramp, constants from mount to mount,
+an encoder that is wrong once a turn, outliers.  The same of the polar servo test and of the eight positions (their x
+current): default plans, setup_plans.py.
 Standard deviation of a window 0.0022 deg/h; 72 windows a turn of 2.4 h, 10 in a dwell, as the default plan has them.
 Prints the coverage of each coefficient, and how wide the intervals are over those of clean records without candidates.
 """
@@ -11,18 +13,22 @@ Prints the coverage of each coefficient, and how wide the intervals are over tho
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
+import setup_plans
 from coverage import plan
 
 from gyrobench import drift, frames
-from gyrobench.reduction.estimation import noise, noise_mixture_fit, nuisances
+from gyrobench.reduction.estimation import noise, noise_mixture_fit, nuisances, outliers
+from gyrobench.reduction.estimation.linear_fit import fit
 
 SIGMA = 0.0022  # deg/h, of a window
 ARCSEC = np.pi / 180.0 / 3600.0
@@ -39,6 +45,9 @@ class Case:
     remount: float = 0.0  # deg/h, standard deviation from mount to mount
     slow: float = 0.0  # share of the variance of a window in drift with a correlation time of a quarter of the record
     order: tuple[int, ...] = ONCE
+    encoder: float = 0.0  # arcsec, times the sine of the table angle
+    outliers: float = 0.0  # share of the windows that are off by thirty standard deviations, either way
+    plan: str = "tumble"
 
 
 CASES = {
@@ -52,51 +61,98 @@ CASES = {
     "remount, mounts repeated": Case(remount=SIGMA, order=ONCE * 3),
     "remount, mounts once": Case(remount=SIGMA),
     "clean, mounts repeated": Case(order=ONCE * 3),
+    "encoder 30 arcsec": Case(encoder=30.0),
+    "outlier 1 in 100": Case(outliers=0.01),
+    **{
+        f"{plan}, {name}": replace(case, plan=plan)
+        for plan in setup_plans.PLANS
+        for name, case in {
+            "clean": Case(),
+            "tilt of 20 arcsec": Case(tilt=20.0),
+            "tilt of 100 arcsec": Case(tilt=100.0),
+            "ramp of 0.02 deg/h": Case(ramp=0.02),
+        }.items()
+    },
 }
 
 
 class Bench:
     """Records of one plan and their reduction."""
 
-    def __init__(self, order: tuple[int, ...] = ONCE, turn: int = 72, dwell: int = 10) -> None:
+    def __init__(self, order: tuple[int, ...] = ONCE, turn: int = 72, dwell: int = 10, of: str = "tumble") -> None:
+        self.readings, self.names = False, NAMES
+        if of in setup_plans.PLANS:
+            p = setup_plans.PLANS[of]()
+            self.t0, self.t1, self.X, self.names, self.readings = p.t0, p.t1, p.X, p.names, p.readings
+            self.turned = None
+            self._finish(p.tilt, p.mount, p.candidates)
+            return
         self.t0, self.t1, self.X = plan(turn, dwell, order=order)
+        self.turned = plan(turn, dwell, order=order, encoder=ARCSEC)[2] - self.X  # for 1 arcsec
         counts = [turn if p < 3 else dwell for p in order]
-        role, self.mount = np.repeat(order, counts), np.repeat(np.arange(len(order)), counts)
+        role, mount = np.repeat(order, counts), np.repeat(np.arange(len(order)), counts)
         along = np.array([ALONG[int(r)] for r in role]) * frames.EARTH_RATE * np.degrees(1.0) * 3600.0
-        self.tilt = -along * ARCSEC  # deg/h per arcsec
-        self.time = ((self.t0 + self.t1) / 2.0 - self.t0[0]) / (self.t1[-1] - self.t0[0])
-        self.truth = np.linspace(-1.0, 1.0, 9)
+        tilt = -along * ARCSEC  # deg/h per arcsec
         found = [
-            nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, self.tilt),
+            nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, tilt),
             nuisances.trend(self.t0, self.t1),
-            nuisances.scatter("mount", "remount", self.mount.tolist()),
+            nuisances.scatter("mount", "remount", mount.tolist()),
         ]
-        self.seen, self.hidden = nuisances.observable(self.X, NAMES, found)
+        self._finish(tilt, mount, found)
+
+    def _finish(self, tilt: np.ndarray, mount: np.ndarray, candidates: list[nuisances.Candidate]) -> None:
+        self.tilt, self.mount = tilt, mount
+        self.time = ((self.t0 + self.t1) / 2.0 - self.t0[0]) / (self.t1[-1] - self.t0[0])
+        self.truth = np.linspace(-1.0, 1.0, len(self.names))
+        self.seen, self.hidden = nuisances.observable(self.X, self.names, candidates)
 
     def record(self, case: Case, rng: np.random.Generator, white: bool = False) -> np.ndarray:
-        tau, share, _ = (1.0, 0.0, 0.0) if white else noise.sample_instrument(rng, self.t0, self.t1)
+        tau, share, reading = 1.0, 0.0, 0.0
+        if not white:
+            tau, share, reading = noise.sample_instrument(rng, self.t0, self.t1, self.readings)
         if case.slow:
             tau, share = 0.25 * (self.t1[-1] - self.t0[0]), case.slow
         unit = noise.process_covariance(self.t0, self.t1, tau)
         C = np.eye(self.t0.size) * (1.0 - share) + share * unit / unit[0, 0]
-        e = SIGMA * np.linalg.cholesky(C + 1e-12 * np.eye(self.t0.size)) @ rng.standard_normal(self.t0.size)
+        e = np.linalg.cholesky(C + 1e-12 * np.eye(self.t0.size)) @ rng.standard_normal(self.t0.size)
+        if reading:
+            e = math.sqrt(1.0 - reading) * e + math.sqrt(reading / 2.0) * self._between_readings(rng)
+        if case.outliers:
+            e += 30.0 * (rng.random(e.size) < case.outliers) * rng.choice([-1.0, 1.0], e.size)
         offsets = case.remount * rng.standard_normal(self.mount.max() + 1)
-        return self.X @ self.truth + case.tilt * self.tilt + case.ramp * self.time + offsets[self.mount] + e
+        y = self.X @ self.truth + case.tilt * self.tilt + case.ramp * self.time + offsets[self.mount] + SIGMA * e
+        return y if self.turned is None else y + case.encoder * self.turned @ self.truth
 
-    def reduce(self, y: np.ndarray, candidates: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Errors and half widths of the nine coefficients; D_F is that of the middle of a ramp."""
-        blocks = [c.block for c in self.seen] if candidates else []
-        found = noise_mixture_fit.fit(self.X, y, NAMES, self.t0, self.t1, blocks=blocks)
-        return found.beta[:9] - self.truth, found.half_width[:9]
+    def _between_readings(self, rng: np.random.Generator) -> np.ndarray:
+        """Differences of readings with errors of unit variance, which neighbouring windows share."""
+        first, last = rng.standard_normal((2, self.t0.size))
+        joint = np.flatnonzero(np.abs(self.t0[1:] - self.t1[:-1]) < 1e-6 * (self.t1 - self.t0)[1:])
+        first[joint + 1] = last[joint]
+        return last - first
+
+    def reduce(self, y: np.ndarray, how: bool | str = True) -> tuple[np.ndarray, np.ndarray]:
+        """Errors and half widths of the coefficients; D_F is that of the middle of a ramp.
+
+        how: with the nuisance model, or not; "named": with it, without the rows that are named as outliers.
+        """
+        p = len(self.names)
+        if how == "named":
+            fitted = fit(self.names, self.X, y, self.t0, self.t1, [], "rate", "", 1.0, candidates=self.seen)
+            odd = outliers.find(fitted)
+            best = (odd.without if odd else fitted).est
+            return best.beta[:p] - self.truth, best.half_width[:p]
+        blocks = [c.block for c in self.seen] if how else []
+        found = noise_mixture_fit.fit(self.X, y, self.names, self.t0, self.t1, 1e3, self.readings, blocks)
+        return found.beta[:p] - self.truth, found.half_width[:p]
 
 
 def count(
-    bench: Bench, case: Case, runs: int, seed: int, white: bool = False, candidates: bool = True
+    bench: Bench, case: Case, runs: int, seed: int, white: bool = False, candidates: bool | str = True
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of the nine coefficients, and mean half widths."""
+    """Coverage of the coefficients, and mean half widths; candidates: see Bench.reduce."""
     rng = np.random.default_rng(seed)
     middle = case.ramp * np.mean(bench.time)
-    hits, width = np.zeros(9), np.zeros(9)
+    hits, width = np.zeros((2, len(bench.names)))
     for _ in range(runs):
         error, half = bench.reduce(bench.record(case, rng, white) - middle, candidates)
         hits += np.abs(error) <= half
@@ -111,20 +167,22 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--white", action="store_true")
     given = parser.parse_args()
-    print(f"{'case':<28}{'nuisances':<10}" + " ".join(f"{n[2:]:>5}" for n in NAMES) + "   width over clean, plain")
-    benches: dict[tuple[int, ...], tuple[Bench, np.ndarray]] = {}
+    benches: dict[tuple[str, tuple[int, ...]], tuple[Bench, np.ndarray]] = {}
     for name in given.case or CASES:
         case, began = CASES[name], time.monotonic()
-        if case.order not in benches:
-            bench = Bench(case.order)
-            benches[case.order] = bench, count(bench, Case(), given.runs // 2, 99, given.white, False)[1]
-        bench, plain = benches[case.order]
-        for candidates in (False, True):
+        key = case.plan, case.order
+        if key not in benches:
+            bench = Bench(case.order, of=case.plan)
+            benches[key] = bench, count(bench, Case(), given.runs // 2, 99, given.white, False)[1]
+            print(f"{'case':<40}{'nuisances':<10}" + " ".join(f"{n[-5:]:>5}" for n in bench.names) + "   width / clean")
+        bench, plain = benches[key]
+        for candidates in (False, True, *(["named"] if case.outliers else [])):
             held, width = count(bench, case, given.runs, given.seed, given.white, candidates)
             row = " ".join(f"{v:.3f}" for v in held)
             wide = " ".join(f"{v:.2f}" for v in width / plain)
             took = f"{time.monotonic() - began:.0f} s"
-            print(f"{name:<28}{'auto' if candidates else 'none':<10}{row}   {wide}  {took}", flush=True)
+            shown = candidates if isinstance(candidates, str) else "auto" if candidates else "none"
+            print(f"{name:<40}{shown:<10}{row}   {wide}  {took}", flush=True)
     return 0
 
 

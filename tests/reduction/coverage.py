@@ -17,8 +17,11 @@ from gyrobench.reduction.estimation import noise, noise_mixture_fit
 WINDOW = 119.67  # s: 5 degrees at ten times Earth rate
 
 
-def plan(turn: int, dwell: int, order: tuple[int, ...] = (3, 1, 4, 2), pause: float = 60.0):
-    """(t0, t1, X) of a tumble at 45.75 deg with ``turn`` windows a turn and ``dwell`` windows in each dwell."""
+def plan(turn: int, dwell: int, order: tuple[int, ...] = (3, 1, 4, 2), pause: float = 60.0, encoder: float = 0.0):
+    """(t0, t1, X) of a tumble at 45.75 deg with ``turn`` windows a turn and ``dwell`` windows in each dwell.
+
+    encoder: rad, the table stands this times the sine of its angle further.
+    """
     latitude = math.radians(45.75)
     base, faces = frames.polar_base(latitude), frames.tumble_faces(latitude)
     t0, rows, t = [], [], 0.0
@@ -27,6 +30,7 @@ def plan(turn: int, dwell: int, order: tuple[int, ...] = (3, 1, 4, 2), pause: fl
         face = faces[f"mount {phase}" if phase < 3 else f"static {phase}"]
         for k in range(turn if phase < 3 else dwell):
             angle = -(k + 0.5) * 2 * math.pi / turn if phase < 3 else 0.0
+            angle += encoder * math.sin(angle)
             rows.append(drift.regressors(frames.to_face(-frames.U, face, base, angle), drift.terms(9)))
             t0.append(t)
             t += WINDOW

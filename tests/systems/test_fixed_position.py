@@ -200,11 +200,19 @@ def test_refusals(session: Session) -> None:
 
 
 def test_trend_is_seen(session: Session) -> None:
-    """Ageing by D_F p_F t: -0.3 deg/h 1e-3/s over 190 s is a trend of 0.057 deg/h."""
+    """Ageing by D_F p_F t: -0.3 deg/h 1e-3/s over 190 s is a trend of 0.057 deg/h, -1.08 deg/h/h: in the model, or
+    found by the F test.  In the model it is no part of u.
+    """
     values = {**SHORT, "dwell": 200.0, "readings": 20, "gyro.p_F": 1e-3, **QUIET, "gyro.white": 0.002 * DPH}
     result = reduced(session, values)
     assert result.repeatability["trend over the record / (°/h)"] == pytest.approx(-0.3e-3 * 190.0, rel=0.3)
-    assert next(t.p for t in result.tests if t.name == "trend") < 0.01
+    assert [c.name for c in result.coefficients] == ["ω_d", "trend"]
+    trend = result.coefficients[1]
+    assert trend.interval[0] < -0.3e-3 * 3600.0 < trend.interval[1] < -0.7
+    plain = reduced(session, {**values, "nuisances": "none"})
+    assert plain.repeatability["trend over the record / (°/h)"] == pytest.approx(-0.3e-3 * 190.0, rel=0.3)
+    assert next(t.p for t in plain.tests if t.name == "trend") < 0.01
+    assert plain.coefficients[0].u > 2.0 * result.coefficients[0].u
 
 
 # ------------------------------------------------------------------------------------------ files and days

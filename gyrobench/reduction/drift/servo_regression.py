@@ -26,14 +26,19 @@ from gyrobench import drift, frames
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.run_metadata import Site
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations
+#: least share of a misalignment's effect that the coefficients must leave: what a little turning in dwells shows of it
+#: would let degrees pass, and D_F and D_I with them
+PART = 0.1
 TRACKING = 2.0 / 3600.0 * np.pi / 180.0  # rad, limit of Hu 1981 for the table against the gyro
 
 #: our name -> that of Hu 1981, and its sign against ours  [CROSS-MAP]; D_O is empirical, after eq. 2-40
@@ -195,7 +200,7 @@ def effects(
         return np.array([-y, z])  # a mass along z pulls with its weight along y, one along y against that along z
 
     def mount(k: int) -> Array:
-        return moved(held.turned(body=frames.rotation(np.eye(3)[k], SMALL)))
+        return moved(_mounted(held, k))
 
     each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [
@@ -213,6 +218,36 @@ def effects(
         ),
         Effect("time base", sizes["u_time"], "1", fit.error(-held.rate), "relative"),
     ]  # fmt: skip
+
+
+def _mounted(held: Held, k: int) -> Held:
+    """The windows with the gyro turned by SMALL about its axis k on the table."""
+    return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
+
+
+def candidates(
+    held: Held, site: Site, columns: Callable[[Held], Array], phase: NDArray[np.int_], windows: Mapping[str, Array]
+) -> list[Candidate]:
+    """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
+    differ from phase to phase, each of which is set up by itself.
+
+    columns: what is fitted.  windows: the rows of ``held``, with the thermometers of a measured record.
+    """
+    y, X = drift_rate(held, site), columns(held)
+    start = np.linalg.lstsq(X, y, rcond=None)[0]  # the axis sees another part of the drift, too
+
+    def misalignment(k: int) -> Array:
+        other = _mounted(held, k)
+        out: Array = (drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL
+        return out
+
+    text = "misalignment of the input axis towards the"
+    return [
+        Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2), PART),
+        Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1), PART),
+        *nuisances.common({**windows, "t_start": held.t_start, "t_end": held.t_end}),
+        nuisances.scatter("σ_mount", nuisances.MOUNTS, phase.tolist()),
+    ]
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:

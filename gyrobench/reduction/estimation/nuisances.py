@@ -27,6 +27,7 @@ DPH = units.factor("deg/h")
 FREEDOM = 10  # degrees of freedom that must be left beside all candidates
 CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
 VISIBLE = 1e-3  # least share of a column's length at right angles to the others
+TITLE = "Nuisance model"
 COLUMNS = ["candidate", "meaning", "estimate", "u", "unit", "probability", "in the model", "largest change", "of u"]
 
 
@@ -40,10 +41,11 @@ class Candidate:
     scale: float  # of it in SI
     columns: Array
     scatter: bool = False
+    visible: float = VISIBLE  # least share of its length at right angles to the coefficients
 
     @classmethod
-    def of(cls, name: str, meaning: str, unit: str, columns: Array) -> Candidate:
-        return cls(name, meaning, units.display(unit), units.factor(unit), columns)
+    def of(cls, name: str, meaning: str, unit: str, columns: Array, visible: float = VISIBLE) -> Candidate:
+        return cls(name, meaning, units.display(unit), units.factor(unit), columns, visible=visible)
 
     @property
     def block(self) -> Block:
@@ -116,7 +118,7 @@ def observable(X: Array, names: Sequence[str], candidates: Iterable[Candidate]) 
             continue  # it does not occur: no temperature but one
         unit = columns / np.where(np.linalg.norm(columns, axis=0) > 0.0, np.linalg.norm(columns, axis=0), 1.0)
         left = unit - model @ np.linalg.lstsq(model, unit, rcond=None)[0]
-        contrasts = int(np.sum(np.linalg.svd(left, compute_uv=False) > VISIBLE))
+        contrasts = int(np.sum(np.linalg.svd(left, compute_uv=False) > c.visible))
         if X.shape[0] - model.shape[1] - columns.shape[1] < FREEDOM:
             hidden.append(Hidden(c, f"not tested: fewer than {FREEDOM} degrees of freedom would be left"))
         elif c.scatter and contrasts < CONTRASTS:
@@ -163,7 +165,7 @@ def table(
         "change: coefficient that moves most when the effect is in the model, in its u without the effect. Estimates "
         "and intervals are means over all combinations, weighted by their probabilities."
     )
-    return {"title": "Nuisance model", "caption": caption, "columns": COLUMNS, "rows": rows}
+    return {"title": TITLE, "caption": caption, "columns": COLUMNS, "rows": rows}
 
 
 def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation import nuisances, uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
@@ -65,12 +65,14 @@ def combine_days(
     """One result of repeats (name of the day -> its result) with the same coefficients.
 
     Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common
-    to all days.  Series: each coefficient against the number of the day.  Raises ReductionError for fewer than two
-    days or coefficients that are not the same.
+    to all days.  Set-up effects that joined the nuisance model of some days only are left to those days.  Series: each
+    coefficient against the number of the day.  Raises ReductionError for fewer than two days or coefficients that are
+    not the same.
     """
+    if len(results) < 2:
+        raise ReductionError(f"{len(results)} {what}: at least two are needed for a scatter from {what} to {what}")
+    results = _without_own_effects(results)
     days, parts = list(results), list(results.values())
-    if len(parts) < 2:
-        raise ReductionError(f"{len(parts)} {what}: at least two are needed for a scatter from {what} to {what}")
     names = [c.name for c in parts[0].coefficients]
     for day, r in results.items():
         if [c.name for c in r.coefficients] != names:
@@ -127,6 +129,19 @@ def combine_days(
     )  # fmt: skip
     reasons = [f"{what} {day}: {text}" for day, r in results.items() for text in r.withheld]
     return uncertainty.withhold(combined, reasons)
+
+
+def _without_own_effects(results: Mapping[str, DriftTestResult]) -> dict[str, DriftTestResult]:
+    """The results without the effects of their nuisance models that are not among the coefficients of all."""
+    of_all = set.intersection(*({c.name for c in r.coefficients} for r in results.values()))
+    out = {}
+    for day, r in results.items():
+        effects = {row[0] for t in r.tables if t["title"].startswith(nuisances.TITLE) for row in t["rows"]}
+        kept = [j for j, c in enumerate(r.coefficients) if c.name in of_all or c.name not in effects]
+        correlation = [[r.correlation[i][j] for j in kept] for i in kept]
+        changes = [{**b, "changes": [[row[j] for j in kept] for row in b["changes"]]} for b in r.type_b]
+        out[day] = replace(r, coefficients=[r.coefficients[j] for j in kept], correlation=correlation, type_b=changes)
+    return out
 
 
 def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:

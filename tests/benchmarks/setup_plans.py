@@ -1,0 +1,84 @@
+"""Default plans of the polar servo test and of the eight positions for setup_effects.py: windows in deg/h, from the
+equations, with what a misalignment of the input axis does to them, and the candidates of their reductions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gyrobench import drift, frames
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.nuisances import Candidate
+
+ARCSEC = math.pi / 180.0 / 3600.0
+PHI = math.radians(45.75)
+EARTH = math.degrees(frames.EARTH_RATE) * 3600.0  # deg/h
+POLE = frames.pole(PHI)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Times (n,) s, design (n, p), effect of a tilt of 1 arcsec, number of each window's mount, candidates."""
+
+    t0: np.ndarray
+    t1: np.ndarray
+    X: np.ndarray
+    names: tuple[str, ...]
+    tilt: np.ndarray
+    mount: np.ndarray
+    candidates: list[Candidate]
+    readings: bool = False
+
+
+def servo_polar() -> Plan:
+    """Two dwells of 6 windows of 600 s with the input axis east, output axis up and down, then 144 against (mount S)
+    and along the pole, in which the table turns once a day.  A tilt towards the output axis sees the Earth in the
+    dwells.
+    """
+    east = np.array([1.0, 0.0, 0.0])
+    t0, rows, tilt, mount, t = [], [], [], [], 0.0
+    for phase, (x, y, count) in enumerate(
+        ((east, frames.U, 6), (east, -frames.U, 6), (-POLE, east, 144), (POLE, east, 144))
+    ):
+        t += 60.0
+        for k in range(count):
+            # among the stars the gyro stands still: its table turns against the Earth, about its own axis x
+            angle = -float(x @ POLE) * 2.0 * math.pi * (k + 0.5) / 144.0
+            gyro = np.array([x, y, np.cross(x, y)])
+            gyro = (
+                np.array([[1, 0, 0], [0, math.cos(angle), math.sin(angle)], [0, -math.sin(angle), math.cos(angle)]])
+                @ gyro
+            )
+            rows.append(drift.regressors(gyro @ -frames.U, drift.terms(9)))
+            tilt.append(-EARTH * float(gyro[1] @ POLE) * ARCSEC)
+            t0.append(t)
+            mount.append(phase)
+            t += 600.0
+    start, column, number = np.array(t0), np.array(tilt), np.array(mount)
+    found = [
+        Candidate("tilt", "misalignment", "arcsec", 1.0, column, visible=0.1),
+        nuisances.trend(start, start + 600.0),
+        nuisances.scatter("mount", "remount", mount),
+    ]
+    return Plan(start, start + 600.0, np.array(rows), drift.terms(9), column, number, found, True)
+
+
+def eight_position() -> Plan:
+    """Ten cycles of the eight positions, the ten readings of each averaged: 60 s every 70 s.  The current about x
+    measures k I = w_y - R - ... ; the k of the first column is the scale factor less the assumed one over 1000.
+    """
+    E, N, U = frames.E, frames.N, frames.U
+    both = [(E, N), (N, -E), (-E, -N), (-N, E), (U, E), (-E, U), (-U, -E), (E, -U)] * 10
+    w = EARTH * np.array([[x @ POLE, y @ POLE] for x, y in both])
+    g = -np.array([[x @ U, y @ U, np.cross(x, y) @ U] for x, y in both])
+    X = np.column_stack([1e-3 * w[:, 1], np.ones(80), g[:, 2], -g[:, 1], g[:, 1] ** 2, g[:, 0]])
+    start = 70.0 * np.arange(80.0)
+    tilt = -w[:, 0] * ARCSEC
+    found = [Candidate("tilt", "misalignment", "arcsec", 1.0, tilt), nuisances.trend(start, start + 60.0)]
+    return Plan(start, start + 60.0, X, ("k", "R", "u", "u_z", "q", "s"), tilt, np.arange(80), found)
+
+
+PLANS = {"servo_polar": servo_polar, "eight_position": eight_position}
