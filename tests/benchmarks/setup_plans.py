@@ -1,5 +1,7 @@
-"""Default plans of the polar servo test and of the eight positions for setup_effects.py: windows in deg/h, from the
-equations, with what a misalignment of the input axis does to them, and the candidates of their reductions.
+"""Default plans of the polar servo test, of the eight positions and of tests in one attitude for setup_effects.py.
+
+Windows in deg/h, from the equations, with what a misalignment of the input axis does to them, and the candidates of
+their reductions.
 """
 
 from __future__ import annotations
@@ -81,4 +83,19 @@ def eight_position() -> Plan:
     return Plan(start, start + 60.0, X, ("k", "R", "u", "u_z", "q", "s"), tilt, np.arange(80), found)
 
 
-PLANS = {"servo_polar": servo_polar, "eight_position": eight_position}
+def fixed_position(readings: bool = False) -> Plan:
+    """Thirty windows of two minutes in one attitude, which shows no tilt.  readings: open_loop_drift, their data are
+    differences of readings.
+    """
+    start, nothing = 120.0 * np.arange(30.0), np.zeros(30)
+    found = [nuisances.trend(start, start + 120.0)]
+    return Plan(start, start + 120.0, np.ones((30, 1)), ("D",), nothing, np.zeros(30, int), found, readings)
+
+
+PLANS = {
+    "servo_polar": servo_polar,
+    "eight_position": eight_position,
+    "fixed_position": fixed_position,
+    "open_loop_drift": lambda: fixed_position(True),
+}
+STILL = ("fixed_position", "open_loop_drift")
