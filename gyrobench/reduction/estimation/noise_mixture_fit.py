@@ -206,7 +206,7 @@ def fit(
     columns = np.column_stack([X, Z])[:, keep]
     joined = tuple(c for e in evidence if e.joined for c in e.names)
     return Estimate(
-        (*names, *joined), beta[keep], covariance, u, half, probability, equivalent_dof(half / u),
+        (*names, *joined), beta[keep], covariance, u, half, probability, equivalent_dof(half / np.maximum(u, 1e-300)),
         y - columns @ beta[keep], scatter / math.sqrt(max(float(s2[at]), 1e-300)), gain, design, white, tau, sigma,
         density, model[:2], tuple(warnings), mixture, model[2],
         _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
