@@ -286,9 +286,7 @@ def at_rest(record: Record) -> Iterator[Candidate]:
 
 
 def table_of_rates(record: Record) -> Iterator[Candidate]:
-    """A row for each current, measured: rates of both senses."""
-    if not record.run.measured:
-        return
+    """A row for each current: rates of both senses."""
     yield from exchanged_rows(record, ["current"], "the currents of rows")
     yield from exchanged_rows(record, ["rate_plus", "rate_minus"], "the rates of rows")
     w = record.windows

@@ -1,10 +1,10 @@
-"""Diagnosis of handling errors: which mistake in taking or labelling a record makes its residuals ordinary.
+"""Diagnosis of handling errors: which mistake in taking or labelling a measured record makes its residuals ordinary.
 
     @handling_errors.examined(candidates)          # candidates: record -> the mistakes that make sense in this test
     def from_record(record, specification=None): ...
 
-A record is examined where its residuals are not ordinary: a test of the fit contradicts model or noise, or, measured,
-they are correlated (a mistake may hide in what is taken for slow noise) or too few to say.  It is then reduced again
+A measured record is examined where its residuals are not ordinary: a test of the fit contradicts model or noise, they
+are correlated (a mistake may hide in what is taken for slow noise) or too few to say.  It is then reduced again
 with each mistake undone, and without the unknowns that are there for small errors of the set-up: a misalignment of
 minutes of arc can take a mistake in.  A mistake is named when
 

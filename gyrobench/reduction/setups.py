@@ -42,9 +42,8 @@ class Setup:
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
         """Return the setup that a run.json describes; ``own``: the fields that are the test's own."""
-        shared = {"specification": specification, "instrument": run.instrument}
-        if corrections := str(run.options.get("corrections", "")):
-            shared["corrections"] = corrections
+        corrections = run.options.get("corrections", "")
+        shared = {"specification": specification, "instrument": run.instrument, "corrections": corrections}
         sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
         return cls(**{**shared, **sources, **own})
 

@@ -9,7 +9,6 @@ from typing import Any
 from gyrobench.report.numbers import write_number
 
 Json = dict[str, Any]
-NORMAL = 1.959963984540054
 MOST = 4  # names in a sentence
 
 
@@ -20,7 +19,8 @@ def mark_beyond_chance(measures: Sequence[Json]) -> None:
     a single one; few degrees of freedom enter through k.
     """
     known = [d for m in measures for d in m["differences"] if d and d["significant"] is not None]
-    limit = NormalDist().inv_cdf(1.0 - 0.025 / max(len(known), 1)) / NORMAL
+    quantile = NormalDist().inv_cdf
+    limit = quantile(1.0 - 0.025 / max(len(known), 1)) / quantile(0.975)
     for d in known:
         d["beyond_chance"] = abs(d["value"]) > limit * d["U"]
 

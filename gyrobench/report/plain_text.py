@@ -64,6 +64,8 @@ def step_sentence(check: Mapping[str, Any]) -> str:
     cost = f" ({check['seconds']:.1f} s)" if check.get("seconds") else ""
     worst = check.get("worst")
     most = "" if worst is None else f", at most {write_number(worst, significant=2).text} times the u without it"
+    if worst is not None and worst > 1.0:  # by how much, of which, is a sentence of its own
+        most = ", larger than the u without it for some measures: see the warnings and the table of the step check"
     return f"step check{cost}: the effect of the communication step is in u{most}"
 
 

@@ -85,7 +85,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     def effects_of(found: Findings) -> list[Effect]:
         return servo_regression.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
 
-    found = corrected(found, effects_of, str(run.options.get("corrections", "")))
+    found = corrected(found, effects_of, run.options.get("corrections", ""))
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)

@@ -80,7 +80,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             DPH, noise="readings", limit=1e6, candidates=_candidates(run, record.windows, held, phase, c),
         )  # fmt: skip
         effects_of = functools.partial(_effects, j, seen, phase, site, run, drift.terms_2dof(c, terms))
-        found[c] = corrected(found[c], effects_of, str(run.options.get("corrections", "")))
+        found[c] = corrected(found[c], effects_of, run.options.get("corrections", ""))
         _mount_test(found[c], phase)
         results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, run, terms, truth, specification)
     tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]

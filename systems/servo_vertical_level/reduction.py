@@ -71,7 +71,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         every = servo_regression.effects(held, site, found, columns, phase, sizes)
         return [e for e in every if "a turn" not in e.source]
 
-    found = corrected(found, effects_of, str(run.options.get("corrections", "")))
+    found = corrected(found, effects_of, run.options.get("corrections", ""))
     statistics: dict[str, composite.Composite | str] = {}
     for p, label in labels.items():
         rows = phase == p
