@@ -1,0 +1,139 @@
+"""Angle reading of a table: errors of the scale, coarse-fine carry, multiplier loop, incremental count.
+
+Angles are those of the axis, rad.  A scale of p pole pairs repeats every 2 pi/p, its electrical cycle.
+"""
+
+from __future__ import annotations
+
+from gyrobench.component.composition import Block
+from gyrobench.component.declarations import Discrete, Noise, Parameter
+from gyrobench.component.math import TWO_PI, Number, cos, exp, floor, sin
+
+
+def nearest(x: Number) -> Number:
+    """Return the whole number nearest to x, halves upwards."""
+    return floor(x + 0.5)
+
+
+def carried(fine: Number, coarse: Number, step: Number, counts: Number, cycles: Number) -> Number:
+    """Return the angle in fine counts, of one turn, from a fine count and a coarse one.
+
+    fine: 0 .. counts - 1 within a cycle; coarse: in steps of ``step`` fine counts; cycles: fine cycles in a turn.
+    Half a coarse step is added, so that the coarse channel may be wrong by the same amount on both sides:
+
+        n = floor((step coarse + step/2 - fine + counts/2) / counts) mod cycles        angle = n counts + fine
+    """
+    n = floor((step * coarse + 0.5 * step - fine + 0.5 * counts) / counts)
+    return (n - cycles * floor(n / cycles)) * counts + fine
+
+
+class ScaleErrors(Block):
+    """Static errors of a scale, what is read too much at the true angle a:
+
+        eccentricity sin(a + ...) + tilt sin(2 a + ...) + pitch sin(pitch_order a + ...) + interpolation sin(p a + ...)
+        + [d0 (1 - cos 2 p a) / 2 + de sin 2 p a / 2 + (e5 - e3) sin 4 p a] / p
+
+    d0 error of quadrature, de of equal amplitudes, e3 and e5 harmonics of the windings (second order left out).
+    [ANGLE-INDUCTOSYN; Hu 1981, eq. 5-51]
+    """
+
+    pole_pairs = Parameter(360, int, "pole pairs p: electrical cycles of the scale in a turn", min=1, max=100000)
+    eccentricity = Parameter(0.0, "rad", "reading error of order 1 (eccentricity)")
+    eccentricity_phase = Parameter(0.0, "rad", "its phase at angle 0")
+    tilt = Parameter(0.0, "rad", "reading error of order 2 (tilt of the scale)")
+    tilt_phase = Parameter(0.0, "rad", "its phase at angle 0")
+    pitch = Parameter(0.0, "rad", "reading error of order pitch_order (pitch, sectors)")
+    pitch_order = Parameter(12, int, "its cycles in a turn", min=3, max=100000)
+    pitch_phase = Parameter(0.0, "rad", "its phase at angle 0")
+    interpolation = Parameter(0.0, "rad", "reading error once in an electrical cycle (offsets of the channels)")
+    interpolation_phase = Parameter(0.0, "rad", "its phase at angle 0")
+    d0 = Parameter(0.0, "rad", "departure of the channels from quadrature, electrical", min=-0.1, max=0.1)
+    de = Parameter(0.0, "1", "relative difference of the channels' amplitudes", min=-0.1, max=0.1)
+    e3 = Parameter(0.0, "1", "third harmonic of the windings, relative", min=-0.1, max=0.1)
+    e5 = Parameter(0.0, "1", "fifth harmonic of the windings, relative", min=-0.1, max=0.1)
+
+    def error(self, angle: Number) -> Number:
+        """Return reading minus angle."""
+        x = 0.0
+        if self.eccentricity != 0.0:
+            x = self.eccentricity * sin(angle + self.eccentricity_phase)
+        if self.tilt != 0.0:
+            x = x + self.tilt * sin(2.0 * angle + self.tilt_phase)
+        if self.pitch != 0.0:
+            x = x + self.pitch * sin(self.pitch_order * angle + self.pitch_phase)
+        if self.interpolation != 0.0:
+            x = x + self.interpolation * sin(self.pole_pairs * angle + self.interpolation_phase)
+        winding = self.e5 - self.e3
+        if self.d0 != 0.0 or self.de != 0.0 or winding != 0.0:
+            s = sin(2.0 * self.pole_pairs * angle)
+            c = cos(2.0 * self.pole_pairs * angle)
+            x = x + (0.5 * self.d0 * (1.0 - c) + 0.5 * self.de * s + 2.0 * winding * s * c) / self.pole_pairs
+        return x
+
+
+class IncrementalEncoder(ScaleErrors):
+    """Counts of a scale: (angle + error + reading noise) / quantum, rounded, and the instant they belong to.
+
+    A part calls latch() when it samples; count and t_read stay until the next time.  Counts are whole and cumulative.
+    [ANGLE-INDUCTOSYN; Hu 1981, sections 5.4 (three-1), 5.5 (one-3)]
+    """
+
+    quantum = Parameter(TWO_PI / 7.2e6, "rad", "angle of a count (0.18 arcsec)", above=0.0)
+    reading = Noise(0.0, "rad", "standard deviation of a reading", per="step")
+    count = Discrete(0.0, "1", "cumulative count")
+    t_read = Discrete(0.0, "s", "the instant it belongs to")
+
+    def counted(self, angle: Number, lag: Number) -> Number:
+        """Return the count of the scale at this angle (rad), read late by the angle ``lag``."""
+        return nearest((angle - lag + self.error(angle) + self.noise.reading) / self.quantum)
+
+    def latch(self, angle: Number) -> None:
+        """Read the scale now, at this angle (rad)."""
+        self.count = self.counted(angle, 0.0)
+        self.t_read = self.t
+
+
+class MultiplierLoop(Block):
+    """Phase multiplier that makes counts of an electrical cycle: what its output lags behind the angle x, e = x - y.
+
+        type 0   e = 0                                          ideal
+        type 1   e' = x' - K_v e                                lags x'/K_v at constant rate
+        type 2   e'' = x'' - K_v e' - K_v^2 e / 4               no lag at constant rate, 4 x''/K_v^2 at acceleration
+
+    exact for a rate that is linear in time within a step (type 2: critically damped, charge pump).
+    [ANGLE-INDUCTOSYN]
+    """
+
+    type = Parameter(2, int, "multiplier loop: 0 ideal, 1 lags rate/K_v, 2 without lag at constant rate", min=0, max=2)
+    K_v = Parameter(100.0 * TWO_PI, "1/s", "gain of the multiplier loop", above=0.0)
+    lag = Discrete(0.0, "rad", "angle minus output of the loop")
+    lag_rate = Discrete(0.0, "rad/s", "its derivative")
+    rate_last = Discrete(0.0, "rad/s", "rate at the end of the last step")
+    slipped = Discrete(0.0, "1", "cycles lost since the start")
+
+    def follow(self, rate: Number, h: Number) -> None:
+        """Advance by a step h (s) that ends with this rate (rad/s)."""
+        slope = (rate - self.rate_last) / h
+        if self.type == 1.0:
+            # e = (x' - x''/K) / K on the ramp, and the rest of the old departure from it
+            k = self.K_v
+            before = (self.rate_last - slope / k) / k
+            self.lag = (rate - slope / k) / k + (self.lag - before) * exp(-k * h)
+        if self.type == 2.0:
+            a = 0.5 * self.K_v
+            rest = slope / (a * a)
+            d = self.lag - rest
+            v = self.lag_rate + a * d
+            fade = exp(-a * h)
+            self.lag = rest + (d + v * h) * fade
+            self.lag_rate = (v - a * (d + v * h)) * fade
+        self.rate_last = rate
+
+    def slip(self, cycle: Number) -> None:
+        """Count the whole cycles by which the loop has lost the angle; it is locked again to another one.
+
+        Its phase detector sees the lag modulo a cycle (rad of the axis): beyond half of one it pulls to the next.
+        """
+        n = nearest(self.lag / cycle)
+        self.lag = self.lag - n * cycle
+        self.slipped = self.slipped + n
