@@ -65,7 +65,6 @@ class Inductosyn(Component):
         d0=0.1 * ARCSEC * 360.0,
         de=0.1 * ARCSEC * 360.0,
         e3=0.05 * ARCSEC * 360.0,
-        reading=0.02 * ARCSEC,
     )
     loop = MultiplierLoop()
 

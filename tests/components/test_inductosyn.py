@@ -381,7 +381,7 @@ def test_native_is_bit_equal_in_every_mode(more):
     rows = []
     for target in ("plain", "native"):
         one = make("inductosyn", target, bench=BENCH)
-        one.set({"coarse_zero": 0.003, "seed": 4.0, **{n: float(x) for n, x in more.items()}})
+        one.set({"coarse_zero": 0.003, "encoder_reading": 1e-6, "seed": 4.0, **{n: float(x) for n, x in more.items()}})
         one.initialize(0.0)
         for k in range(100):
             one.set({"angle": 8e-3 * math.sin(0.1 * k), "rate": 0.8 * math.cos(0.1 * k)})
