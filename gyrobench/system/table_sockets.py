@@ -28,6 +28,7 @@ TABLES: tuple[Socket, ...] = (
         (
             inp("angle", "rad", "table angle"),
             inp("rate", "rad/s", "table rate relative to its base"),
+            inp("torque", "N.m", "torque to be added", optional=True),
             out("M", "N.m", "torque on the table"),
         ),
     ),

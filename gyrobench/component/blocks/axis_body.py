@@ -1,0 +1,164 @@
+"""The moving part of a table axis: inertia, resonance between motor and plate, friction with presliding, cables."""
+
+from __future__ import annotations
+
+from gyrobench.component.composition import Block
+from gyrobench.component.declarations import Discrete, Noise, Parameter, State
+from gyrobench.component.math import Number, Vector, exp, fabs, sign, sqrt
+
+
+class Presliding(Block):
+    """Friction torque of a contact that is elastic before it slides (LuGre).
+
+        z' = v - |v| z / z_s(v)        z_s = g / k        g(v) = M_c + (M_s - M_c) exp(-(v / v_s)2)
+        M  = -(k z + d z')             k = M_c / presliding
+
+    v rate against the base, z deflection of the contact, M_c Coulomb and M_s break-away torque.  At a constant v the
+    law of z is solved exactly over a step, z+ = +-z_s + (z -+ z_s) exp(-|dx| / z_s): stable whatever the rate.  Before
+    it slides the contact is a spring k with hysteresis; a torque below M_s is held.
+
+    Not modelled: a memory that tells closed from open hysteresis loops (LuGre creeps under a torque that vibrates).
+    Source: Canudas 1995, eq. 1 to 4; [FRICTION-PRESLIDING].
+    """
+
+    suffixes = {"coulomb": ""}
+
+    coulomb = Parameter(0.0, "N.m", "Coulomb friction; 0: none", min=0.0)
+    static = Parameter(0.0, "N.m", "break-away torque; 0: the Coulomb torque", min=0.0)
+    slip_rate = Parameter(1e-4, "rad/s", "rate at which break-away has turned into Coulomb friction", above=0.0)
+    presliding = Parameter(5e-6, "rad", "deflection at the Coulomb torque, before it slides", above=0.0)
+    damping = Parameter(0.0, "N.m.s/rad", "damping of that deflection", min=0.0)
+
+    z = Discrete(0.0, "rad", "deflection of the contact")
+    spring = Discrete(0.0, "N.m/rad", "stiffness k before it slides")
+
+    def start(self) -> None:
+        less = self.static > 0.0 and self.static < self.coulomb
+        self.refuse(less, "{self}_static = {static} N.m must be 0 or at least the Coulomb torque {coulomb} N.m")
+        self.spring = self.coulomb / self.presliding
+
+    def limit(self, v: Number) -> Number:
+        """Return the deflection z_s at which the contact slides steadily at the rate v."""
+        level = self.coulomb
+        if self.static > self.coulomb:
+            q = v / self.slip_rate
+            level = level + (self.static - self.coulomb) * exp(-q * q)
+        return level / self.spring
+
+    def after(self, dx: Number, v: Number) -> Number:
+        """Return z after a turn by dx at the mean rate v."""
+        end = sign(dx) * self.limit(v)
+        return end + (self.z - end) * exp(-fabs(dx) / self.limit(v))
+
+    def torque(self, z: Number, v: Number) -> Number:
+        """Return the torque on what turns at the rate v with the deflection z."""
+        slip = v - fabs(v) * z / self.limit(v)
+        return -(self.spring * z + self.damping * slip)
+
+
+class AxisBody(Block):
+    """Motion of a table axis under the torque of its motor and its loads, w inertial rate, e that of the base.
+
+        rigid:       J w' = T + M - viscous v - cable (x - cable_zero) + friction         x' = v = w - e
+        resonance:   (J - J_m) w' = k s + d s' + M - ...        J_m (w' + s'') = T - k s - d s'        J_m = share J
+
+    s is the angle of the motor against the plate, k and d follow from the frequency and the damping ratio of the free
+    pair.  The part hands over T, M and e as numbers: `turn` in its flow, then `settle` in its sampled method, which
+    takes the friction of the next step at its middle (second order) so that it stays out of the linearization.  All
+    else is linear and exact over a step.
+
+    Not modelled: motion of the axis in its bearing, backlash, Coulomb friction on the motor's side.
+    Source: Hu 1981, eq. 5-7, 5-8; own design of the resonance.
+    """
+
+    J = Parameter(2.56, "kg.m2", "inertia of motor, plate and load about the axis", above=0.0)
+    viscous = Parameter(0.0, "N.m.s/rad", "viscous drag of bearing and eddy currents", min=0.0)
+    cable = Parameter(0.0, "N.m/rad", "stiffness of cables between base and plate", min=0.0)
+    cable_zero = Parameter(0.0, "rad", "angle at which the cables pull at nothing")
+    unbalance = Parameter([0.0, 0.0], "kg.m", "mass times offset along the first and second table axis")
+    resonance = Parameter(0.0, "rad/s", "resonance of motor against plate; 0: rigid", min=0.0)
+    resonance_damping = Parameter(0.01, "1", "its damping ratio", above=0.0)
+    share = Parameter(0.1, "1", "share of the motor in J", above=0.0, below=1.0)
+    rumble = Noise(0.0, "N.m/sqrt(Hz)", "random torque density (brushes, air)")
+    friction = Presliding()
+
+    x = State(0.0, "rad", "angle against the base")
+    w = State(0.0, "rad/s", "inertial rate about the axis")
+    twist = State(0.0, "rad", "angle s of the motor against the plate")
+    twist_rate = State(0.0, "rad/s", "its rate")
+
+    v = Discrete(0.0, "rad/s", "rate against the base at the end of the last step")
+    acc = Discrete(0.0, "rad/s2", "inertial acceleration there")
+    e = Discrete(0.0, "rad/s", "rate of the base about the axis there")
+    x_last = Discrete(0.0, "rad", "angle there")
+    rub = Discrete(0.0, "N.m", "friction at the middle of the next step")
+    per_plate = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the plate")
+    per_motor = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the motor")
+    spring = Discrete(0.0, "N.m/rad", "stiffness between motor and plate")
+    damper = Discrete(0.0, "N.m.s/rad", "damping between motor and plate")
+
+    def rest(self, x: Number, v: Number, e: Number) -> None:
+        """Start at the angle x with the rate v against a base that turns at e."""
+        self.per_motor = 1.0 / (self.share * self.J)
+        self.per_plate = 1.0 / self.J
+        if self.resonance > 0.0:
+            self.per_plate = 1.0 / ((1.0 - self.share) * self.J)
+            both = self.share * (1.0 - self.share) * self.J
+            self.spring = both * self.resonance * self.resonance
+            self.damper = 2.0 * both * self.resonance * self.resonance_damping
+        self.x = x
+        self.x_last = x
+        self.v = v
+        self.e = e
+        self.w = e + v
+        if self.friction.coulomb > 0.0 and v != 0.0:  # it slides already
+            self.friction.z = sign(v) * self.friction.limit(v)
+            self.rub = self.friction.torque(self.friction.z, v)
+
+    def unbalanced(self, c: Number, s: Number, g: Vector) -> Number:
+        """Return the torque of the unbalance: c, s of the table angle, g specific force along the axes at angle 0."""
+        fx = c * g[0] + s * g[1]
+        fy = c * g[1] - s * g[0]
+        return self.unbalance[1] * fx - self.unbalance[0] * fy
+
+    def through(self, motor: Number) -> Number:
+        """Return what of the motor torque reaches the plate."""
+        if self.resonance > 0.0:
+            return self.spring * self.twist + self.damper * self.twist_rate
+        return motor
+
+    def turn(self, motor: Number, load: Number, e: Number) -> None:
+        """Write the derivatives; e at the end of the step, taken as its mean over it."""
+        v = self.w - 0.5 * (self.e + e)
+        inner = self.through(motor)
+        m = inner + load + self.rub + self.noise.rumble - self.viscous * v - self.cable * (self.x - self.cable_zero)
+        self.der.x = v
+        self.der.w = m * self.per_plate
+        if self.resonance > 0.0:
+            self.der.twist = self.twist_rate
+            self.der.twist_rate = (motor - inner) * self.per_motor - m * self.per_plate
+        else:  # stays 0, and leaves no pole at 0 in the linearization
+            self.der.twist = -self.twist
+            self.der.twist_rate = -self.twist_rate
+
+    def settle(self, motor: Number, load: Number, e: Number) -> None:
+        """Take rate, acceleration and friction at the end of an internal step."""
+        v = self.w - e
+        m = self.through(motor) + load - self.viscous * v - self.cable * (self.x - self.cable_zero)
+        self.acc = m * self.per_plate
+        if self.friction.coulomb > 0.0:
+            fast = self.h * sqrt(self.friction.spring * self.per_plate)
+            self.refuse(
+                fast > 0.5,
+                "{self}_friction_presliding is too small for the internal step: step <= 0.5 sqrt(J presliding / M_c) "
+                "is needed; shorten the step",
+            )
+            dx = self.x - self.x_last
+            self.friction.z = self.friction.after(dx, dx / self.h)
+            self.acc = self.acc + self.friction.torque(self.friction.z, v) * self.per_plate
+            middle = v + 0.5 * self.h * self.acc
+            z = self.friction.after(0.25 * self.h * (v + middle), middle)
+            self.rub = self.friction.torque(z, middle)
+        self.x_last = self.x
+        self.v = v
+        self.e = e
