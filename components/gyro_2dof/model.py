@@ -46,7 +46,8 @@ class Gyro2dof(Component):
         J_y q' = +H p - C_y (q - omega_y) + T_y + M_y,     T_y = -H (omega_dx + k_y i_y (1 + ...))
         psi_x' = p - omega_x + omega_z psi_y,              psi_y' = q - omega_y - omega_z psi_x
 
-    undamped frequency H / sqrt(J_x J_y).  p and q are inertial: an angular acceleration of the case is not an input.
+    undamped frequency H / sqrt(J_x J_y).  p and q are inertial: no torque comes from an acceleration of the case.
+    Within a communication step the case turns with omega + alpha_b (t - end of the step), alpha_b = 0: omega held.
     M_x, M_y are torques from outside on outer and inner gimbal (without nutation they precess: M_x / H, -M_y / H).
 
     Gimbals at full size, full = 1: a platform on the outer gimbal (power gyro, J_x with the load) [STAB-POWER-2DOF].
@@ -66,8 +67,9 @@ class Gyro2dof(Component):
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.2.0"
+    version = "1.3.0"
     nonlinear = "full"
+    integrator = "midpoint"
 
     K_sg_x = Parameter(10.0, "V/rad", "gain of the x pickoff", above=0.0)
     K_sg_y = Parameter(10.0, "V/rad", "gain of the y pickoff", above=0.0)
@@ -134,6 +136,7 @@ class Gyro2dof(Component):
 
     omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
     f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
+    alpha_b = Input([0.0, 0.0, 0.0], "rad/s2", "derivative of omega, case axes (0: omega is held over a step)")
     i_x = Input(0.0, "A", "current of the torquer about x (nulls u_y)")
     i_y = Input(0.0, "A", "current of the torquer about y (nulls u_x)")
     M_x = Input(0.0, "N.m", "torque from outside on the outer gimbal about x")
@@ -203,7 +206,7 @@ class Gyro2dof(Component):
         return vector([about_x, about_y])
 
     def flow(self) -> None:
-        w = self.mount @ self.omega
+        w = self.mount @ (self.omega + (self.t - self.step_end) * self.alpha_b)  # omega is that of the step's end
         rate = self.precession(self.drift_rates())
         rate_x = rate[0]
         rate_y = rate[1]

@@ -10,7 +10,8 @@ Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut
 1.  the noise of this internal step is drawn (counter-based: it depends on ``seed``, the port and the
     count of internal steps, on nothing else);
 2.  the states advance, by the exponential Euler step ``x+ = x + h phi1(h A) f(x)`` with
-    ``A = df/dx`` (exact when f is linear in x) or by RK4 with declared substeps;
+    ``A = df/dx`` (exact when f is linear in x), with ``self.t`` at the start of the internal step or, "midpoint", in
+    its middle (second order for a part that follows an input through the step), or by RK4 with declared substeps;
 3.  the ``@sampled`` methods whose turn it is run, with ``self.t`` at the end of the internal step.
 
 ``self.t``, ``self.h`` are the present time and h; ``self.step_start``, ``self.step_end`` are t and t + H, which a part
@@ -63,7 +64,7 @@ class Component:
 
     version: ClassVar[str] = "1.0.0"
     sources: ClassVar[dict[str, str]] = {}  # files of the part by module name, where it was loaded from a bench
-    integrator: ClassVar[str] = "exponential"  # or "rk4"
+    integrator: ClassVar[str] = "exponential"  # or "midpoint", "rk4"
     rk4_substeps: ClassVar[int] = 20  # of one internal step
     nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
     declarations: ClassVar[dict[str, Declaration]] = {}
@@ -373,6 +374,8 @@ class Component:
         if self.integrator == "rk4":
             self._advance_rk4(h)
             return
+        if self.integrator == "midpoint":
+            self.t = self.t + 0.5 * h
         anew = getattr(self, self.nonlinear) != 0.0 if isinstance(self.nonlinear, str) else self.nonlinear
         if anew or h != self._phi_h:
             self._phi = phi1([[a * h for a in row] for row in self.jacobian()])

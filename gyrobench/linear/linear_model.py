@@ -49,7 +49,10 @@ class LinearizationError(GyrobenchError):
 
 @dataclass
 class Block:
-    """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable"."""
+    """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable".
+
+    within: B in the middle of each internal step, where a part follows an input through the communication step.
+    """
 
     slot: str
     inputs: list[str]
@@ -59,16 +62,20 @@ class Block:
     b: Array
     c: Array
     d: Array
+    within: list[Array]
 
     def held(self, step: float) -> tuple[Array, Array]:
         """Return exp(A h) and its integral times B: the exact step with the inputs held."""
         from scipy.linalg import expm
 
         n, m = self.b.shape
-        augmented = np.zeros((n + m, n + m))
-        augmented[:n, :n], augmented[:n, n:] = self.a, self.b
-        transition = expm(augmented * step)
-        return transition[:n, :n], transition[:n, n:]
+        ad, bd = np.eye(n), np.zeros((n, m))
+        for b in self.within:
+            augmented = np.zeros((n + m, n + m))
+            augmented[:n, :n], augmented[:n, n:] = self.a, b
+            transition = expm(augmented * (step / len(self.within)))
+            ad, bd = transition[:n, :n] @ ad, transition[:n, :n] @ bd + transition[:n, n:]
+        return ad, bd
 
 
 def operating_point(
@@ -151,7 +158,20 @@ class Linear:
         incoming = list(dict.fromkeys(c.input.variable for c in self.connections if c.target == slot))
         wired = [c.output.variable for c in self.connections if c.source == slot]
         outgoing = list(dict.fromkeys([*wired, *(n.partition(".")[2] for n in self.shown if n.startswith(slot + "."))]))
-        return Block(slot, incoming, outgoing, [s.name for s in part.states], *jacobians(part, incoming, outgoing))
+        a, b, c, d = jacobians(part, incoming, outgoing)
+        within = self._within(part, incoming, b)
+        return Block(slot, incoming, outgoing, [s.name for s in part.states], a, b, c, d, within)
+
+    def _within(self, part: Component, incoming: list[str], b: Array) -> list[Array]:
+        """Return B in the middle of each internal step; the one of the communication points where it is the same."""
+        now = part.t
+        part.step_end = now + self.step
+        found = []
+        for k in range(round(self.step / part.h)):
+            part.t = now + (k + 0.5) * part.h
+            found.append(jacobians(part, incoming, [])[1])
+        part.t = part.step_end = now
+        return [b] if all(np.array_equal(x, b) for x in found) else found
 
     def _late(self, c: Connection, name: str) -> bool:
         """Return whether this connection takes the output ``name`` from the previous step."""

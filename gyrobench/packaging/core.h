@@ -193,6 +193,9 @@ static void advance(Part *p, double h) {
     (void)jacobian;
     (void)phi1;
 #else
+#if MIDPOINT
+    p->n.v.t = p->n.v.t + 0.5 * h;
+#endif
     if (NONLINEAR || h != p->n.phi_h) {
         Square z;
         jacobian(p, z);

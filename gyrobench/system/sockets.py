@@ -68,6 +68,7 @@ SOCKETS: dict[str, Socket] = {
             (
                 inp("omega", "rad/s", "inertial rate of the case along x, y, z (outer gimbal, inner gimbal, spin)", 3),
                 inp("alpha", "rad/s2", "angular acceleration of the case along x, y, z", 3, optional=True),
+                inp("alpha_b", "rad/s2", "the same, of a case that is the base of a platform", 3, optional=True),
                 inp("f", "m/s2", "specific force along x, y, z", 3),
                 inp("i_x", "A", "current of the torquer about x, which nulls u_y"),
                 inp("i_y", "A", "current of the torquer about y, which nulls u_x"),

@@ -35,7 +35,7 @@ class StabilizerPower2dof(LoopTest):
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
     }
     wires = MOVED + LoopTest.wires + """
-        motion -> gyro: omega f
+        motion -> gyro: omega alpha=alpha_b f
         gyro.u_y -> stabilizer.u
         exciter.test[1] -> stabilizer.test
         load.M[1] -> stabilizer.M_load

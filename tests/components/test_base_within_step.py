@@ -188,3 +188,36 @@ def test_vertical_gyro(told, order):
     errors, found = orders(error)
     np.testing.assert_allclose(found, order, atol=0.2)
     assert bool(errors[-1] < 1e-5) is told
+
+
+# ------------------------------------------------------------------------------------------ power gyro
+def power_gyro():
+    """Both gimbal angles: gyroscopic torque H w x z_i about outer x and inner y, dampers, torques from outside."""
+    mount = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # gyro axes in case axes
+
+    def slope(t, x):
+        a, b, p, q = x
+        w = turned(0, a, mount @ rate(t))  # of the base, axes of the outer gimbal
+        outer = -10.0 * q * math.cos(b) - 10.0 * (p - w[0]) + 4.0
+        inner = 10.0 * (p * math.cos(b) - w[2] * math.sin(b)) - 2.0 * (q - w[1]) - 3.0
+        return [p - w[0], q - w[1], outer / 0.5, inner / 0.02]
+
+    return integrate(slope, np.zeros(4))[:2]
+
+
+@pytest.mark.parametrize(("told", "order"), [(False, 1.0), (True, 2.0)])
+def test_power_gyro(told, order):
+    """The outer gimbal bears the platform, the case is the base; small angles: test_isolation_by_hand."""
+    truth = power_gyro()
+    numbers = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0, "M_x": 4.0, "M_y": -3.0, "full": 1.0}
+    numbers |= {f"mount[{i},{j}]": float(i % 3 + 1 == j) for i in (1, 2, 3) for j in (1, 2, 3)}
+    numbers |= {f"{n}_{c}": 0.0 for n in ("markov", "white", "pickoff") for c in "xy"}
+    numbers |= {f"D{c}_{n}": 0.0 for c in "xy" for n in ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")}
+
+    def error(h):
+        given = {"names": ("omega", "alpha_b", "f"), **numbers}
+        return np.max(np.abs(ridden("gyro_2dof", h, ["alpha", "beta"], told, **given) - truth))
+
+    errors, found = orders(error)
+    np.testing.assert_allclose(found, order, atol=0.1)
+    assert bool(errors[-1] < 1e-5) is told  # rad, at 2 ms

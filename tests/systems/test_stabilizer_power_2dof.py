@@ -194,7 +194,7 @@ def test_measures_of_the_whole_run(whole: Any) -> None:
     assert c["PM"].estimate == pytest.approx(c["PM"].closed, abs=0.05)
     assert c["K_m limit"].estimate == pytest.approx(LIMIT, rel=0.01)
     assert c["f_n"].estimate == pytest.approx(17.43, rel=0.005)
-    assert c["isolation"].estimate == pytest.approx(c["isolation"].closed, abs=0.01)
+    assert c["isolation"].estimate == pytest.approx(c["isolation"].closed, abs=1e-3)
     assert abs(c["drift"].z) < 4.0 and abs(c["N"].z) < 4.0
     servo = c["servo rate"]
     assert servo.estimate == pytest.approx(servo.closed, abs=5 * servo.u)
@@ -237,16 +237,15 @@ def test_isolation_by_hand(whole: Any) -> None:
 
         a / base = C_x / (J_x s + C_x + H (H s + K_m) / (J_y s2 + C_y s))
 
-    The gyro gets the rate of the end of each step over the whole step, half a step early: a = alpha + angle of the
-    base, the small difference of two large angles, then has 1 - e^(s h/2) of the base in it, 0.25 % of a at 0.1 Hz.
+    A base held over the step, half a step early, would add 1 - e^(s h/2) of it: 0.25 % of a at 0.1 Hz.  The correction
+    acts on the angle at the start of the step: half a step late.  Noise leaves 0.03 % at 0.1 Hz.
     """
     result = load().reduce(whole)
     r = next(r for r in result.responses if r.name == "isolation")
     s = 2j * np.pi * np.array(r.x)
-    by_hand = 10.0 / (0.5 * s + 10.0 + 10.0 * (10.0 * s + 100.0) / (0.02 * s * s + 2.0 * s))
-    early = np.exp(s * 0.5e-4)
-    np.testing.assert_allclose(r.y, np.abs(by_hand * early + 1.0 - early), rtol=1e-3)
-    np.testing.assert_allclose(r.y, np.abs(by_hand), rtol=3e-3)
+    late = np.exp(-s * 0.5e-4)
+    by_hand = 10.0 / (0.5 * s + 10.0 + 10.0 * (10.0 * s + 100.0 * late) / (0.02 * s * s + 2.0 * s))
+    np.testing.assert_allclose(r.y, np.abs(by_hand), rtol=4e-4)
 
 
 # ------------------------------------------------------------------------------------ bad input
