@@ -1,0 +1,239 @@
+"""Analogue controller: networks against python-control, count loop, tachometer loop, presets; the capture law."""
+
+import math
+
+import control
+import numpy as np
+import pytest
+from wired import BENCH
+
+from gyrobench.component import Component, ComponentError, Input, Output, sampled
+from gyrobench.component.blocks.control import Capture
+from gyrobench.packaging import load_part
+
+Controller = load_part("controller_analog", BENCH)
+ERU, ARCSEC, GCM, DEG = 7.2921159e-5, math.pi / 648000, 9.80665e-5, math.pi / 180
+QUANTUM, J, M_MAX = 0.18 * ARCSEC, 2.56, 9.80665
+
+
+def started(**parameters):
+    inputs = {n: parameters.pop(n) for n in ("count_command", "rate_command", "enable") if n in parameters}
+    part = Controller(**parameters)
+    for name, x in inputs.items():
+        setattr(part, name, x)
+    part.initialize()
+    return part
+
+
+def network(number, w):
+    s = control.tf("s")
+    lag = (1 + 12 * s / w) / (1 + 60 * s / w)
+
+    def lead(r):
+        return (1 + math.sqrt(r) * s / w) / (1 + s / (math.sqrt(r) * w))
+
+    return {1: lead(4) ** 2 * lag, 2: lead(5) ** 2 * lag, 3: lead(28) ** 2, 4: lead(6.5) ** 3, 5: lead(14) * lag}[
+        number
+    ]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
+def test_networks(number):
+    """Step response of each set against python-control; the gain puts the crossover of J at w."""
+    w, h = 200.0, 1e-3
+    part = started(bank_network=number, bank_crossover=w, M_max=1e9)
+    gain = J * w * w / abs(network(number, w)(1j * w))
+    assert part.bank_K == pytest.approx(gain, rel=1e-12)
+    t = np.arange(60) * h
+    expected = control.forced_response(network(number, w), t, np.ones_like(t)).outputs * gain * 1000 * QUANTUM
+    part.count_command = 1000.0
+    out = []
+    for k in range(60):
+        part.do_step(k * h, h)
+        out.append(part.demand)
+    assert np.array(out[:-1]) == pytest.approx(expected[1:], rel=1e-9)
+
+
+def test_own_networks_and_gain():
+    part = started(
+        bank_network=0, bank_zeros=[10.0, 20.0, 30.0], bank_poles=[100.0, 20.0, 30.0], bank_gain=5.0, count_command=1e6
+    )
+    part.do_step(0.0, 1.0)
+    assert part.demand == pytest.approx(5.0 * 1e6 * QUANTUM, rel=1e-9)  # settled: 1e6 counts are 0.87 rad
+
+
+def test_count_loop_margins_and_constant_rate():
+    w = 40 * math.pi
+    part = started()
+    s = control.tf("s")
+    opened = part.bank_K * network(5, w) / (J * s * s)
+    _, pm, _, wc = control.margin(opened)
+    assert wc == pytest.approx(w, rel=1e-6) and pm > 50.0
+    h, x, v, errors = 5e-4, 0.0, 0.0, []
+    for k in range(4000):
+        reference = 10 * ERU * k * h
+        part.count_command, part.count = math.floor(reference / QUANTUM), math.floor(x / QUANTUM)
+        errors.append(x - reference)
+        part.do_step(k * h, h)
+        a = (part.demand + 140 * GCM) / J
+        x, v = x + v * h + 0.5 * a * h * h, v + a * h
+    # no error of a constant rate; 140 g.cm / 2662 g.cm/arcsec = 0.05 arcsec and one count
+    assert np.abs(errors[2000:]).max() / ARCSEC < 0.05 + 0.18
+    assert part.saturated == 0.0
+
+
+def test_preset_and_enable_switch_without_a_jump():
+    part = started(enable=0.0, count_command=40.0)
+    part.do_step(0.0, 1e-3)
+    assert part.demand == 0.0
+    part.enable = 1.0
+    part.do_step(1e-3, 1e-3)
+    assert part.demand == pytest.approx(part.bank_K * 40 * QUANTUM, rel=1e-12)
+    part.count_command = 80.0
+    part.preset = 1.0
+    part.do_step(2e-3, 1e-3)
+    assert part.demand == pytest.approx(part.bank_K * 80 * QUANTUM, rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------- tachometer
+def tacho(rate, time, h=1e-3, ripple=1e-3, cycles=36):
+    """Rate of a table with 6000 g.cm of friction, whose tachometer has ripple."""
+    part = started(loop=1)
+    part.rate_command = rate
+    w = angle = 0.0
+    out = []
+    for k in range(round(time / h)):
+        part.tacho = w * (1 + ripple * math.sin(cycles * angle))
+        part.do_step(k * h, h)
+        w += h * (part.demand - 6000 * GCM * math.tanh(w / 1e-4)) / J
+        angle += h * w
+        out.append(w)
+    return np.array(out)
+
+
+def spread(w):
+    return (w.max() - w.min()) / 2 / w[-1]
+
+
+def test_tachometer_loop():
+    # 99 % of 999.9 deg/s after 0.99 J w / (M - M_f) = 4.80 s
+    fast = tacho(999.9 * DEG, 7.0)
+    reached = np.argmax(fast > 0.99 * 999.9 * DEG) * 1e-3
+    assert reached == pytest.approx(0.99 * J * 999.9 * DEG / (M_MAX - 6000 * GCM), abs=0.02)
+    assert reached == pytest.approx(4.80, abs=0.01)
+    # 0.1 % of ripple at 36 cycles a turn: 1 Hz at 10 deg/s is inside the loop's 5 Hz, 100 Hz at 999.9 deg/s is not
+    assert spread(tacho(10 * DEG, 4.0)[-2000:]) == pytest.approx(1.1e-3, abs=0.1e-3)
+    assert spread(fast[-1000:]) == pytest.approx(5e-5, abs=1e-5)
+
+
+@pytest.mark.parametrize(("rate", "text"), [(1000.0, "above rate_rate_most"), (0.09, "use the synchronous rate")])
+def test_rates_of_the_tachometer_loop(rate, text):
+    part = started(loop=1)
+    part.rate_command = -rate * DEG
+    with pytest.raises(ComponentError, match=text):
+        for k in range(3):
+            part.do_step(k * 1e-3, 1e-3)
+
+
+# ---------------------------------------------------------------------------------------------- capture
+class Capturing(Component):
+    """Capture law and fine loop on a table with a float gyro (H/c 4/3, 1 ms), as a part."""
+
+    theta = Input(0.0, "rad", "float angle, positive for a table that lags")
+    tacho = Input(0.0, "rad/s", "table rate")
+    close = Input(1.0, "1", "1 closes the loop")
+    stage = Output("1", "stage")
+    torque = Output("N.m", "demand")
+    switched = Output("1", "1 at the switch")
+    law = Capture(sensitivity=4.0 / 3.0)
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        self.law.advance(self.close, self.theta, self.tacho, self.h)
+
+    def outputs(self) -> None:
+        self.stage = self.law_stage
+        self.switched = self.law_switched
+        self.torque = self.law.demand(self.theta, self.tacho)
+
+
+def simulate(fine_from_the_start, time, h=1e-4):
+    """Table, float and motor lag of 0.5 ms; the fine loop is the network of 1 ms.  Semi-implicit steps of 0.1 ms."""
+    H, tau, lag, w = 0.04, 1e-3, 0.5e-3, 100 * math.pi
+    c = 0.03
+    table = control.tf([H], [J * c * tau, J * c, H * H, 0]) * control.tf([1], [lag, 1])
+    gain = 1 / abs((table * network(2, w))(1j * w))
+    net = control.ss(gain * network(2, w))
+    dn = control.sample_system(net, h, "zoh")
+    # float angle, float rate, table rate, motor torque: exact step with the torque demanded held
+    a = np.zeros((4, 4))
+    a[0, 1] = 1
+    a[1, 1:3] = -1 / tau, H / (c * tau)
+    a[2, 1], a[2, 3] = -H / J, -1 / J
+    a[3, 3] = -1 / lag
+    plant = control.sample_system(control.ss(a, np.array([[0], [0], [0], [1 / lag]]), np.eye(4), np.zeros((4, 1))), h)
+    part = Capturing()
+    part.initialize()
+    x, xn, rows = np.array([2 * DEG, 0, 0, 0.0]), np.zeros(net.nstates), []
+    fine, t_switch = fine_from_the_start, None
+    for k in range(round(time / h)):
+        seen = float(np.clip(x[0], -0.5 * DEG, 0.5 * DEG))
+        if not fine:
+            part.theta, part.tacho = seen, -x[2]
+            if k % 10 == 0:
+                part.do_step(k * h, 1e-3)
+            u = part.get("torque")
+            if part.stage == 2.0:
+                fine, t_switch = True, k * h
+                xn = np.linalg.solve(np.eye(net.nstates) - dn.A, dn.B[:, 0] * seen)
+        if fine:
+            u = float((dn.C @ xn + dn.D[:, 0] * seen)[0])
+            xn = dn.A @ xn + dn.B[:, 0] * seen
+        x = plant.A @ x + plant.B[:, 0] * float(np.clip(u, -M_MAX, M_MAX))
+        x[2] -= h / J * 1400 * GCM * math.tanh(x[2] / 1e-4)
+        rows.append((x[0], x[2]))
+    return t_switch, np.array(rows)
+
+
+def test_capture_from_two_degrees():
+    t_switch, rows = simulate(False, 3.0)
+    assert t_switch == pytest.approx(2.17, abs=0.05)
+    outside = np.flatnonzero(np.abs(rows[:, 0]) > ARCSEC * 4 / 3)
+    assert outside[-1] * 1e-4 == pytest.approx(2.31, abs=0.1)
+    assert np.abs(rows[:, 1]).max() / DEG == pytest.approx(1.95, abs=0.05)
+    assert -rows[:, 0].min() / ARCSEC < 25
+
+
+def test_the_fine_loop_closed_at_two_degrees_diverges():
+    _, rows = simulate(True, 3.0)
+    assert np.abs(rows[-10000:, 0]).max() > 2 * DEG
+
+
+def test_the_capture_opens_and_begins_anew():
+    part = Capturing()
+    part.theta = 1e-5
+    part.initialize()
+    stages = []
+    for k in range(120):
+        part.close = 0.0 if 60 <= k < 65 else 1.0
+        part.do_step(k * 1e-3, 1e-3)
+        stages.append(part.stage)
+    assert (
+        stages[:50] == [1.0] * 50 and stages[50:60] == [2.0] * 10 and stages[60:65] == [0.0] * 5 and stages[65] == 1.0
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "theta", "text"),
+    [
+        ({"law_tacho": 0}, 0.0, "needs a tachometer"),
+        ({"law_near": 12 * ARCSEC}, 0.0, "beyond the linear range of the fine loop"),
+        ({}, 6 * DEG, "the sensor is at its stop"),
+    ],
+)
+def test_capture_refusals(parameters, theta, text):
+    with pytest.raises(ComponentError, match=text):
+        part = Capturing(**parameters)
+        part.theta = theta
+        part.initialize()
+        part.do_step(0.0, 1e-3)
