@@ -61,6 +61,20 @@ TABLES: tuple[Socket, ...] = (
         ),
     ),
     Socket(
+        "RateReadout",
+        "rate of a table axis from counts: by gates of time or by the time of an interval of angle",
+        (
+            inp("count", "1", "cumulative count", whole=True),
+            inp("t_read", "s", "instant to which the count belongs"),
+            out("rate", "rad/s", "rate of the last interval"),
+            out("valid", "1", "1 when there is one", whole=True),
+            limit_flag("overflow", "1 while the interval is beyond the display"),
+            out("number", "1", "intervals read since the start", whole=True),
+            out("t_start", "s", "start of the last interval"),
+            out("t_end", "s", "its end"),
+        ),
+    ),
+    Socket(
         "TableCommand",
         "reference motion of a table axis: mode and target in, cumulative command counts out",
         (

@@ -1,12 +1,13 @@
-"""Angle reading of a table: errors of the scale, coarse-fine carry, multiplier loop, incremental count.
+"""Angle reading of a table: errors of the scale, coarse-fine carry, multiplier loop, incremental count, rate readouts.
 
 Angles are those of the axis, rad.  A scale of p pole pairs repeats every 2 pi/p, its electrical cycle.
 """
 
 from __future__ import annotations
 
-from gyrobench.component.composition import Block
-from gyrobench.component.declarations import Discrete, Noise, Parameter
+from gyrobench.component.component import Component
+from gyrobench.component.composition import Block, sampled
+from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter
 from gyrobench.component.math import TWO_PI, Number, cos, exp, floor, sin
 
 
@@ -137,3 +138,58 @@ class MultiplierLoop(Block):
         n = nearest(self.lag / cycle)
         self.lag = self.lag - n * cycle
         self.slipped = self.slipped + n
+
+
+class RateReadout(Component):
+    """Common part of the readouts of a rate from counts with time stamps.  [READOUT-RATE]
+
+    A reading is what a sample of one communication step shows; one that repeats the stamp before is the same reading.
+    The parts write r_time, the time (s) of the last interval by their own clock, r_angle (rad) and the interval's ends.
+    """
+
+    step = Parameter(1e9, "s", "largest internal step: one reading for each communication step", above=0.0)
+    quantum = Parameter(TWO_PI / 7.2e6, "rad", "angle of a count (0.18 arcsec)", above=0.0)
+    clock = Parameter(0.0, "1", "relative error of the time base: it runs fast", min=-0.01, max=0.01)
+
+    count = Input(0.0, "1", "cumulative count")
+    t_read = Input(0.0, "s", "instant to which the count belongs")
+
+    rate = Output("rad/s", "rate of the last interval")
+    valid = Output("1", "1 when there is one")
+    overflow = Output("1", "1 while the interval is beyond the display")
+    number = Output("1", "intervals read since the start")
+    t_start = Output("s", "start of the last interval")
+    t_end = Output("s", "its end")
+
+    count_last = Discrete(0.0, "1", "count of the reading before")
+    t_last = Discrete(0.0, "s", "its stamp")
+    started = Discrete(0.0, "1", "1 after the first reading")
+    over = Discrete(0.0, "1", "the running interval is beyond the display")
+    r_number = Discrete(0.0, "1", "intervals read")
+    r_angle = Discrete(0.0, "rad", "angle of the last interval")
+    r_time = Discrete(0.0, "s", "its time by the readout's clock; 0: none")
+    r_start = Discrete(0.0, "s", "its start")
+    r_end = Discrete(0.0, "s", "its end")
+
+    @sampled(every=1)
+    def check_time(self) -> None:
+        self.refuse(
+            self.started == 1.0 and self.t_read < self.t_last,
+            "t_read = {t_read} s is before that of the last reading, {t_last} s: stamps must not go back",
+        )
+
+    def note(self) -> None:
+        """Keep the reading for the next one."""
+        self.count_last = self.count
+        self.t_last = self.t_read
+        self.started = 1.0
+
+    def outputs(self) -> None:
+        self.valid = 1.0 if self.r_time > 0.0 and self.over == 0.0 else 0.0
+        self.rate = 0.0
+        if self.valid == 1.0:
+            self.rate = self.r_angle / self.r_time
+        self.overflow = self.over
+        self.number = self.r_number
+        self.t_start = self.r_start
+        self.t_end = self.r_end
