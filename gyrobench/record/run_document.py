@@ -10,6 +10,7 @@ Keys that this version does not know are kept.  reports/run.schema.json is the p
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from pathlib import Path
@@ -51,11 +52,17 @@ class Entry(BaseModel):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON object: the keys that were given or changed, and numbers that are not finite as text."""
-        for name, field in type(self).model_fields.items():  # a list that was filled in place counts as given
-            if getattr(self, name) != field.get_default(call_default_factory=True):
+        for name, default in _defaults(type(self)).items():  # a list that was filled in place counts as given
+            if getattr(self, name) != default:
                 self.model_fields_set.add(name)
         document: dict[str, Any] = _plain(self.model_dump(exclude_unset=True, by_alias=True))
         return document
+
+
+@functools.cache
+def _defaults(entry: type[Entry]) -> dict[str, Any]:
+    """Return what each key is when it was never given; only to compare with."""
+    return {name: field.get_default(call_default_factory=True) for name, field in entry.model_fields.items()}
 
 
 class PlanRow(Entry):

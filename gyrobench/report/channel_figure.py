@@ -7,11 +7,14 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gyrobench import units as printed
 from gyrobench.report.numbers import superscript
-from gyrobench.report.plots import finite
 from gyrobench.report.style import CYCLE, SHADE, WIDE, axis_label, envelope, figure, span_labels, svg, time_axis
 
+Array = NDArray[np.float64]
 MOST = 6  # panels of a system that does not say which channels it shows
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.2)), (0, (2, 0.8)), (0, (6, 1, 1, 1)))
 
@@ -31,37 +34,40 @@ def panels(
     ``most`` quantities of the record, counters and flags after the others; all of them where there are no more.
     """
     vectors: dict[str, list[str]] = {}
+    columns = {name: np.asarray(values, dtype=float) for name, values in record.items()}
     for name in record:
         if name != "time":
             vectors.setdefault(re.sub(r"\[[\d,]+\]$", "", name), []).append(name)
     if declared:
         named = [[n for name in entry.split() for n in vectors.get(name, [])] for entry in declared]
-        moving = [[n for n in names if _moves(record[n])] for names in named]
+        moving = [[n for n in names if _moves(columns[n])] for names in named]
         return [names for names in moving if names]
     if len(vectors) <= most:
         return list(vectors.values())
 
     def dull(base: str) -> bool:
-        return all(_counts(record[n], units.get(n, "")) or not _moves(record[n]) for n in vectors[base])
+        return all(_counts(columns[n], units.get(n, "")) or not _moves(columns[n]) for n in vectors[base])
 
     chosen = sorted(vectors, key=dull)[:most]
     return [names for base, names in vectors.items() if base in chosen]
 
 
-def _moves(values: Sequence[float]) -> bool:
-    return len(values) > 0 and min(values) != max(values)
+def _moves(values: Array) -> bool:
+    known = values[~np.isnan(values)]
+    return known.size > 0 and bool(known.min() != known.max())
 
 
-def _counts(values: Sequence[float], unit: str) -> bool:
-    return unit == "1" and all(float(v).is_integer() for v in values)
+def _counts(values: Array, unit: str) -> bool:
+    return unit == "1" and bool(np.all(np.isfinite(values) & (values == np.floor(values))))
 
 
-def scaled(values: Sequence[float], unit: str) -> tuple[float, str]:
+def scaled(values: Sequence[float] | Array, unit: str) -> tuple[float, str]:
     """Factor and unit in which values recorded in an SI unit are easy to read: °, °/h, µV, mA, or 10⁻⁶ of the unit."""
     shown, factor = _SHOWN.get(unit, (printed.display(unit), 1.0))
-    if unit == "rad/s" and max((abs(v) for v in values), default=0.0) > printed.FAST:
+    largest = float(np.abs(values).max(initial=0.0))
+    if unit == "rad/s" and largest > printed.FAST:
         shown, factor = "°/s", 180.0 / math.pi
-    size = factor * max((abs(v) for v in values), default=0.0)
+    size = factor * largest
     exponent = 3 * math.floor(math.log10(size) / 3.0) if size > 0.0 else 0
     if 1e-2 <= size < 1e5:
         return factor, shown
@@ -78,10 +84,10 @@ def draw(
 
     plan: rows of run.json; where the exciter recorded its phase, they are shaded by what was excited.
     """
-    time = [float(v) for v in record["time"]]
-    if len(time) < 3 or not shown:
+    time = np.asarray(record["time"], dtype=float)
+    if time.size < 3 or not shown:
         return ""
-    divisor, time_unit = time_axis(time)
+    divisor, time_unit = time_axis((float(time.min()), float(time.max())))
     spans = [(a / divisor, b / divisor, label) for a, b, label in _phases(record, plan)]
     strip = [0.12] if spans else []  # over the panels, for the names of the phases
     heights = [*strip, *[1.0] * len(shown)]
@@ -89,11 +95,16 @@ def draw(
         WIDE, 14 + 27 * len(shown) + 8 * len(strip), nrows=len(heights), sharex=True, height_ratios=heights
     )
     for ax, names in zip(axes[len(strip) :, 0], shown, strict=True):
-        columns = [finite(time, [float(v) for v in record[n]]) for n in names]
-        factor, unit = scaled([v for _, y in columns for v in y], units.get(names[0], "SI"))
+        columns = [_finite(time, np.asarray(record[n], dtype=float)) for n in names]
+        factor, unit = scaled(np.concatenate([y for _, y in columns]), units.get(names[0], "SI"))
         for k, (name, (t, y)) in enumerate(zip(names, columns, strict=True)):
-            t, y = envelope([v / divisor for v in t], [v * factor for v in y])
-            ax.plot(t, y, linestyle=DASHES[k % 4], color=CYCLE[k % len(CYCLE)], linewidth=0.8, label=name)
+            ax.plot(
+                *envelope(t / divisor, y * factor),
+                linestyle=DASHES[k % 4],
+                color=CYCLE[k % len(CYCLE)],
+                linewidth=0.8,
+                label=name,
+            )
         common = names[0] if len(names) == 1 else _common(names)
         ax.set_title(axis_label(common.rstrip("."), unit) if common else f"in {unit}", pad=3)
         if len(names) > 1:
@@ -114,6 +125,11 @@ def draw(
     return svg(fig, key, zoom=axes[-1, 0])
 
 
+def _finite(t: Array, y: Array) -> tuple[Array, Array]:
+    keep = np.isfinite(t) & np.isfinite(y)
+    return t[keep], y[keep]
+
+
 def _common(names: Sequence[str]) -> str:
     """Return what the names begin with: slot and variable of a vector's elements, else the slot, else nothing."""
     for pattern in (r"\[[\d,]+\]$", r"(?<=\.).*$"):
@@ -128,12 +144,13 @@ def _phases(record: Mapping[str, Any], plan: Sequence[Mapping[str, Any]]) -> lis
     numbers = next((record[n] for n in record if n.endswith(".phase")), None)
     words = {row.get("phase"): _MODES.get(str(row.get("mode")), str(row.get("label"))) for row in plan}
     spans: list[tuple[float, float, str]] = []
-    for t, number in zip(record["time"], numbers if numbers is not None else [], strict=False):
-        word = words.get(int(number))
+    if numbers is None:
+        return []
+    changes = np.flatnonzero(np.diff(numbers)) + 1
+    for first, after in zip([0, *changes], [*changes, len(numbers)], strict=True):
+        word = words.get(int(numbers[first]))
         if word is None:
             continue
-        if spans and spans[-1][2] == word:
-            spans[-1] = (spans[-1][0], float(t), word)
-        else:
-            spans.append((float(t), float(t), word))
+        start = spans.pop()[0] if spans and spans[-1][2] == word else float(record["time"][first])
+        spans.append((start, float(record["time"][after - 1]), word))
     return spans

@@ -110,8 +110,11 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
 
     ``zoom`` is the axes whose x axis the page's script may zoom; its limits are written into the element.
     """
-    buffer = io.StringIO()
-    fig.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    buffer = io.StringIO()  # not by savefig, which draws everything twice
+    canvas: Any = FigureCanvasSVG(fig)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
     text = clean_svg(buffer.getvalue(), key)
     if zoom is not None:
         low, high = (float(v) for v in zoom.get_xlim())
@@ -169,7 +172,7 @@ def time_axis(seconds: Sequence[float]) -> tuple[float, str]:
     return 86400.0, "d"
 
 
-def envelope(x: Sequence[float], y: Sequence[float], buckets: int = 1500) -> tuple[list[float], list[float]]:
+def envelope(x: Any, y: Any, buckets: int = 1500) -> tuple[list[float], list[float]]:
     """Min-max envelope of a long record: every bucket keeps its smallest and its largest sample, in order.
 
     Records of at most ``4 * buckets`` samples come back whole.  No extreme is ever lost.
@@ -190,7 +193,7 @@ def envelope(x: Sequence[float], y: Sequence[float], buckets: int = 1500) -> tup
 def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
     """Shade every second span of the x axis and write its label above, in rows so that none overlap."""
     fig = ax.figure
-    fig.draw_without_rendering()
+    fig.get_layout_engine().execute(fig)
     renderer = fig.canvas.get_renderer() if hasattr(fig.canvas, "get_renderer") else None
     low, high = ax.get_xlim()
     width = ax.get_window_extent(renderer).width

@@ -6,6 +6,7 @@ Residuals come as stretches: runs of windows of equal length without a gap.  Not
 
 from __future__ import annotations
 
+import functools
 import math
 from itertools import pairwise
 from typing import Any
@@ -74,6 +75,15 @@ def normality(x: Array) -> tuple[float, float]:
     return float(w), float(p)
 
 
+@functools.cache
+def _degrees_of_freedom(m: int, n: int) -> float:
+    """Return those of the overlapping Allan variance over m of n rates with white noise."""
+    import allantools
+
+    edf = allantools.edf_greenhall(alpha=0, d=2, m=m, N=n + 1, overlapping=True, modified=False)
+    return float(edf)
+
+
 def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
     """Overlapping Allan deviation of rate means, pooled over stretches of the most frequent window length.
 
@@ -94,7 +104,7 @@ def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
             _, d, _, count = allantools.oadev(p, rate=1.0 / window, data_type="freq", taus=[m * window])
             if len(d) == 0 or count[0] < 1:
                 continue
-            edf = allantools.edf_greenhall(alpha=0, d=2, m=m, N=p.size + 1, overlapping=True, modified=False)
+            edf = _degrees_of_freedom(m, p.size)
             square += float(d[0]) ** 2 * edf
             freedom += edf
         if freedom > 0.0 and square > 0.0:
