@@ -62,4 +62,4 @@ class TableBody(AxisTable):
         self.angle_read = self.axis_x
         self.rate = rate
         self.rate_motor = rate + self.axis_twist_rate
-        self.friction = self.axis_rub
+        self.friction = self.axis_friction_ahead

@@ -202,7 +202,7 @@ def test_rates_and_forces_on_the_face():
         ({"axis_J": 0.0}, "axis_J = 0"),
         ({"axis_friction": 0.2, "axis_friction_static": 0.1}, "axis_friction_static = 0.1 N.m must be 0 or at least"),
         ({"axis_share": 1.0}, "axis_share = 1"),
-        ({"axis_friction": 0.2, "axis_friction_presliding": 1e-8}, "axis_friction_presliding is too small"),
+        ({"axis_friction": 0.2, "axis_friction_presliding": 1e-8}, "axis_friction_presliding = 1e-08 rad is too small"),
     ],
 )
 def test_what_is_refused(values, text):

@@ -30,6 +30,9 @@ class Presliding(Block):
     damping = Parameter(0.0, "N.m.s/rad", "damping of that deflection", min=0.0)
 
     z = Discrete(0.0, "rad", "deflection of the contact")
+    x_last = Discrete(0.0, "rad", "angle at the end of the last step")
+    now = Discrete(0.0, "N.m", "torque there")
+    ahead = Discrete(0.0, "N.m", "torque at the middle of the next step")
     spring = Discrete(0.0, "N.m/rad", "stiffness k before it slides")
 
     def start(self) -> None:
@@ -54,6 +57,30 @@ class Presliding(Block):
         """Return the torque on what turns at the rate v with the deflection z."""
         slip = v - fabs(v) * z / self.limit(v)
         return -(self.spring * z + self.damping * slip)
+
+    def rest(self, x: Number, v: Number) -> None:
+        """Begin at the angle x, free of torque, or sliding already at the rate v."""
+        self.x_last = x
+        self.z = 0.0
+        self.ahead = 0.0
+        if self.coulomb > 0.0 and v != 0.0:
+            self.z = sign(v) * self.limit(v)
+            self.ahead = self.torque(self.z, v)
+
+    def slide(self, x: Number, v: Number, acc: Number, per_J: Number) -> None:
+        """Take the contact to the angle x and the rate v; acc without friction and 1 / inertia tell the next step."""
+        if self.coulomb > 0.0:
+            self.refuse(
+                self.h * sqrt(self.spring * per_J) > 0.5,
+                "{self}_presliding = {presliding} rad is too small for the internal step, which must be at most "
+                "0.5 sqrt(J presliding / Coulomb torque): shorten the step",
+            )
+            dx = x - self.x_last
+            self.z = self.after(dx, dx / self.h)
+            self.now = self.torque(self.z, v)
+            middle = v + 0.5 * self.h * (acc + self.now * per_J)
+            self.ahead = self.torque(self.after(0.25 * self.h * (v + middle), middle), middle)
+        self.x_last = x
 
 
 class AxisBody(Block):
@@ -90,8 +117,6 @@ class AxisBody(Block):
     v = Discrete(0.0, "rad/s", "rate against the base at the end of the last step")
     acc = Discrete(0.0, "rad/s2", "inertial acceleration there")
     e = Discrete(0.0, "rad/s", "rate of the base about the axis there")
-    x_last = Discrete(0.0, "rad", "angle there")
-    rub = Discrete(0.0, "N.m", "friction at the middle of the next step")
     per_plate = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the plate")
     per_motor = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the motor")
     spring = Discrete(0.0, "N.m/rad", "stiffness between motor and plate")
@@ -107,13 +132,10 @@ class AxisBody(Block):
             self.spring = both * self.resonance * self.resonance
             self.damper = 2.0 * both * self.resonance * self.resonance_damping
         self.x = x
-        self.x_last = x
         self.v = v
         self.e = e
         self.w = e + v
-        if self.friction.coulomb > 0.0 and v != 0.0:  # it slides already
-            self.friction.z = sign(v) * self.friction.limit(v)
-            self.rub = self.friction.torque(self.friction.z, v)
+        self.friction.rest(x, v)
 
     def unbalanced(self, c: Number, s: Number, g: Vector) -> Number:
         """Return the torque of the unbalance: c, s of the table angle, g specific force along the axes at angle 0."""
@@ -131,7 +153,8 @@ class AxisBody(Block):
         """Write the derivatives; e at the end of the step, taken as its mean over it."""
         v = self.w - 0.5 * (self.e + e)
         inner = self.through(motor)
-        m = inner + load + self.rub + self.noise.rumble - self.viscous * v - self.cable * (self.x - self.cable_zero)
+        m = inner + load + self.noise.rumble - self.viscous * v - self.cable * (self.x - self.cable_zero)
+        m = m + self.friction.ahead
         self.der.x = v
         self.der.w = m * self.per_plate
         if self.resonance > 0.0:
@@ -145,20 +168,8 @@ class AxisBody(Block):
         """Take rate, acceleration and friction at the end of an internal step."""
         v = self.w - e
         m = self.through(motor) + load - self.viscous * v - self.cable * (self.x - self.cable_zero)
-        self.acc = m * self.per_plate
-        if self.friction.coulomb > 0.0:
-            fast = self.h * sqrt(self.friction.spring * self.per_plate)
-            self.refuse(
-                fast > 0.5,
-                "{self}_friction_presliding is too small for the internal step: step <= 0.5 sqrt(J presliding / M_c) "
-                "is needed; shorten the step",
-            )
-            dx = self.x - self.x_last
-            self.friction.z = self.friction.after(dx, dx / self.h)
-            self.acc = self.acc + self.friction.torque(self.friction.z, v) * self.per_plate
-            middle = v + 0.5 * self.h * self.acc
-            z = self.friction.after(0.25 * self.h * (v + middle), middle)
-            self.rub = self.friction.torque(z, middle)
-        self.x_last = self.x
+        acc = m * self.per_plate
+        self.friction.slide(self.x, v, acc, self.per_plate)
+        self.acc = acc + self.friction.now * self.per_plate
         self.v = v
         self.e = e
