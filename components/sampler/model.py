@@ -17,6 +17,7 @@ class Sampler(Component):
     samples x_0 (at the start) ... x_n (at the end) of a window
 
         mean = sum of h_j (x_{j-1} + x_j) / 2, j = 1..n, divided by t_end - t_start     (trapezoid)
+             = sum of h_j x_j, divided by t_end - t_start, where x is the mean over the step that ends (integrated = 1)
         std  = standard deviation (n - 1) of x_1 ... x_n about their arithmetic mean
 
     both summed as differences from x_0, so that millions of samples of a nearly constant signal lose nothing.
@@ -25,12 +26,15 @@ class Sampler(Component):
 
     One sample is one communication step (`step` is large for that reason).  Whole numbers are Real signals.
 
+    With integrated = 1 the mean of counts per step is the difference of the counts at the ends of the window, exactly.
+
     Not modelled: anti-alias filter, dead time and quantization of a real integrating meter.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
+    integrated = Parameter(False, bool, "1: the signal is its mean over the step that ends; 0: its value at the sample")
 
     x = Input(0.0, "1", "signal")
     angle = Input(0.0, "rad", "table angle, cumulative")
@@ -60,7 +64,7 @@ class Sampler(Component):
     angle_0 = Discrete(0.0, "rad", "angle there")
     x_0 = Discrete(0.0, "1", "signal there")
     before = Discrete(0.0, "1", "x - x_0 of the sample before")
-    area = Discrete(0.0, "1", "trapezoid sum of x - x_0")
+    area = Discrete(0.0, "1", "integral of x - x_0")
     total = Discrete(0.0, "1", "sum of x - x_0")
     squares = Discrete(0.0, "1", "sum of (x - x_0)2")
     steps = Discrete(0.0, "1", "steps so far")
@@ -111,7 +115,7 @@ class Sampler(Component):
             self.begin()
         else:
             d = self.x - self.x_0
-            self.area = self.area + 0.5 * self.h * (self.before + d)
+            self.area = self.area + (self.h * d if self.integrated else 0.5 * self.h * (self.before + d))
             self.before = d
             self.total = self.total + d
             self.squares = self.squares + d * d

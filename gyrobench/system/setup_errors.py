@@ -24,7 +24,7 @@ def setup_errors(
     ``system.assumed`` what system or part give it.
     """
     owners = {name: key for key, option in system.options.items() for name in option.sets.split()}
-    owners |= {name: "" for name in system.assumed if name not in owners}
+    owners |= {name.rstrip("?"): "" for name in system.assumed if name not in owners}
     bases = {_base(name) for name in owners}
     past = [name for name in system.overrides if _base(name) in bases]
     if not past:

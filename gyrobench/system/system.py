@@ -117,7 +117,7 @@ class System(Configurable):
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
-    ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes
+    ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
-from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings
 
@@ -43,10 +43,12 @@ def design(
     return np.column_stack([X, -along])
 
 
-def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Array, found: Findings) -> list[Effect]:
+def effects(
+    setup: TumbleSetup, turning: window_regressors.Turning, current: Array, spread: Array, found: Findings
+) -> list[Effect]:
     """All sources with their sensitivities; sizes come from ``setup`` and may be 0.
 
-    current (n,) in A with the sign of the precession convention.
+    current, spread (n,): mean in A with the sign of the precession convention, standard deviation in a window.
     """
     names, X = found.est.names[: found.X.shape[1]], found.X
     rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
@@ -73,6 +75,9 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
     full = float(np.max(np.abs(current))) or 1.0
     one = np.ones_like(current)
     along_i, along_o, along_s = np.eye(3)
+    windows = pulses.Windows(current, spread, turning.t_end - turning.t_start)
+    p = setup.pulses
+    counted = p.effects(found, setup.k, windows, setup.u_pulse, setup.u_switching) if p else []
     return [
         Effect("table axis off the pole, about east", setup.u_axis, "rad", axis(setup.base[0])),
         Effect("table axis off the pole, about p × east", setup.u_axis, "rad", axis(setup.base[1])),
@@ -94,6 +99,7 @@ def effects(setup: TumbleSetup, turning: window_regressors.Turning, current: Arr
         ),
         Effect("offset of the current reading", setup.u_current, "A", read(one)),
         Effect("resolution of the current reading", setup.quantum / 12.0**0.5, "A", read(one), "as if never dithered"),
+        *counted,
     ]  # fmt: skip
 
 

@@ -62,6 +62,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
     turning = window_regressors.Turning(
         column["angle_start"], column["angle_end"], column["t_start"], column["t_end"], face
     )
+    spread = np.asarray(windows.get("std", np.zeros(phase.size)), dtype=float)
     current = column["mean"] if setup.polarity == "project" else -column["mean"]
     rate = window_regressors.axis_rate(turning, setup.base, setup.latitude, setup.earth_rate)
     y = rate - setup.k * current
@@ -87,11 +88,11 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         DPH,
         candidates=_candidates(setup, turning, phase, windows),
     )
-    found = corrected(found, lambda f: budget.effects(setup, turning, current, f), setup.corrections)
+    found = corrected(found, lambda f: budget.effects(setup, turning, current, spread, f), setup.corrections)
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
     turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
     turns.test()
-    effects = budget.effects(setup, turning, current, found)
+    effects = budget.effects(setup, turning, current, spread, found)
     tilt_line = next(e for e in effects if e.source == budget.TOWARDS_OUTPUT)
     j = names.index("D_O") if "D_O" in names else 0
     dominant = abs(float(tilt_line.changes(found)[0, j])) * tilt_line.size > float(found.u[j])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata, setups
+from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.result import Specification
 
 
@@ -15,11 +16,15 @@ class TumbleSetup(setups.TumbleSetup):
     """k: torquer scale factor, rad/s/A.  terms: of the model.  quantum: resolution of the current reading.
 
     tilt: the small angle of the input axis towards the output axis (where it is estimated D_O rests on the dwells).
+    pulses: those of a pulse-width rebalance, where the current was counted.
     """
 
     k: float
     terms: int = 9
     quantum: float = 0.0
+    pulses: Pulses | None = None
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> TumbleSetup:
@@ -35,4 +40,5 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Tu
         truth=run_metadata.truth_of(run, drift.NAMES),
         terms=int(run.options.get("terms", 9)),
         quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
+        pulses=Pulses.of(run),
     )

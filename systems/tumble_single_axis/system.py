@@ -39,6 +39,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         }
         | CORRECTIONS
         | type_b("axis", "mount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
+        | type_b("pulse", "switching")
         | TORQUER
     )
     measured_data = MEASURED

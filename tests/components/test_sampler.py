@@ -137,3 +137,13 @@ def test_refuses(gate, window, message):
     part.initialize()
     with pytest.raises(ComponentError, match=message):
         part.do_step(0.0, H)
+
+
+def test_integrated_signal_is_summed():
+    # x of the step that ends: 1, 2 ... in steps 51 to 150 after the first open sample, which does not count
+    part = Sampler(integrated=1.0)
+    part.initialize()
+    for k in range(1, 151):
+        part.x, part.gate = (1e6 if k == 50 else k - 50.0), float(k >= 50)
+        part.do_step((k - 1) * H, H)
+    assert part.count == 1 and part.mean == pytest.approx(50.5, rel=1e-9)

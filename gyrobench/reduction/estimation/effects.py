@@ -37,7 +37,8 @@ class Effect:
     error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
     reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
     (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
-    change of the reported values, of a source that is not in the data.
+    change of the reported values, of a source that is not in the data.  simulated: the error that a simulated set-up
+    has, of a source without parts.
     """
 
     source: str
@@ -47,6 +48,7 @@ class Effect:
     note: str = ""
     parts: tuple[str, ...] = ()
     values: Array | None = None
+    simulated: float = 0.0
 
     def changes(self, fit: Findings) -> Array:
         """Return the change (m, q) of the reported values for one unit of each part, SI."""
@@ -156,5 +158,31 @@ def correction_table(fit: Findings) -> list[dict[str, Any]]:
             "closed formulas use the data as they are.",
             "columns": ["source", "value", "u", "unit"],
             "rows": [[c.source, c.value, c.u, c.unit] for c in fit.corrections],
+        }
+    ]
+
+
+def simulated_table(fit: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+    """Return the table of the shifts by simulated errors of the set-up; none where the effects have no such error.
+
+    A shift is sensitivity times error, less what a correction has taken out; it is known before anything is measured.
+    """
+    taken = {c.source: c.value for c in fit.corrections}
+    known = [e for e in effects if e.simulated]
+    if not known:
+        return []
+    shifts = [(e.simulated - taken.get(e.source, 0.0)) * e.changes(fit)[0] for e in known]
+    rows = []
+    for j, q in enumerate(fit.quantities):
+        each = [float(s[j]) / q.scale for s in shifts]
+        rows.append([q.title, *each, sum(each), float(fit.u[j]) / q.scale, q.unit])
+    errors = [f"({n}) {e.source}, {units.format_quantity(e.simulated, e.unit)}" for n, e in enumerate(known, 1)]
+    return [
+        {
+            "title": "Predicted shifts by simulated errors",
+            "caption": "Change of each estimate against a set-up without these errors, sensitivity of the budget times "
+            f"error: {'; '.join(errors)}.",
+            "columns": ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"],
+            "rows": rows,
         }
     ]

@@ -19,7 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import outliers, regression, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, budget_rows, correction_table, standard_changes
+from gyrobench.reduction.estimation.effects import (
+    Effect,
+    budget_rows,
+    correction_table,
+    simulated_table,
+    standard_changes,
+)
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
@@ -85,7 +91,14 @@ def linear_result(
         budget=_budget(fit, effects, random),
         type_b=_type_b(fit, effects, by_source),
         repeatability=dict(repeatability or {}),
-        tables=[*correction_table(fit), *_closed_table(fit, closed_caption), *tables, *fit.nuisance_tables(), *beside],
+        tables=[
+            *correction_table(fit),
+            *simulated_table(fit, effects),
+            *_closed_table(fit, closed_caption),
+            *tables,
+            *fit.nuisance_tables(),
+            *beside,
+        ],
         warnings=[*fit_warnings, *warnings],
         summary=[*summary, *fit.nuisance_sentences()],
         decision_rule=uncertainty.DECISION_RULE,

@@ -45,6 +45,8 @@ _TYPE_B = {
     "scale_factor": ("1", "relative standard uncertainty of the torquer scale factor"),
     "nonlinearity": ("1", "relative torquer nonlinearity at the largest current, standard unc."),
     "current": ("A", "standard uncertainty of the zero of the current meter"),
+    "pulse": ("A", "standard uncertainty of the positive less the negative current of a pulse rebalance"),
+    "switching": ("s", "standard uncertainty of the switching time of a pulse rebalance"),
     "time": ("1", "relative standard uncertainty of the time base"),
 }
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled
+from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Slot
 
 TWO_AXIS_NOISES = tuple(f"{name}_{axis}" for name in SDF_NOISES for axis in "xy")
@@ -19,6 +21,11 @@ REBALANCE = """
 """
 
 
+def pulse_errors(slot: str) -> tuple[str, ...]:
+    """Return the parameters of a rebalance by pulses that a test takes as zero."""
+    return tuple(f"{slot}.{name}?" for name in ("dI_plus", "dI_minus", "dT"))
+
+
 class RebalanceTest(TableTest):
     """A floated gyro holds its float by its torquer; the current of the torquer is read.
 
@@ -29,6 +36,35 @@ class RebalanceTest(TableTest):
     wires = TableTest.wires + REBALANCE
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "rebalance.meter")
     channels: ClassVar[tuple[str, ...]] = ("gyro.u", "rebalance.i", "gyro.drift")
+    assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, *pulse_errors("rebalance"))
+    #: slot of a rebalance -> its sampler, and what the gain of its loop is made of: pickoff gain, torquer scale factor
+    read_by: ClassVar[Mapping[str, tuple[str, str, str]]] = {"rebalance": ("sampler", "K_sg", "k")}
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        counting = {f"{s}.integrated?": 1 for r, (s, *_) in self.read_by.items() if f"{r}.f_q" in parts}
+        return {**super().parameters(parts), **counting}
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        problems = super().check_parameters(parameters)
+        for slot, (_, pickoff, torquer) in self.read_by.items():
+            problems += self._saw_problems(parameters, slot, pickoff, torquer)
+        return problems
+
+    def _saw_problems(self, parameters: Mapping[str, Any], slot: str, pickoff: str, torquer: str) -> list[str]:
+        """Return that the loop is too fast for the saw of a pulse-width rebalance.  [REBAL-PWM]"""
+        chain = [parameters.get(n) for n in (f"gyro.{pickoff}", f"gyro.{torquer}", f"{slot}.K_p", f"{slot}.f_s")]
+        floated = pickoff == "K_sg"  # the float turns at (H/C) k i, a free rotor at k i
+        ratio = parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or math.inf) if floated else 1.0
+        if None in chain:
+            return []
+        *gains, saw = (float(x) for x in chain)  # type: ignore[arg-type]
+        crossover = ratio * math.prod(gains) / (2.0 * math.pi)
+        if crossover <= 0.1 * saw:
+            return []
+        return [
+            f"{slot}.f_s = {saw:g} Hz: the loop crosses over at {crossover:.3g} Hz, the saw must be at least ten times "
+            f"faster; lower {slot}.K_p or raise {slot}.f_s"
+        ]
 
     def check(self) -> list[str]:
         problems = super().check()
@@ -64,6 +100,15 @@ class TwoChannelTest(RebalanceTest):
         + sampled("sampler_x")
         + sampled("sampler_y")
     )
+    assumed: ClassVar[tuple[str, ...]] = (
+        *TableTest.assumed,
+        *pulse_errors("rebalance_x"),
+        *pulse_errors("rebalance_y"),
+    )
+    read_by: ClassVar[Mapping[str, tuple[str, str, str]]] = {
+        "rebalance_x": ("sampler_x", "K_sg_y", "k_x"),
+        "rebalance_y": ("sampler_y", "K_sg_x", "k_y"),
+    }
     noises: ClassVar[tuple[str, ...]] = (*TWO_AXIS_NOISES, "rebalance_x.meter", "rebalance_y.meter")
     channels: ClassVar[tuple[str, ...]] = (
         "gyro.u_x",

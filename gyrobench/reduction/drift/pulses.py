@@ -1,0 +1,85 @@
+"""A rebalance that counts pulses of constant current: what errors of its pulses do to the readings.  [REBAL-PWM]
+
+With d = (n+ - n-)/(n+ + n-), read as the current I d, the mean current of a binary pulse-width loop is
+
+    I d + (dI_plus - dI_minus)/2 + d (dI_plus + dI_minus)/2 + (2 I + dI_plus + dI_minus) f_s (dT_1 + dT_2 d + dT_3 d2)
+
+[Hu 1981, eq. 5-74..5-76 with ET18; the product of both errors added], so the drift rate omega_IA - k I d is too large
+by k times what is beside I d.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.linear_fit import Findings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Readings (n,): mean and standard deviation of the current of each step (A), length of the window (s)."""
+
+    mean: Array
+    std: Array
+    length: Array
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """Pulse-width rebalance of a run: current (A), data clock, saw (Hz), and the errors that are simulated (A, s)."""
+
+    current: float
+    f_q: float
+    f_s: float
+    d_plus: float = 0.0
+    d_minus: float = 0.0
+    late: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, run: RunDocument, slot: str = "rebalance") -> Self | None:
+        """Return the pulses of the part in ``slot``; None where it has no saw and no clock."""
+        p = run.parameters
+        if any(f"{slot}.{name}" not in p for name in ("I", "f_q", "f_s")):
+            return None
+        late = [float(x) for x in p.get(f"{slot}.dT", (0.0, 0.0, 0.0))]
+        return cls(
+            float(p[f"{slot}.I"]),
+            float(p[f"{slot}.f_q"]),
+            float(p[f"{slot}.f_s"]),
+            float(p.get(f"{slot}.dI_plus", 0.0)),
+            float(p.get(f"{slot}.dI_minus", 0.0)),
+            (late[0], late[1], late[2]),
+        )
+
+    def effects(self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float) -> list[Effect]:
+        """Return the sources with their sensitivities.
+
+        k: torquer scale factor, rad/s/A.  u_pulse (A), u_switching (s): standard uncertainties, see the options.
+        """
+        d = read.mean / self.current
+        one = np.ones_like(d)
+        edge = k * (2.0 * self.current + self.d_plus + self.d_minus) * self.f_s
+        square = d**2 + (read.std / self.current) ** 2  # the noise of d is rectified
+        asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
+        counts = np.sqrt(np.sum((fit.gain * (2.0 * k * self.current / self.f_q / read.length)) ** 2, axis=1))
+        return [
+            Effect("asymmetry of the pulse currents", u_pulse, "A", 0.5 * k * one, "positive less negative current",
+                   simulated=asymmetry),
+            Effect("mean of the pulse currents", 0.0, "A", k * d, "part of the torquer scale factor", simulated=mean),
+            Effect("switching time of the pulses", u_switching, "s", edge * one, "edges too late",
+                   simulated=self.late[0]),
+            Effect("switching time, proportional to the current", u_switching, "s", edge * d, "at full current",
+                   simulated=self.late[1]),
+            Effect("switching time, by the square of the current", u_switching, "s", edge * square, "at full current",
+                   simulated=self.late[2]),
+            Effect("resolution of the counts", 12.0**-0.5, "1", None, "two clocks, independent from window to window",
+                   values=counts),
+        ]  # fmt: skip
