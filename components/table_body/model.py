@@ -57,7 +57,7 @@ class TableBody(AxisTable):
 
     def outputs(self) -> None:
         rate = self.axis_w - self.earth()
-        self.feel(cos(self.axis_x), sin(self.axis_x), self.axis_w, rate, self.axis_acc)
+        self.feel(cos(self.axis_x), sin(self.axis_x), self.axis_w, rate, self.axis_acc_mean)
         self.angle = self.axis_x
         self.angle_read = self.axis_x
         self.rate = rate

@@ -116,6 +116,10 @@ class AxisBody(Block):
 
     v = Discrete(0.0, "rad/s", "rate against the base at the end of the last step")
     acc = Discrete(0.0, "rad/s2", "inertial acceleration there")
+    acc_mean = Discrete(0.0, "rad/s2", "mean acceleration since the start of the communication step")
+    begun = Discrete(0.0, "s", "start of the communication step")
+    w_begun = Discrete(0.0, "rad/s", "inertial rate there")
+    w_last = Discrete(0.0, "rad/s", "inertial rate at the end of the last step")
     e = Discrete(0.0, "rad/s", "rate of the base about the axis there")
     per_plate = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the plate")
     per_motor = Discrete(0.0, "1/(kg.m2)", "1 / inertia of the motor")
@@ -136,6 +140,9 @@ class AxisBody(Block):
         self.e = e
         self.w = e + v
         self.friction.rest(x, v)
+        self.begun = self.t
+        self.w_begun = self.w
+        self.w_last = self.w
 
     def unbalanced(self, c: Number, s: Number, g: Vector) -> Number:
         """Return the torque of the unbalance: c, s of the table angle, g specific force along the axes at angle 0."""
@@ -165,7 +172,16 @@ class AxisBody(Block):
             self.der.twist_rate = -self.twist_rate
 
     def settle(self, motor: Number, load: Number, e: Number) -> None:
-        """Take rate, acceleration and friction at the end of an internal step."""
+        """Take rate, acceleration and friction at the end of an internal step.
+
+        acc_mean is what an instrument on the plate should get as its acceleration: it turns a change of w into the
+        same change of momentum.  Samples of a torque that jumps within the communication step do not.
+        """
+        if self.step_start != self.begun:
+            self.begun = self.step_start
+            self.w_begun = self.w_last
+        self.w_last = self.w
+        self.acc_mean = (self.w - self.w_begun) / (self.t - self.begun)
         v = self.w - e
         m = self.through(motor) + load - self.viscous * v - self.cable * (self.x - self.cable_zero)
         acc = m * self.per_plate
