@@ -86,10 +86,7 @@ class RebalancePwm(PulseRebalance):
     @sampled(every=1)
     def tick(self) -> None:
         if self.length > 0.0:
-            self.refuse(
-                fabs(self.h - self.coupling) > 1e-9 * self.h,
-                "the communication step must not change; it was {coupling} s",
-            )
+            self.require_same_step()
             self.count()
         else:
             self.measure_step()

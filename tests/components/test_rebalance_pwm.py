@@ -1,67 +1,19 @@
-"""Pulse-width rebalance: charge of the pulses, counts, the loop with a float in closed form, refusals.
-
-The float of these tests is written here: v' = (r - v)/tau, theta' = v with r = (H/C) (w - k i), solved exactly for a
-current that is constant over a step; H/C = 4/3, tau = 1 ms, k such that I is 1 deg/s (Hu 1981, section 5.5).
-"""
+"""Pulse-width rebalance: charge of the pulses, counts, the loop with a float in closed form, refusals."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
-from wired import BENCH
+from pulse_loop import ARCSEC, DEG, RATIO, TAU, I, Loop, RebalancePwm, W, loop_gain
 
 from gyrobench.component import ComponentError
-from gyrobench.packaging import load_part
 
-RebalancePwm = load_part("rebalance_pwm", BENCH)
-DEG = math.pi / 180.0
-ARCSEC = DEG / 3600.0
-RATIO, TAU, K_SG = 4.0 / 3.0, 1e-3, 10.0
-W = DEG  # full scale, rad/s
 N = 1e-6 * DEG  # rad, one clock of full torque
-I = RebalancePwm().I  # noqa: E741
-SCALE = W / I  # k, rad/s/A
 T_S, CLOCKS = 1e-3, 1000
-
-
-def loop_gain(hertz: float) -> dict[str, float]:
-    """Proportional only, crossover K_v = RATIO k K_p K_sg."""
-    return {"K_p": 2.0 * math.pi * hertz / (RATIO * SCALE * K_SG), "K_i": 0.0}
-
-
-class Loop:
-    """The part and the float; the part has the pickoff angle of now, the float the current of the coming step."""
-
-    def __init__(self, rate: float, step: float = T_S, **parameters: Any) -> None:
-        self.part = RebalancePwm(**{**loop_gain(20.0), **parameters})
-        self.part.initialize()
-        self.rate, self.step, self.k = rate, step, 0
-        self.theta = self.v = 0.0
-        self.decay = math.exp(-step / TAU)
-
-    def run(self, time: float, see: Callable[[Any], float] | None = None) -> np.ndarray:
-        seen = []
-        for _ in range(round(time / self.step)):
-            r = RATIO * (self.rate - SCALE * self.part.i)
-            self.theta += r * self.step + (self.v - r) * TAU * (1.0 - self.decay)
-            self.v = r + (self.v - r) * self.decay
-            self.part.u = K_SG * self.theta
-            self.part.do_step(self.k * self.step, self.step)
-            self.k += 1
-            if see:
-                seen.append(see(self))
-        return np.array(seen)
-
-    def measured(self, time: float) -> float:
-        """Mean rate by the counts."""
-        before = self.part.n_plus - self.part.n_minus
-        self.run(time)
-        return N * (self.part.n_plus - self.part.n_minus - before) / time
 
 
 # ------------------------------------------------------------------------------------------ pulses

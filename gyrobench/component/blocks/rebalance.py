@@ -57,8 +57,13 @@ class PulseRebalance(Component):
     def demand(self) -> Number:
         return clip(self.K_p * self.u + self.K_i * self.q, -self.I, self.I)
 
+    def require_same_step(self) -> None:
+        self.refuse(
+            fabs(self.h - self.coupling) > 1e-9 * self.h, "the communication step must not change; it was {coupling} s"
+        )
+
     def measure_step(self) -> None:
-        """Measure the communication step in clocks, where it is another one."""
+        """Measure the communication step in clocks."""
         self.coupling = self.h
         self.length = floor(self.h * self.f_q + 0.5)
         self.refuse(
