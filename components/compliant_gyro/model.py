@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Parameter, State
-from gyrobench.component.blocks.gyro import SdfGyro, torquer_rate
+from gyrobench.component.blocks.gyro import SdfGyro
 from gyrobench.component.math import cos, sin
 
 
@@ -25,16 +25,17 @@ class CompliantGyro(SdfGyro):
     Drift rate omega_d in precession sign as there, (X, Y, Z) = -f/g0 along I, O, S, g0 = 9.80665 m/s2:
 
         omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
-                  + turn-on constant + Gauss-Markov + white
+                  + D_T T_m + D_B . B + D_dB . dB + turn-on constant + Gauss-Markov + white
 
-    All ten terms may be given; there is no choice of `terms`, no ageing and no temperature (use floated_gyro).
+    All ten terms may be given; there is no choice of `terms`, no ageing and no temperature differences (use
+    floated_gyro).  T_m, k_T, B and dB as there.
 
     Not modelled: transverse inertia of the rotor (nutation; 1e-6 kg.m2 changes the response at 10 Hz by less than
     1e-3), drift torque on the rotor instead of the float, damping in the bearing, and what floated_gyro leaves out.
     Source: Hu 1981, ch. 2, eq. 2-57..2-67.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping", above=0.0)
     K_I = Parameter(400.0, "N.m/rad", "stiffness of rotor bearing and gimbal about I", above=0.0)
@@ -50,6 +51,6 @@ class CompliantGyro(SdfGyro):
         self.der.rotor_I = spring / self.H - sensed
         self.der.rotor_O = -self.K_I / self.H * self.rotor_I - self.float_rate - w[1]
         self.der.float_angle = self.float_rate
-        rate = self.drift_rate() + torquer_rate(self.k, self.k2, self.k3, self.i)
+        rate = self.drift_rate() + self.precession()
         torque = spring - self.H * rate - self.C * self.float_rate
         self.der.float_rate = torque / self.J - self.mount[1] @ self.alpha

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.blocks.gyro import SdfGyro, torquer_rate
+from gyrobench.component.blocks.gyro import SdfGyro
 from gyrobench.component.math import Number, Vector, cos, fabs, pi, sin, vector
 
 
@@ -20,7 +20,7 @@ class FloatedGyro(SdfGyro):
     Drift rate omega_d in precession sign, (X, Y, Z) = -f/g0 along I, O, S, g0 = 9.80665 m/s2   [2-36, 2-47..2-49]
 
         omega_d = F + X I + Y O + Z S + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
-                  + turn-on constant + Gauss-Markov + white
+                  + D_T T_m + D_B . B + D_dB . dB + turn-on constant + Gauss-Markov + white
         F = D_F (1 + p_F T) + D_vI v_I + D_vO v_O + D_vS v_S
                                                      I = D_I (1 + p_I T) + D_TI dT_S
         O = D_O (1 + p_O T) - D_TO dT_O              S = D_S (1 + p_S T) - D_TS dT_I        T = age + time
@@ -30,6 +30,8 @@ class FloatedGyro(SdfGyro):
     -D_Tzx dT_z X -> +D_TI dT_S X, +D_Tyy dT_y Y -> -D_TO dT_O Y, +D_Txz dT_x Z -> -D_TS dT_I Z.  dT_j is the
     temperature difference between the two ends of the float along j, v_j the velocity of the float against the case
     (D_vI = -D_vx, D_vO = -D_vy, D_vS = -D_vz of Hu 1981).  p_O has no physical cause there.
+    T_m (input `temperature`): mean temperature of the gyro above the one that the coefficients belong to; it also turns
+    k into k (1 + k_T T_m).  B, dB: magnetic field along I, O, S, and its differences over the gyro  [ENV-DISTURBANCE]
 
     `terms` says which model is meant: 3 = F, I, S; 4 = 3 + IS; 5 = 4 + II; 8 = 5 + SS, IO, OS; 9 = 8 + O;
     10 = 9 + OO.  A coefficient outside it must be 0.  Gauss-Markov: g+ = e^(-h/tau) g + sqrt(1 - e^(-2 h/tau))
@@ -54,7 +56,7 @@ class FloatedGyro(SdfGyro):
     Source: Hu 1981, ch. 2; Xia 2008, sections 2.1, 2.2.2.2 (corrected).
     """
 
-    version = "1.2.0"
+    version = "1.3.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
     K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)
@@ -119,7 +121,7 @@ class FloatedGyro(SdfGyro):
         w = self.mount @ self.omega
         sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
         rate = self.drift_rate()
-        torque = self.H * (sensed - rate - torquer_rate(self.k, self.k2, self.k3, self.i)) - self.C * self.float_rate
+        torque = self.H * (sensed - rate - self.precession()) - self.C * self.float_rate
         if self.K > 0.0:
             torque = torque - self.K * self.float_angle
         if self.dynamic > 0.0:
@@ -144,8 +146,7 @@ class FloatedGyro(SdfGyro):
             s = self.H * sin(self.float_angle)
             c = self.H * cos(self.float_angle)
             turn = w_o + self.float_rate
-            precession = self.H * (self.drift + torquer_rate(self.k, self.k2, self.k3, self.i))
-            along_o = self.C * self.float_rate + self.K * self.float_angle + precession
+            along_o = self.C * self.float_rate + self.K * self.float_angle + self.H * (self.drift + self.precession())
             self.M_react = self.mount[2] * s * turn - self.mount[0] * c * turn + self.mount[1] * along_o
             self.h_I = self.H * sin(self.float_angle + 0.5 * self.h * self.float_rate)
             self.M_I = -c * w_o

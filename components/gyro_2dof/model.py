@@ -40,6 +40,10 @@ class Gyro2dof(Component):
 
     The y channel is the x channel with (I, O, S) = (y, -x, z): along -x both X and dT_x change sign.
 
+    Surroundings add Dc_T T_m + Dc_B . B + Dc_dB . dB to omega_dc, and k_c becomes k_c (1 + k_T_c T_m); T_m (input
+    `temperature`): mean temperature above that of the coefficients, B, dB: magnetic field and its differences over the
+    gyro along x, y, z                                                                              [ENV-DISTURBANCE]
+
     Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses without lag).  p, q: inertial rates of rotor axis:
 
         J_x p' = -H q - C_x (p - omega_x) + T_x + M_x,     T_x = +H (omega_dy + k_x i_x (1 + ...))
@@ -67,7 +71,7 @@ class Gyro2dof(Component):
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.3.0"
+    version = "1.4.0"
     nonlinear = "full"
     integrator = "midpoint"
 
@@ -80,6 +84,8 @@ class Gyro2dof(Component):
     k3_x = Parameter(0.0, "1/A2", "nonlinearity of the torquer about x, relative, odd in the rate")
     k2_y = Parameter(0.0, "1/A", "nonlinearity of the torquer about y, relative, even in the rate")
     k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
+    k_T_x = Parameter(0.0, "1/K", "scale factor of the torquer about x per kelvin of mean temperature, relative")
+    k_T_y = Parameter(0.0, "1/K", "scale factor of the torquer about y per kelvin of mean temperature, relative")
     mount = Rotation("rows: gyro axes x, y, z in case axes")
 
     H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)
@@ -143,6 +149,9 @@ class Gyro2dof(Component):
     M_y = Input(0.0, "N.m", "torque from outside on the inner gimbal about y")
     dT = Input([0.0, 0.0, 0.0], "K", "temperature differences along x, y, z")
     v_float = Input([0.0, 0.0, 0.0], "m/s", "velocity of the float against the case, along x, y, z")
+    temperature = Input(0.0, "K", "mean temperature above that of the coefficients")
+    B = Input([0.0, 0.0, 0.0], "T", "magnetic field, case axes")
+    dB = Input([0.0, 0.0, 0.0], "T", "differences of the magnetic field over the gyro, case axes")
 
     u_x = Output("V", "x pickoff: case against rotor about x")
     u_y = Output("V", "y pickoff: case against rotor about y")
@@ -195,14 +204,22 @@ class Gyro2dof(Component):
         age = self.age + self.t
         for_x = vector([self.dT[2], -self.dT[1], -self.dT[0]])
         for_y = vector([-self.dT[0], self.dT[2], -self.dT[1]])
-        x = self.Dx.rate(g, age, for_x, self.v_float) + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
-        y = self.Dy.rate(g, age, for_y, self.v_float) + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
+        x = self.Dx.rate(g, age, for_x, self.v_float)
+        y = self.Dy.rate(g, age, for_y, self.v_float)
+        if self.Dx_exposed > 0.0 or self.Dy_exposed > 0.0:
+            field = self.mount @ self.B
+            difference = self.mount @ self.dB
+            x = x + self.Dx.surroundings(self.temperature, field, difference)
+            y = y + self.Dy.surroundings(self.temperature, field, difference)
+        x = x + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
+        y = y + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
         return vector([x, y])
 
     def precession(self, drift: Vector) -> Vector:
         """Return the rates of the rotor under drift and torquers; each torquer acts about the other axis."""
-        about_x = drift[0] + torquer_rate(self.k_y, self.k2_y, self.k3_y, self.i_y)
-        about_y = drift[1] + torquer_rate(self.k_x, self.k2_x, self.k3_x, self.i_x)
+        T = self.temperature
+        about_x = drift[0] + torquer_rate(self.k_y * (1.0 + self.k_T_y * T), self.k2_y, self.k3_y, self.i_y)
+        about_y = drift[1] + torquer_rate(self.k_x * (1.0 + self.k_T_x * T), self.k2_x, self.k3_x, self.i_x)
         return vector([about_x, about_y])
 
     def flow(self) -> None:

@@ -11,7 +11,7 @@ from gyrobench.bench import Bench
 
 if TYPE_CHECKING:
     from gyrobench.system.suite import Suite
-    from gyrobench.system.system import System
+    from gyrobench.system.system import Slot, System
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:
@@ -42,7 +42,7 @@ def complete_specification(incomplete: str) -> list[str]:
 def complete_setting(incomplete: str) -> list[str]:
     """Return "option=" for each option of the system named before; after "slot." the parameters of its part."""
     test = _named_before()
-    slots = getattr(test, "slots", {})
+    slots = _slots(test)
     slot, dot, _ = incomplete.partition(".")
     if test is None or (dot and slot not in slots):
         return []
@@ -58,7 +58,12 @@ def complete_setting(incomplete: str) -> list[str]:
 
 def complete_slot(incomplete: str) -> list[str]:
     """Return "slot=" for each slot of the system named before."""
-    return _starting((f"{s}=" for s in getattr(_named_before(), "slots", {})), incomplete)
+    return _starting((f"{s}=" for s in _slots(_named_before())), incomplete)
+
+
+def _slots(test: System | Suite | None) -> dict[str, Slot]:
+    """Return the slots of a system, those on request too; none of a suite."""
+    return {} if test is None or not hasattr(test, "all_slots") else test.all_slots()
 
 
 def _named_before() -> System | Suite | None:

@@ -48,6 +48,9 @@ def format_system(description: Mapping[str, Any]) -> str:
     lines += align_columns(
         [[n, s["socket"], f"{s['model']} {s['version']}", s["fmu"]] for n, s in slots], {0, 1, 2, 3}, "  "
     )
+    if description["on_request"]:
+        wanted = ", ".join(f"{n} (--set {n}.PARAMETER=VALUE or --part {n}=PART)" for n in description["on_request"])
+        lines += [f"  on request: {wanted}"]
     lines += ["", "wires"]
     for w in description["wires"]:
         marks = ["   (value of the previous step)"] * w["cut"] + ["   (not provided by the part)"] * (

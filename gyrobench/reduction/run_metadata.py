@@ -13,14 +13,25 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from gyrobench import frames
+import numpy as np
+
+from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import Result
+from gyrobench.result import Coefficient, Result
 
 R = TypeVar("R", bound=Result)
+#: estimates that belong to the mean temperature of the record -> their change per kelvin in the gyro, and its sign
+WARMED = {
+    "D_F": ("D_T", 1.0),
+    "ω_d": ("D_T", 1.0),
+    "Dx_0": ("Dx_T", 1.0),
+    "Dy_0": ("Dy_T", 1.0),
+    "R_x": ("Dy_T", 1.0),
+    "R_y": ("Dx_T", -1.0),
+}
 NO_TYPE_B = (
     "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare type_b = none."
 )
@@ -98,6 +109,7 @@ def finish(result: R, record: Record) -> R:
     series is a warning too.
     """
     result.provenance = record.run.as_dict()
+    _at_mean_temperature(result, record)
     if record.run.measured:
         result.warnings[:0] = record.run.notes
         if not record.run.type_b_stated:
@@ -106,3 +118,30 @@ def finish(result: R, record: Record) -> R:
         stopped = record.run.stopped_at or 0.0
         result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before the end of its plan.")
     return result
+
+
+def _at_mean_temperature(result: Result, record: Record) -> None:
+    """Say that constant drift belongs to the mean temperature of the record, and take the simulated truth from there.
+
+    The temperatures in a record are weighed as deviations from their mean (gyrobench.reduction.estimation.nuisances).
+    """
+    read = [np.asarray(v, dtype=float) for n, v in record.windows.items() if n.startswith("temperature")]
+    if not read:
+        return
+    mean = float(np.mean(read))
+    shown = f"{mean - 273.15:.2f} °C" if record.run.measured else f"{mean:.3g} K above that of the gyro's coefficients"
+    sentences = getattr(result, "conventions", None)
+    if sentences is not None:
+        sentences.append(f"Constant drift belongs to the mean temperature of the record, {shown}.")
+    for c in result.coefficients:
+        name, sign = WARMED.get(c.name, ("", 0.0))
+        per_kelvin = float(record.run.parameters.get(f"gyro.{name}", 0.0)) * sign
+        if c.truth is not None and per_kelvin:
+            _set_truth(c, c.truth + per_kelvin * mean / units.factor(c.unit))
+        if c.name == "temperature" and "gyro.D_T" in record.run.parameters:
+            _set_truth(c, float(record.run.parameters["gyro.D_T"]) / units.factor(c.unit))
+
+
+def _set_truth(c: Coefficient, truth: float) -> None:
+    c.truth = truth
+    c.z = (c.estimate - truth) / c.u if c.u > 0.0 else None

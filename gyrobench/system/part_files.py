@@ -21,10 +21,12 @@ def resolve_parts(
     Without a compiler the Python target is built, with a note.  Raises InvalidConfigurationError, BenchError and
     BuildError.
     """
+    for slot in parts:
+        system.request(slot)
     unknown = [s for s in parts if s not in system.slots]
     if unknown:
         raise InvalidConfigurationError(
-            system.name, [f"no slot '{s}'; slots: {', '.join(system.slots)}" for s in unknown]
+            system.name, [f"no slot '{s}'; slots: {', '.join(system.all_slots())}" for s in unknown]
         )
     paths: dict[str, Path] = {}
     built: dict[str, str] = {}

@@ -31,6 +31,12 @@ TABLE = (
     out("f", "m/s2", "specific force in face axes", 3),
     out("in_position", "1", "1 when the target is reached", whole=True),
 )
+#: what temperature and magnetic field do to a gyro
+EXPOSED = (
+    inp("temperature", "K", "mean temperature above that of the coefficients", optional=True),
+    inp("B", "T", "magnetic field along the axes of the case", 3, optional=True),
+    inp("dB", "T", "differences of the magnetic field over the gyro, axes of the case", 3, optional=True),
+)
 SOCKETS: dict[str, Socket] = {
     s.name: s
     for s in (
@@ -44,6 +50,19 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         Socket(
+            "Surroundings",
+            "temperature and magnetic field at the instrument",
+            (
+                inp("angle", "rad", "table angle", optional=True),
+                inp("face", "1", "rows: the instrument's axes in table axes", 3, 3, optional=True),
+                out("temperature", "K", "mean temperature of the instrument above that of its coefficients"),
+                out("room", "K", "temperature of the room above that of the coefficients", optional=True),
+                out("dT", "K", "temperature differences along the instrument's axes", 3, optional=True),
+                out("B", "T", "magnetic field along the instrument's axes", 3, optional=True),
+                out("dB", "T", "differences of the magnetic field over the instrument", 3, optional=True),
+            ),
+        ),
+        Socket(
             "SdfGyro",
             "single-degree-of-freedom gyro, case inputs and torquer in, pickoff out",
             (
@@ -53,6 +72,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("i", "A", "torquer current"),
                 inp("dT", "K", "temperature differences along I, O, S", 3, optional=True),
                 inp("v_float", "m/s", "velocity of the float against the case along I, O, S", 3, optional=True),
+                *EXPOSED,
                 out("u", "V", "pickoff voltage"),
                 out("drift", "rad/s", "drift rate, precession sign (diagnostic)", optional=True),
                 out("b", "rad", "float angle (diagnostic)", optional=True),
@@ -76,6 +96,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("M_y", "N.m", "outside torque on the inner gimbal, about y", optional=True),
                 inp("dT", "K", "temperature differences along x, y, z", 3, optional=True),
                 inp("v_float", "m/s", "velocity of the float against the case along x, y, z", 3, optional=True),
+                *EXPOSED,
                 out("u_x", "V", "x pickoff voltage: case against rotor about x"),
                 out("u_y", "V", "y pickoff voltage: case against rotor about y"),
                 out("drift_x", "rad/s", "drift rate about x, precession sign (diagnostic)", optional=True),

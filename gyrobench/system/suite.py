@@ -112,13 +112,13 @@ class Suite(Configurable):
             first, dot, rest = key.partition(".")
             if dot and first in members:
                 slot = rest.partition(".")[0]
-                if rest not in members[first].options and slot not in members[first].slots:
+                if rest not in members[first].options and slot not in members[first].all_slots():
                     raise InvalidValueError(f"{key}: {first} has no option {rest} and no slot {slot}")
                 to_one[first][rest] = value
                 continue
-            takers = [n for n, s in members.items() if (first in s.slots if dot else key in s.options)]
+            takers = [n for n, s in members.items() if (first in s.all_slots() if dot else key in s.options)]
             if not takers:
-                slots = sorted({x for s in members.values() for x in s.slots})
+                slots = sorted({x for s in members.values() for x in s.all_slots()})
                 options = sorted({x for s in members.values() for x in s.options} | set(self.options))
                 hint = suggest_names(first, [*members, *slots]) if dot else suggest_names(key, options)
                 missing = f"no slot '{first}'; " if dot else ""
@@ -133,9 +133,9 @@ class Suite(Configurable):
         Raises InvalidValueError for a slot that no test has.
         """
         for slot in given:
-            if not any(slot in s.slots for s in members.values()):
+            if not any(slot in s.all_slots() for s in members.values()):
                 raise InvalidValueError(f"no test of the suite has a slot '{slot}'")
-        return {n: {slot: v for slot, v in given.items() if slot in s.slots} for n, s in members.items()}
+        return {n: {slot: v for slot, v in given.items() if slot in s.all_slots()} for n, s in members.items()}
 
     def seed_of(self, seed: int, name: str) -> int:
         """The seed of one test; with it the test alone gives the same record."""

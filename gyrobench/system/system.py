@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InvalidConfigurationError",
     "MeasuredData",
+    "OnRequest",
     "Option",
     "Slot",
     "System",
@@ -85,6 +86,19 @@ class Windows:
 
 
 @dataclass(frozen=True)
+class OnRequest:
+    """Slots that a system has only where they are asked for: a part is put into the first, or a parameter of it is set.
+
+    Without them the system is the one it was: no FMU, no wire, no column more.  columns: further ones of the windows.
+    """
+
+    slots: Mapping[str, Slot]
+    wires: str
+    columns: Mapping[str, str] = field(default_factory=dict)
+    channels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class MeasuredData:
     """How a laboratory's record of a test is written and read.
 
@@ -101,6 +115,7 @@ class System(Configurable):
 
     slots: ClassVar[Mapping[str, Slot]] = {}
     wires: ClassVar[str] = ""
+    on_request: ClassVar[Mapping[str, OnRequest]] = {}  # by the name of their first slot
     open: ClassVar[tuple[str, ...]] = ()  # "slot.input" left at its start value on purpose: no note says so
     #: of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too), or a function of the parts that gives it
     factors: ClassVar[Mapping[str, float | Callable[[PartValues], float]]] = {}
@@ -128,13 +143,15 @@ class System(Configurable):
     def set(self, name: str, value: Any) -> None:
         """Set an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""
         slot, dot, _ = name.partition(".")
+        if dot:
+            self.request(slot)
         if name in self.options:
             super().set(name, value)
         elif slot in self.slots and dot:
             self.overrides[name] = value  # parsed when the part and so the unit is known
             self._was_given(name)
         elif dot:
-            raise InvalidValueError(f"{name}: no slot '{slot}'; {suggest_names(slot, self.slots)}")
+            raise InvalidValueError(f"{name}: no slot '{slot}'; {suggest_names(slot, self.all_slots())}")
         else:
             import difflib
 
@@ -143,6 +160,24 @@ class System(Configurable):
                 f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "
                 f"is written slot.parameter, slots: {', '.join(self.slots)}"
             )
+
+    def request(self, slot: str) -> None:
+        """Add the slots that :attr:`on_request` has under this name; nothing for any other, or where they are there."""
+        wanted = self.on_request.get(slot)
+        if wanted is None or slot in self.slots:
+            return
+        more: dict[str, Any] = {
+            "slots": {**self.slots, **wanted.slots},
+            "wires": f"{self.wires}\n{wanted.wires}",
+            "channels": (*self.channels, *wanted.channels),
+        }
+        if self.windows is not None:
+            more["windows"] = replace(self.windows, columns={**self.windows.columns, **wanted.columns})
+        vars(self).update(more)
+
+    def all_slots(self) -> dict[str, Slot]:
+        """Return the slots, and those that can be asked for."""
+        return {**{name: r.slots[name] for name, r in self.on_request.items()}, **self.slots}
 
     @classmethod
     def with_parts(cls, **parts: str) -> dict[str, Slot]:

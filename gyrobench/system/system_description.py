@@ -35,6 +35,7 @@ def describe(assembly: Assembly) -> dict[str, Any]:
         "spec": list(system.spec),
         "step": system.step,
         "slots": slots,
+        "on_request": [name for name in system.on_request if name not in system.slots],
         "wires": wires,
         **assembly.order.as_dict(system.step),
         "plan": system.plan().rows(),

@@ -10,7 +10,7 @@ from gyrobench import drift
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
-from gyrobench.system.families.table_test import Array, sampled
+from gyrobench.system.families.table_test import Array, sampled, surroundings
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
@@ -43,6 +43,7 @@ class TumbleTwoAxis(RebalanceTest):
         rebalance.i_read -> sampler_inner.x
         {sampled("sampler_inner", "table: angle_y_read")}
     """
+    on_request = surroundings("table: angle_x_read", turned=False)
     options = (
         SITE
         | PHYSICAL_FORM

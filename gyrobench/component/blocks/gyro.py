@@ -63,6 +63,31 @@ class GaussMarkov(Block):
         self.value = self.decay * self.value + self.innovation * self.noise.rms
 
 
+class Exposure(Block):
+    """Drift rate that temperature and magnetic field add, linear in both.  [ENV-DISTURBANCE]
+
+        T (temperature) + B . (field) + dB . (differences of the field over the length of the gyro)
+
+    temperature: mean of the gyro, K above the temperature that its coefficients belong to; field in T along the axes of
+    the gyro.  With all of them 0, as they are unless set, nothing is computed.
+    """
+
+    T = Parameter(0.0, "rad/s/K", "drift rate per kelvin of mean temperature")
+    B = Parameter([0.0, 0.0, 0.0], "rad/s/T", "drift rate per magnetic field along each axis")
+    dB = Parameter([0.0, 0.0, 0.0], "rad/s/T", "drift rate per difference of the magnetic field along each axis")
+    exposed = Discrete(0.0, "1", "1 where one of these sensitivities is given")
+
+    def start(self) -> None:
+        self.exposed = 1.0 if self.T != 0.0 else 0.0
+        for j in range(3):
+            if self.B[j] != 0.0 or self.dB[j] != 0.0:
+                self.exposed = 1.0
+
+    def added(self, temperature: Number, field: Vector, difference: Vector) -> Number:
+        """Return the drift rate that the surroundings add."""
+        return self.T * temperature + vector(self.B) @ field + vector(self.dB) @ difference
+
+
 class ChannelDrift(Block):
     """Static drift of one channel of a two-degree-of-freedom gyro, ten terms along x, y, z.  [GYRO-STATIC-2DOF]
 
@@ -72,7 +97,8 @@ class ChannelDrift(Block):
     [GYRO-COEFF-TIME-TEMP; Hu 1981, eq. 2-39..2-42]
     """
 
-    suffixes = {"fixed": "0"}
+    suffixes = {"fixed": "0", "exposure": ""}
+    exposure = Exposure()
     fixed = Parameter(0.0, "rad/s", "constant drift")
     x = Parameter(0.0, "rad/s", "per g0 along x")
     y = Parameter(0.0, "rad/s", "per g0 along y")
@@ -114,12 +140,18 @@ class ChannelDrift(Block):
         square = vector([self.xx, self.yy, self.zz, self.xy, self.yz, self.xz])
         return drift_polynomial(fixed, vector([along_x, along_y, along_z]), square, g)
 
+    def surroundings(self, temperature: Number, field: Vector, difference: Vector) -> Number:
+        """Return the drift rate that the surroundings add."""
+        return self.exposure.added(temperature, field, difference)
+
 
 class SdfGyro(Component):
     """Common part of single-degree-of-freedom gyros: float, pickoff, torquer, mount, static and random drift, ports.
 
         omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
-                  + turn-on bias + Gauss-Markov + white                     (X, Y, Z) = -f/g0 along I, O, S
+                  + D_T T + D_B . B + D_dB . dB + turn-on bias + Gauss-Markov + white
+        (X, Y, Z) = -f/g0 along I, O, S; T: mean temperature above that of the coefficients; B, dB: magnetic field
+        torquer: precession rate k (1 + k_T T) i (1 + k2 i + k3 i2)
         u = K_sg b + noise, limited to +-u_max
 
     Axes I, O, S (input, output, spin reference) are those of the mount: v_gyro = mount v_case.  [GYRO-STATIC-10]
@@ -132,6 +164,7 @@ class SdfGyro(Component):
     k = Parameter(17.2e3 * DEG_H, "rad/s/A", "torquer scale factor (17.2 deg/h/mA)", above=0.0)
     k2 = Parameter(0.0, "1/A", "torquer nonlinearity, relative, even in the rate")
     k3 = Parameter(0.0, "1/A2", "torquer nonlinearity, relative, odd in the rate")
+    k_T = Parameter(0.0, "1/K", "torquer scale factor per kelvin of mean temperature, relative")
     mount = Rotation("rows: gyro axes I, O, S in case axes")
 
     D_F = Parameter(-0.3 * DEG_H, "rad/s", "acceleration-insensitive drift rate (-0.3 deg/h)")
@@ -145,6 +178,8 @@ class SdfGyro(Component):
     D_OS = Parameter(-0.02 * DEG_H, "rad/s", "drift rate per g0 squared, O and S (-0.02 deg/h/g2)")
     D_IS = Parameter(-0.15 * DEG_H, "rad/s", "drift rate per g0 squared, I and S, anisoelasticity (-0.15 deg/h/g2)")
 
+    D = Exposure()
+
     turn_on = Noise(0.0, "rad/s", "rms of the turn-on bias, one value a run", per="start")
     markov = GaussMarkov(0.002 * DEG_H, "rad/s", "Gauss-Markov drift", "0.002 deg/h")
     white = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density (0.0178 deg/h/sqrt(Hz))")
@@ -154,6 +189,9 @@ class SdfGyro(Component):
     alpha = Input([0.0, 0.0, 0.0], "rad/s2", "angular acceleration, case axes")
     f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
     i = Input(0.0, "A", "torquer current")
+    temperature = Input(0.0, "K", "mean temperature above that of the coefficients")
+    B = Input([0.0, 0.0, 0.0], "T", "magnetic field, case axes")
+    dB = Input([0.0, 0.0, 0.0], "T", "differences of the magnetic field over the gyro, case axes")
 
     u = Output("V", "pickoff voltage")
     drift = Output("rad/s", "drift rate omega_d, precession sign")
@@ -172,9 +210,15 @@ class SdfGyro(Component):
         return self.polynomial(self.D_F, vector([self.D_I, self.D_O, self.D_S]), x)
 
     def drift_rate(self) -> Number:
-        """Return omega_d: static and random."""
+        """Return omega_d: static, of the surroundings, and random."""
         static = self.static_drift(PER_G * (self.mount @ self.f))
+        if self.D_exposed > 0.0:
+            static = static + self.D.added(self.temperature, self.mount @ self.B, self.mount @ self.dB)
         return static + self.noise.turn_on + self.markov_value + self.noise.white
+
+    def precession(self) -> Number:
+        """Return the precession rate by the torquer."""
+        return torquer_rate(self.k * (1.0 + self.k_T * self.temperature), self.k2, self.k3, self.i)
 
     def outputs(self) -> None:
         self.drift = self.drift_rate()

@@ -82,12 +82,13 @@ def scatter(name: str, meaning: str, groups: Sequence[object]) -> Candidate:
 
 
 def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
-    """The candidates of every test: a trend and what thermometers read (columns temperature...).
+    """The candidates of every test: what thermometers read (columns temperature...), and a trend.
 
+    A temperature that only ramps is a trend: what was measured comes first, and the trend is named as its alias.
     channel: appended to their names, where several channels are reported together.
     """
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    return [replace(c, name=c.name + channel) for c in (trend(t0, t1), *temperature(windows))]
+    return [replace(c, name=c.name + channel) for c in (*temperature(windows), trend(t0, t1))]
 
 
 def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:

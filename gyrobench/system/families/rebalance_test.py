@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled
+from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled, surroundings
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Slot
+from gyrobench.system.system import OnRequest, Slot
 
 TWO_AXIS_NOISES = tuple(f"{name}_{axis}" for name in SDF_NOISES for axis in "xy")
 STEP_MAX = 5e-3  # s
@@ -34,6 +34,7 @@ class RebalanceTest(TableTest):
 
     slots: ClassVar[Mapping[str, Slot]] = on_table(table="Table", gyro="SdfGyro", rebalance="Rebalance")
     wires = TableTest.wires + REBALANCE
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "rebalance.meter")
     channels: ClassVar[tuple[str, ...]] = ("gyro.u", "rebalance.i", "gyro.drift")
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, *pulse_errors("rebalance"))

@@ -25,11 +25,11 @@ from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.servo_expectation import Expected, capture_problems
-from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled
+from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled, surroundings
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import MeasuredData, Slot
+from gyrobench.system.system import MeasuredData, OnRequest, Slot
 
 #: table axes (rows) in the axes x, y, z of the attitude at angle 0: the transpose of ON_TABLE
 BASE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
@@ -94,6 +94,7 @@ class ServoTest(TableTest):
     gyro -> sampler: u=x saturated=flag
     {sampled()}
     """
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=False)
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
         | PHYSICAL_FORM

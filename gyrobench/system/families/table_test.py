@@ -14,7 +14,7 @@ from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.families.physical_form import physical_drift
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.system import OnRequest, Option, Slot, System, Windows
 
 Array = NDArray[np.float64]
 FACE = "input axis along the table axis"
@@ -51,6 +51,28 @@ TABLE = """
 """
 
 
+def surroundings(angle: str = "table: angle_read", turned: bool = True) -> dict[str, OnRequest]:
+    """Return the slot with the temperature and the magnetic field at the gyro, and a thermometer in the windows.
+
+    angle: "slot: output", as of :func:`sampled`.  turned: the field is turned into gyro axes, which takes a table with
+    one axis that stands on the site itself.
+    """
+    wires = f"""
+    surroundings -> gyro: temperature dT
+    surroundings -> thermometer: temperature=x
+    {sampled("thermometer", angle)}
+    """
+    if turned:
+        wires += """
+    surroundings -> gyro: B dB
+    table -> surroundings: angle
+    sequencer -> surroundings: face
+    """
+    slots = {"surroundings": Slot("Surroundings", "surroundings"), "thermometer": Slot("Sampler", "sampler")}
+    columns = {"temperature": "thermometer.mean"}
+    return {"surroundings": OnRequest(slots, wires, columns, ("surroundings.temperature",))}
+
+
 class TableTest(System):
     """The sequencer moves the table through the plan; the sampler averages a reading over windows of each phase.
 
@@ -83,6 +105,7 @@ class TableTest(System):
             **self.owned(),
             **physical_drift(self, parts),
             "table.base": self.base(),
+            **({"surroundings.base": self.base()} if self._field_turned() else {}),
         }
 
     def check(self) -> list[str]:
@@ -94,7 +117,23 @@ class TableTest(System):
             f"sequencer.faces, {n}": face for n, face in self.planned_faces(parameters).items()
         }
         matrices |= {n: m for n, m in parameters.items() if n.endswith((".mount", ".base")) and np.shape(m) == (3, 3)}
-        return frames.rotation_problems(matrices)
+        return frames.rotation_problems(matrices) + self._field_problems(parameters)
+
+    def _field_turned(self) -> bool:
+        return "sequencer -> surroundings: face" in self.wires
+
+    def _field_problems(self, parameters: Mapping[str, Any]) -> list[str]:
+        given = [
+            name
+            for name in ("field", "field_swing", "field_difference")
+            if np.any(np.asarray(parameters.get(f"surroundings.{name}", 0.0)) != 0.0)
+        ]
+        if not given or self._field_turned():
+            return []
+        return [
+            f"surroundings.{given[0]}: this test does not turn the field into gyro axes; it is possible in tests on a "
+            "table with one axis that stands on the site (tumble_single_axis, fixed_position ...)"
+        ]
 
 
 class OpenLoopTest(TableTest):
@@ -108,5 +147,6 @@ class OpenLoopTest(TableTest):
     gyro -> sampler: u=x saturated=flag
     """
     )
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
     open: ClassVar[tuple[str, ...]] = ("gyro.i",)
     noises: ClassVar[tuple[str, ...]] = SDF_NOISES

@@ -1,0 +1,111 @@
+"""Drift tests with temperature and magnetic field: the thermometer in the record, and what reductions make of it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from tumbling import DPH, NAMES, SHORT, load, quiet
+
+from gyrobench.engine.session import Session
+from gyrobench.packaging import build
+from gyrobench.record.record import Record
+from gyrobench.result import DriftTestResult
+from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.system import load_system
+
+PER_KELVIN = 0.2 * DPH  # rad/s/K
+FIELD = {"surroundings.field[3]": -44e-6, "gyro.D_B[1]": 2000.0 * DPH, "gyro.D_B[3]": -500.0 * DPH}
+
+
+@pytest.fixture(scope="module")
+def prepared() -> Iterator[Session]:
+    system = load()
+    system.request("surroundings")
+    with Session(system) as session:
+        yield session
+
+
+@pytest.fixture(scope="module")
+def ramp(prepared: Session) -> Record:
+    """A tumble of 12 minutes in which the room warms by 20 K/h, and the gyro follows with 200 s."""
+    values = {"surroundings.ramp": 20.0 / 3600.0, "surroundings.tau": 200.0, "gyro.D_T": PER_KELVIN}
+    return prepared.run({**SHORT, **values}, seed=12)
+
+
+def reduced(record: Record, **columns: Any) -> DriftTestResult:
+    reduction = importlib.import_module(".reduction", type(load()).__module__)
+    windows = {n: v for n, v in record.windows.items() if n in columns or n != "temperature"} | columns
+    result = reduction.from_record.__wrapped__(Record(windows, {}, record.run))
+    assert isinstance(result, DriftTestResult)
+    return result
+
+
+def test_the_record_has_the_mean_temperature_of_each_window(ramp: Record) -> None:
+    """T = r (t - tau (1 - e^(-t/tau))), averaged over a window by its ends and middle (Simpson)."""
+
+    def temperature(t: np.ndarray) -> np.ndarray:
+        return np.asarray(20.0 / 3600.0 * (t - 200.0 * (1.0 - np.exp(-t / 200.0))))
+
+    t0, t1 = ramp.windows["t_start"], ramp.windows["t_end"]
+    mean = (temperature(t0) + 4.0 * temperature((t0 + t1) / 2.0) + temperature(t1)) / 6.0
+    assert ramp.windows["temperature"] == pytest.approx(mean, abs=1e-6)
+    assert ramp.run.window_units["temperature"] == "K"
+
+
+def test_coefficients_and_drift_per_kelvin_come_back(ramp: Record) -> None:
+    """D_F is that of the mean temperature: -0.3 + 0.2 x mean."""
+    result = reduced(ramp, temperature=ramp.windows["temperature"])
+    found = {c.name: c for c in result.coefficients}
+    assert set(found) == {*NAMES, "temperature"}
+    assert found["temperature"].truth == pytest.approx(0.2)
+    assert found["D_F"].truth == pytest.approx(-0.3 + 0.2 * float(np.mean(ramp.windows["temperature"])))
+    for c in result.coefficients:
+        assert c.truth is not None and c.interval[0] < c.truth < c.interval[1], c.name
+    assert found["temperature"].u < 0.02  # so that 0.2 is not found by chance
+
+
+def test_without_the_thermometer_the_warming_is_a_trend(ramp: Record) -> None:
+    """The drift grows by 0.2 x 20 K/h = 4 deg/h/h less what the gyro lags; the constant is that of the middle."""
+    found = {c.name: c for c in reduced(ramp).coefficients}
+    assert "temperature" not in found
+    assert found["trend"].estimate == pytest.approx(3.6, rel=0.2)
+
+
+def test_a_vertical_field_looks_like_unbalance(prepared: Session) -> None:
+    """B = b U and (X, Y, Z) = -f/g0 = -gamma U on every axis: D_B . B = -(b/gamma) (D_B . (X, Y, Z)), so that D_I and
+    D_S are too large by -b D_BI/gamma = +0.088 deg/h/g and -b D_BS/gamma = -0.022 deg/h/g, the others unchanged.
+    """
+    estimates = []
+    for values in ({}, FIELD):
+        record = prepared.run({**SHORT, **quiet(prepared.system), **values}, seed=1)
+        estimates.append({c.name: c.estimate for c in reduced(record).coefficients})
+    gamma = float(record.run.parameters["site.gravity"] or 9.806607) / 9.80665
+    shift = {n: estimates[1][n] - estimates[0][n] for n in NAMES}
+    assert shift["D_I"] == pytest.approx(0.088 / gamma, rel=1e-3)
+    assert shift["D_S"] == pytest.approx(-0.022 / gamma, rel=1e-3)
+    assert max(abs(v) for n, v in shift.items() if n not in ("D_I", "D_S")) < 1e-4
+
+
+def test_surroundings_are_there_only_where_they_are_asked_for() -> None:
+    plain, asked, swapped = load(), load(), load()
+    asked.set("surroundings.ramp", "1K/h")
+    with Session(swapped, {"surroundings": build("surroundings")}) as session:
+        assert set(session.program.order) - set(plain.slots) == {"surroundings", "thermometer"}
+    assert set(asked.slots) - set(plain.slots) == {"surroundings", "thermometer"}
+    assert "surroundings" not in plain.slots and "surroundings" not in type(asked).slots
+    assert plain.windows is not None and "temperature" not in plain.windows.columns
+    assert asked.with_values({"dwell": 10.0}).slots == asked.slots
+
+
+def test_a_field_is_refused_where_it_is_not_turned_into_gyro_axes() -> None:
+    system = load_system("servo_polar")
+    system.set("surroundings.field[3]", "44uT")
+    with (
+        Session(system) as session,
+        pytest.raises(InvalidConfigurationError, match="does not turn the field"),
+    ):
+        session.run()
