@@ -129,10 +129,13 @@ def _at_mean_temperature(result: Result, record: Record) -> None:
     if not read:
         return
     mean = float(np.mean(read))
-    shown = f"{mean - 273.15:.2f} °C" if record.run.measured else f"{mean:.3g} K above that of the gyro's coefficients"
+    simulated = any(name.startswith("surroundings.") for name in record.run.parameters)
+    shown = f"{mean:.3g} K above that of the gyro's coefficients" if simulated else f"{mean - 273.15:.2f} °C"
     sentences = getattr(result, "conventions", None)
     if sentences is not None:
         sentences.append(f"Constant drift belongs to the mean temperature of the record, {shown}.")
+    if not simulated:
+        return
     for c in result.coefficients:
         name, sign = WARMED.get(c.name, ("", 0.0))
         per_kelvin = float(record.run.parameters.get(f"gyro.{name}", 0.0)) * sign
