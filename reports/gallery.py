@@ -23,6 +23,7 @@ SHOWN = {
     "platform_three_axis": "open loop",
     "stabilizer_floated_2dof": "open loop",
     "stabilizer_power_2dof": "open loop",
+    "table_rate_test": "largest change of rate",
 }
 
 

@@ -12,7 +12,7 @@ class TableCommand(Component):
     The acceleration is limited so that a deadbeat loop does not saturate the motor at a change of rate:
     acceleration <= M_max / (2.5 J).
 
-    Not modelled: error of the external time base.
+    Not modelled: jitter and drift of the external time base.
     Source: Hu 1981, sections 5.4 (two-2), 6.1; acceleration limit: own design.
     """
 
@@ -26,6 +26,8 @@ class TableCommand(Component):
 
     mode = Input(0.0, "1", "0 hold, 1 index to the target angle, 2 turn at the target rate")
     target = Input(0.0, "1", "angle (rad) or rate (rad/s), by mode")
+    way = Input(0.0, "1", "way of an index move: 1 shorter, 2 upwards, 3 downwards; 0: reference_way")
+    move_rate = Input(0.0, "rad/s", "largest rate of an index move; 0: reference_index_rate")
 
     count = Output("1", "cumulative command count")
     angle = Output("rad", "reference angle, exact")
@@ -51,11 +53,20 @@ class TableCommand(Component):
     def tick(self) -> None:
         self.clock.tick()
         if self.clock_due == 1.0:
-            self.reference.advance(self.mode, self.target, self.reference_way)
+            unknown = not (self.way == 0.0 or self.way == 1.0 or self.way == 2.0 or self.way == 3.0)
+            self.refuse(unknown, "way = {way} must be 0, 1 shorter, 2 upwards or 3 downwards")
+            self.refuse(
+                self.move_rate < 0.0 or self.move_rate > self.reference_rate_max,
+                "move_rate = {move_rate} rad/s must be 0 to reference_rate_max = {reference_rate_max} rad/s",
+            )
+            way = self.way if self.way > 0.0 else self.reference_way
+            rate = self.move_rate if self.move_rate > 0.0 else self.reference_index_rate
+            self.reference.advance(self.mode, self.target, way, rate)
 
     def outputs(self) -> None:
-        self.count = self.reference_count
-        self.angle = self.reference.angle()
-        self.rate = self.reference.rate()
+        f = self.clock_waited * self.h / self.period  # share of the period that is over
+        self.count = self.reference.count_after(f)
+        self.angle = self.reference.angle_after(f)
+        self.rate = self.reference.rate_after(f)
         self.acc = self.reference.acc()
         self.arrived = self.reference_arrived

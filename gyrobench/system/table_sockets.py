@@ -81,6 +81,8 @@ TABLES: tuple[Socket, ...] = (
             inp("mode", "1", "0 hold, 1 index to the target angle, 2 turn at the target rate", whole=True),
             inp("target", "", "angle (rad) or rate (rad/s), by mode"),
             inp("angle_read", "rad", "table angle as read, cumulative", optional=True),
+            inp("way", "1", "way of an index move: 1 shorter, 2 upwards, 3 downwards", optional=True, whole=True),
+            inp("move_rate", "rad/s", "largest rate of an index move; 0: that of the part", optional=True),
             out("count", "1", "cumulative command count", whole=True),
             out("angle", "rad", "reference angle, exact"),
             out("rate", "rad/s", "reference rate"),

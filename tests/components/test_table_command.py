@@ -132,6 +132,30 @@ def test_way_to_the_target(way, start, target, end):
     assert part.angle == pytest.approx(math.radians(end), abs=0.01 * QUANTUM)
 
 
+def test_way_and_rate_of_a_move_come_with_the_command():
+    part = started(1.0, math.radians(350), period=0.04)
+    part.way, part.move_rate = 1.0, 0.05
+    rows = run(part, 200, h=0.04)
+    assert rows[-1, 1] == pytest.approx(math.radians(-10), abs=0.01 * QUANTUM) and rows[-1, 4] == 1.0
+    assert 0.049 < -rows[:, 2].min() <= 0.05
+
+
+def test_error_of_the_time_base():
+    part = started(2.0, 100 * ERU, reference_clock=-2e-4)
+    assert run(part, 5)[-1, 2] / (100 * ERU) == pytest.approx(1 - 2e-4, abs=1e-9)
+
+
+def test_pulses_between_the_samples():
+    """At a step of 1 ms the count is that of the parabola between two samples, and at them that of the accumulator."""
+    fine, coarse = started(2.0, 500 * ERU), started(2.0, 500 * ERU)
+    rows, ends = run(fine, 100, h=1e-3), run(coarse, 20)
+    assert rows[4::5, :3].tolist() == ends[:, :3].tolist()
+    for k in range(5, 40):  # the command acts from 5 ms on; 7 whole periods of ramp, 35 ms
+        t = (k + 1) * 1e-3 - 5e-3
+        assert rows[k, 1] == pytest.approx(0.5 * t * t, rel=1e-9) and rows[k, 2] == pytest.approx(t, rel=1e-9)
+        assert rows[k, 0] == math.floor(rows[k, 1] / QUANTUM + 1e-9)
+
+
 def test_hold_stops_within_the_acceleration():
     part = started(2.0, -0.02)
     run(part, 20)
@@ -155,11 +179,15 @@ def test_hold_stops_within_the_acceleration():
         ({"period": -5e-3}, 0.0, 0.0, "period"),
         ({"period": 7e-3}, 0.0, 0.0, "not a multiple of the internal step"),
         ({}, 2.0, math.nan, "target is nan"),
+        ({"way": 4.0}, 1.0, 0.1, "way = 4 must be"),
+        ({"move_rate": -0.1}, 1.0, 0.1, "move_rate = -0.1 rad/s must be"),
     ],
 )
 def test_refusals(parameters, mode, target, text):
+    inputs = {n: x for n, x in parameters.items() if n in ("way", "move_rate")}
     with pytest.raises(ComponentError, match=text):
-        part = TableCommand(**parameters)
+        part = TableCommand(**{n: x for n, x in parameters.items() if n not in inputs})
         part.initialize()
         part.mode, part.target = mode, target
+        part.way, part.move_rate = inputs.get("way", 0.0), inputs.get("move_rate", 0.0)
         run(part, 30)

@@ -57,7 +57,7 @@ class CountCommand(Block):
     Way to the target of an index move: 0 as the cumulative angle says, 1 the shorter way, 2 upwards, 3 downwards; the
     last three take the target modulo one turn.
 
-    Not modelled: error of the external time base (the period is the unit of time), count rate within a period.
+    Not modelled: jitter and drift of the external time base.
     Source: Hu 1981, sections 5.4 (two-2), 6.1; accumulator and acceleration limit: own design.
     """
 
@@ -68,6 +68,7 @@ class CountCommand(Block):
     rate_max = Parameter(RATE_MAX, "rad/s", "largest rate that may be commanded (1999.9 ERU)", above=0.0)
     rate_step = Parameter(0.0, "rad/s", "step of the rate; 0: as the accumulator resolves it", min=0.0)
     latitude = Parameter(0.0, "rad", "latitude, for the rates ERU sin and ERU cos", min=-0.5 * pi, max=0.5 * pi)
+    clock = Parameter(0.0, "1", "relative error of the time base: rates are higher by it", min=-0.01, max=0.01)
     way = Parameter(0, int, "way of an index move: 0 cumulative, 1 shorter, 2 upwards, 3 downwards", min=0, max=3)
     limit = Parameter(0.0, "rad", "largest angle from 0 that the axis allows; 0: unlimited", min=0.0)
 
@@ -124,9 +125,21 @@ class CountCommand(Block):
         """Return the reference angle in rad at the last sample."""
         return (self.count + self.part / COUNT) * self.quantum
 
-    def rate(self) -> Number:
-        """Return the reference rate in rad/s at the last sample."""
-        return self.v * self.unit_v / self.period
+    def since(self, f: Number) -> Number:
+        """Return the phase within the last sample's count, a share f of the period later, in phase units."""
+        return self.part + f * (self.v + 0.5 * f * (self.v_next - self.v))
+
+    def count_after(self, f: Number) -> Number:
+        """Return the count a share f of the period after the last sample: pulses come between samples too."""
+        return self.count + floor(self.since(f) / COUNT)
+
+    def angle_after(self, f: Number) -> Number:
+        """Return the reference angle there, rad."""
+        return (self.count + self.since(f) / COUNT) * self.quantum
+
+    def rate_after(self, f: Number) -> Number:
+        """Return the reference rate there, rad/s."""
+        return (self.v + f * (self.v_next - self.v)) * self.unit_v / self.period
 
     def acc(self) -> Number:
         """Return the reference acceleration in rad/s2 from the last sample to the next."""
@@ -142,8 +155,8 @@ class CountCommand(Block):
             return rate
         return sign(rate) * self.rate_step * floor(fabs(rate) / self.rate_step + 0.5)
 
-    def plan_trapezoid(self, target: Number, way: Number) -> None:
-        """Plan the move to an angle, from rest where the reference is."""
+    def plan_trapezoid(self, target: Number, way: Number, rate: Number) -> None:
+        """Plan the move to an angle at a rate, from rest where the reference is."""
         ahead = target - self.angle()
         if way != 0.0:
             ahead = ahead - TURN * floor(ahead / TURN)  # [0, one turn)
@@ -165,14 +178,14 @@ class CountCommand(Block):
         self.moving = 0.0
         if distance > 0.0:
             a = self.acceleration * self.period * self.period / self.quantum
-            peak = minimum(self.index_rate * self.period / self.quantum, sqrt(distance * a))
+            peak = minimum(rate * self.period / self.quantum, sqrt(distance * a))
             self.n_ramp = maximum(-floor(-(peak / a) + 1e-9), 1.0)
             cruise = maximum(-floor(-(distance / peak - self.n_ramp) + 1e-9), 0.0)
             self.n_all = 2.0 * self.n_ramp + cruise
             self.dv = sign(way_counts) * self.even(distance / (self.n_ramp + cruise) / self.n_ramp)
             self.moving = self.n_all
 
-    def command(self, mode: Number, target: Number, way: Number) -> None:
+    def command(self, mode: Number, target: Number) -> None:
         """Take a new command; the one that is running already changes nothing."""
         if mode == self.mode_last and target == self.target_last:
             return
@@ -183,14 +196,14 @@ class CountCommand(Block):
         )
         self.v_goal = 0.0
         if mode == 2.0:
-            self.v_goal = self.even(self.settable(target) * self.period / self.quantum)
+            self.v_goal = self.even(self.settable(target) * (1.0 + self.clock) * self.period / self.quantum)
         self.moving = 0.0
         self.arrived = 0.0
         self.mode_last = mode
         self.target_last = target
 
-    def advance(self, mode: Number, target: Number, way: Number) -> None:
-        """Compute the next sample: one period later."""
+    def advance(self, mode: Number, target: Number, way: Number, rate: Number) -> None:
+        """Compute the next sample, one period later.  way, rate (rad/s): of an index move."""
         total = self.part + 0.5 * (self.v + self.v_next)
         carry = floor(total / COUNT)
         self.count = self.count + carry
@@ -203,9 +216,9 @@ class CountCommand(Block):
                 self.part = self.end_part
                 self.v = 0.0
                 self.arrived = 1.0
-        self.command(mode, target, way)
+        self.command(mode, target)
         if self.mode_last == 1.0 and self.arrived == 0.0 and self.moving == 0.0 and self.v == 0.0:
-            self.plan_trapezoid(self.target_last, way)
+            self.plan_trapezoid(self.target_last, way, rate)
             if self.moving == 0.0:
                 self.arrived = 1.0
         self.v_next = self.v + minimum(maximum(self.v_goal - self.v, -self.dv_most), self.dv_most)
