@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
+from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, rate_servo_limits, spans
+from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import drift
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins, told
@@ -30,6 +31,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     _loads(found)
     for k, axis in enumerate(AXES, 1):
         found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+    lag = float(record.run.parameters.get("platform.lag", 0.0))
     for k, axis in enumerate("xyz", 1) if holds else ():
         got = drift(holds[0].t, holds[0][f"platform.attitude[{k}]"])
         found.measure(f"drift {axis}", f"of the platform about {axis}, at rest", "°/h", got.rate / DPH, got.u / DPH)
@@ -47,6 +49,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         summary=[
             *summary,
             *margins(found, *AXES),
+            *bandwidth(found, {axis: {"servo": lag} for axis in AXES}),
             *told(found.coefficients, "At rest it drifts by {drift x}, {drift y} and {drift z} about x, y and z."),
         ],
         ranked_by="platform error",
@@ -87,12 +90,12 @@ def _flight(found: LoopFindings, flight: Flight) -> list[str]:
     ]  # fmt: skip
     if any(np.any(flight[f"{g}.saturated"] > 0.5) for g in ("gyro_a", "gyro_b")):
         found.warnings.append("A pickoff of the gyros was saturated in the flight: the platform has left them.")
-    fast = max(float(np.abs(flight[f"platform.theta_dot[{k}]"]).max()) for k in (1, 2, 3))
-    fast = max(fast, float(np.abs(flight["platform.theta_4_dot"]).max()))
+    rates = [*(f"platform.theta_dot[{k}]" for k in (1, 2, 3)), "platform.theta_4_dot"]
+    fast = max(float(np.abs(flight[name]).max()) for name in rates)
     top = found.record.run.parameters.get("platform.rate_max")
     if top and fast >= float(top) * (1.0 - 1e-9):
         found.warnings.append(f"A gimbal was at its largest rate, {float(top) / DEG:.4g}°/s, in the flight.")
-    return _said(flight, error, travel, steep & (held < 0.5))
+    return [*_said(flight, error, travel, steep & (held < 0.5)), *rate_servo_limits(flight, rates, top)]
 
 
 def _moved(found: LoopFindings, rate: np.ndarray) -> float:

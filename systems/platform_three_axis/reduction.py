@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,21 +12,26 @@ from gyrobench import drift as static
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
-from gyrobench.reduction.loops.loop_measures import Point, cross_axis, response
+from gyrobench.reduction.loops.loop_limits import bandwidth
+from gyrobench.reduction.loops.loop_measures import Gate, Point, cross_axis, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.reduction.loops.rides import share, still
 from gyrobench.result import LoopResult, Specification
 
+from .budget import budget
+
 AXES = ("pitch", "roll", "azimuth")
 XYZ = "xyz"
+Shares = Mapping[str, Mapping[str, float]]  # motion -> source -> share of the variance
 ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
     """Result of one run.  Raises ReductionError for a record without a whole phase."""
     found = LoopFindings(record)
-    coupled, taken, ride = _coupling(found), _isolation(found), _ride(found)
+    shares = budget(found, _budgeted(found), ANGLES)
+    coupled, taken, ride = _coupling(found, shares), _isolation(found, shares), _ride(found, shares)
     _loads(found)
     _command(found)
     for k, axis in enumerate(AXES, 1):
@@ -48,6 +54,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ],
         summary=[
             *margins(found, *AXES),
+            *bandwidth(found, _lags(found)),
             *told(found.coefficients, taken, coupled, ride, "At rest it drifts by {drift x}, {drift y} and {drift z}."),
         ],
         specification=specification,
@@ -60,7 +67,32 @@ def _norm(points: list[Point]) -> tuple[float, float]:
     return size, math.sqrt(sum((abs(p.value) ** 2 * (p.u or 0.0)) ** 2 for p in points)) / size if size else 0.0
 
 
-def _coupling(found: LoopFindings) -> str:
+def _slowest(found: LoopFindings) -> list[Gate]:
+    """Return the slowest sine of the base about each axis."""
+    slowest = {g.axis: g for g in sorted(found.of("motion", shape="sine"), key=lambda g: -g.f)}
+    return [slowest[axis] for axis in sorted(slowest)]
+
+
+def _budgeted(found: LoopFindings) -> dict[str, Gate]:
+    """Return the phases that have an error budget, by their names in it."""
+    gates = [*_slowest(found), *found.of("command", shape="sine"), *found.of("hold")]
+    return {_motion(g): g for g in gates}
+
+
+def _motion(gate: Gate) -> str:
+    kind = {"motion": "base", "command": "command"}.get(gate.kind, gate.label)
+    return f"{kind} about {XYZ[gate.axis - 1]}, {gate.f:g} Hz" if gate.f else kind
+
+
+def _by(shares: Shares, motion: str) -> str:
+    """Return the largest source of a motion and its share: "by viscous friction (99 %)"; "" without a budget."""
+    sources = shares.get(motion, {})
+    most = max(sources, key=lambda n: sources[n], default="")
+    size = f" ({100.0 * sources[most]:.0f} %)" if most and sources[most] < 0.995 else ""  # beyond: others cancel
+    return f"by {most}{size}" if most else ""
+
+
+def _coupling(found: LoopFindings, shares: Shares) -> str:
     """Cross over main angle of a commanded sine.  [DECOUPLE-BENCH-83MIL]"""
     points: dict[tuple[int, int], complex] = {}
     gates = found.of("command", shape="sine")
@@ -83,21 +115,24 @@ def _coupling(found: LoopFindings) -> str:
     found.tables.append(table)
     worst = max(range(len(gates)), key=lambda k: found.estimates[f"cross {XYZ[gates[k].axis - 1]}"])
     axis = XYZ[gates[worst].axis - 1]
-    return f"A sine commanded about {axis} moves the other axes by {{cross {axis}}} of its own angle, the most of all."
+    by = _by(shares, _motion(gates[worst]))
+    cause = f", {by}" if by else ""
+    return f"A sine about {axis} moves the other axes by {{cross {axis}}} of its own angle, the most of all{cause}."
 
 
-def _isolation(found: LoopFindings) -> str:
+def _isolation(found: LoopFindings, shares: Shares) -> str:
     """What the platform takes over of the base: the whole angle, not only that about the base's axis."""
     taken_over = []
-    slowest = {g.axis: g for g in sorted(found.of("motion", shape="sine"), key=lambda g: -g.f)}
-    for gate in (slowest[axis] for axis in sorted(slowest)):
+    for gate in _slowest(found):
         base = gate[f"motion.angle[{gate.axis}]"]
         taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
         meaning = f"platform over base, base about {XYZ[gate.axis - 1]} at {gate.f:g} Hz"
         if taken:
             size = 20.0 * math.log10(taken)
             found.measure(f"isolation {XYZ[gate.axis - 1]}", meaning, "dB", size, 20.0 / math.log(10.0) * u / taken)
-            taken_over.append(f"{{-isolation {XYZ[gate.axis - 1]}}} about {XYZ[gate.axis - 1]} ({gate.f:g} Hz)")
+            by = _by(shares, _motion(gate))
+            cause = f", carried over {by}" if by else ""
+            taken_over.append(f"{{-isolation {XYZ[gate.axis - 1]}}} about {XYZ[gate.axis - 1]} ({gate.f:g} Hz{cause})")
     found.ratio(
         "attitude over base angle", "motion", 1, ANGLES[0], "exciter.motion_angle[1]",
         caption="Isolation: platform about x over base about x.",
@@ -105,7 +140,7 @@ def _isolation(found: LoopFindings) -> str:
     return f"A swinging base reaches the platform smaller by {', '.join(taken_over)}." if taken_over else ""
 
 
-def _ride(found: LoopFindings) -> str:
+def _ride(found: LoopFindings, shares: Shares) -> str:
     """Attitude while the base moves as recorded, less its mean and slope, each axis and all of them over the base."""
     gate = next((g for g in found.of("hold") if g.label == "ride"), None)
     if gate is None:
@@ -119,7 +154,9 @@ def _ride(found: LoopFindings) -> str:
     found.measure("ride", "platform over base, rms of all axes", "dB", taken.value, taken.u)
     if not math.isfinite(taken.value):
         return ""
-    return "In the ride the base's motion reaches the platform smaller by {-ride}."
+    by = _by(shares, gate.label)
+    cause = f"; the largest part comes {by}" if by else ""
+    return f"In the ride the base's motion reaches the platform smaller by {{-ride}}{cause}."
 
 
 def _loads(found: LoopFindings) -> None:
@@ -182,6 +219,20 @@ def _up(q: Any) -> Any:
     f, r, a = (float(x) for x in q)
     x, y, z = -math.sin(r), math.sin(f) * math.cos(r), math.cos(f) * math.cos(r)
     return np.array([math.cos(a) * x + math.sin(a) * y, -math.sin(a) * x + math.cos(a) * y, z])
+
+
+def _lags(found: LoopFindings) -> dict[str, dict[str, float]]:
+    """Return for each loop the lags of its plant, s: gyro J/C, motor L/R, and the corner of its stabilizer."""
+    p, lags = found.record.run.parameters, {}
+    for k, (axis, gyro) in enumerate(zip(AXES, XYZ, strict=True)):
+        J, C = (float(p.get(f"gyro_{gyro}.{n}", x)) for n, x in (("J", 0.0), ("C", 1.0)))
+        motor = [p.get(f"platform.{n}", x)[k] for n, x in (("L", [0.0] * 3), ("R", [1.0] * 3))]
+        lags[axis] = {
+            "gyro": J / C,
+            "motor": float(motor[0]) / float(motor[1]),
+            "corner of the stabilizer": float(p.get(f"{axis}.T2", 0.0)),
+        }
+    return lags
 
 
 def _limits(found: LoopFindings) -> None:

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, spans
+from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, rate_servo_limits, spans
+from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import Gate, cross_axis, drift, response
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins, told
@@ -27,6 +28,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     _loads(found)
     for k, axis in enumerate(AXES, 1):
         found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+    lag = float(record.run.parameters.get("platform.lag", 0.0))
     _coupling(found)
     _command(found)
     _drift(found)
@@ -45,6 +47,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         summary=[
             *summary,
             *margins(found, *AXES),
+            *bandwidth(found, {axis: {"servo": lag} for axis in AXES}),
             *told(found.coefficients, "At rest it drifts by {drift x}, {drift y} and {drift z} about x, y and z."),
         ],
         ranked_by="platform error",
@@ -92,7 +95,7 @@ def _coupling(found: LoopFindings) -> None:
 
 def _command(found: LoopFindings) -> None:
     """Less the drift that the hold showed."""
-    for gate in found.of("command", shape="step"):
+    for gate in (g for g in found.of("command", shape="step") if g.amplitude):
         own = next((drift(g.t, g[f"platform.attitude[{gate.axis}]"]).rate for g in _rest(found)), 0.0)
         late = gate.t > gate.t[0] + 0.3 * (gate.t[-1] - gate.t[0])
         y = gate[f"platform.attitude[{gate.axis}]"][late]
@@ -148,8 +151,11 @@ def _flight(found: LoopFindings) -> list[str]:
         found.warnings.append(
             "A pickoff of the gyros was saturated in the flight: the platform had left them; real ones reach a stop."
         )
+    rates = [f"platform.theta_dot[{k}]" for k in (1, 2, 3)]
+    limits = rate_servo_limits(flight, rates, found.record.run.parameters.get("platform.rate_max"))
     if not locked:
-        return [f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."]
+        kept = f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."
+        return [kept, *limits]
     a, b = locked[0]
     when, angle = float(flight.t[a]), float(middle[a]) / DEG
     text = f"Gimbal lock from t = {when:.4g} s (leg “{flight.leg_at(a)}”) at {angle:.4g}° of the middle gimbal"
@@ -158,7 +164,8 @@ def _flight(found: LoopFindings) -> list[str]:
     found.warnings.insert(0, f"{text}.")
     before = float(flight.error[: a + 1].max()) / DEG
     return [
-        f"{text}: the platform was dragged along by up to {most / DEG:.5g}°; until then it was kept to {before:.2g}°."
+        f"{text}: the platform was dragged along by up to {most / DEG:.5g}°; until then it was kept to {before:.2g}°.",
+        *limits,
     ]
 
 

@@ -76,6 +76,25 @@ class Flight:
         return next((g.label for g in reversed(self.gates) if g.inside.start - self.first <= k), self.gates[0].label)
 
 
+def rate_servo_limits(flight: Flight, rates: Sequence[str], rate_max: float | None) -> list[str]:
+    """Return what lets the base's motion through to a platform of rate servos, which else take it out exactly.
+
+    rates: channels of the gimbal rates, rad/s; the sentence names the largest and since when it was at its limit.
+    """
+    if rate_max is None:
+        return []
+    sizes = np.max(np.abs([flight[n] for n in rates]), axis=0)
+    limit = rate_max * (1.0 - 1e-9)
+    text = (
+        "The servos take the motion of the base out exactly; it reaches the platform only in gimbal lock or with a "
+        f"gimbal at its largest rate, {rate_max / DEG:.3g}°/s: "
+    )
+    if sizes.max() < limit:
+        return [f"{text}in the flight the gimbals turned by up to {sizes.max() / DEG:.3g}°/s."]
+    first = int(np.argmax(sizes >= limit))
+    return [f"{text}reached in the flight at t = {flight.t[first]:.4g} s (leg “{flight.leg_at(first)}”)."]
+
+
 def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last sample of each stretch in which a flag is 1."""
     on = np.concatenate([[False], np.asarray(flag, dtype=float) > 0.5, [False]])

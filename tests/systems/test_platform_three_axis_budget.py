@@ -1,0 +1,97 @@
+"""Error budget of the three-axis platform: each source against a run in which it is switched off, or alone."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from gyrobench.engine.session import run
+from gyrobench.system.loop_plan import LoopPhase
+from gyrobench.system.system import load_system
+
+GYROS = ("gyro_x", "gyro_y", "gyro_z")
+TERMS = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "white", "markov", "pickoff")
+IDEAL = {f"{g}.{n}": 0.0 for g in GYROS for n in TERMS}
+AXES = (1, 2, 3)
+DRY = {f"platform.friction[{k}]": 0.02 for k in AXES} | {"platform.presliding": 5e-4}
+BASE_Y, BASE_Z, COMMAND = "base about y, 0.7 Hz", "base about z, 0.9 Hz", "command about z, 1 Hz"
+
+
+def ridden(*phases: LoopPhase, seed: int = 1, wires: str = "", **values: Any) -> tuple[Any, dict[tuple[str, str], Any]]:
+    """Result, and (motion, source) -> row of the budget, of these phases without noise of the gyros."""
+    system: Any = load_system("platform_three_axis")
+    system.phases = lambda: list(phases)
+    if wires:
+        system.wires = wires
+    result = system.reduce(run(system, values={**IDEAL, **values}, seed=seed))
+    table = next((t for t in result.tables if t["title"].startswith("Error budget")), {"rows": []})
+    return result, {(r[0], r[1]): r[2:] for r in table["rows"]}
+
+
+def swing(axis: int, f: float, size: float = 0.08) -> LoopPhase:
+    return LoopPhase(f"base {axis}", "motion", "sine", axis, size, f, settle=5.0, dwell=4.0 / f)
+
+
+COMMANDED = LoopPhase("command z", "command", "sine", 3, 0.3, 1.0, settle=5.0, dwell=4.0)
+
+
+@pytest.fixture(scope="module")
+def whole() -> tuple[Any, dict[tuple[str, str], Any]]:
+    return ridden(swing(2, 0.7), swing(3, 0.9), COMMANDED, **DRY)
+
+
+def test_shares_add_up_and_the_whole_is_what_was_measured(whole: Any) -> None:
+    result, rows = whole
+    for motion in (BASE_Y, BASE_Z, COMMAND):
+        share = [r[1] for (name, _), r in rows.items() if name == motion and r[1] is not None]
+        assert sum(share) == pytest.approx(100.0, abs=1e-6)
+        assert rows[motion, "measured"][0] == pytest.approx(rows[motion, "together"][0], rel=0.1)
+    assert {s for m, s in rows if m == BASE_Y} >= {"viscous friction", "dry friction"}
+    assert any("carried over by reaction of the gimbals" in s for s in result.summary)
+
+
+@pytest.mark.parametrize(("source", "name"), [("viscous friction", "viscous"), ("dry friction", "friction")])
+def test_friction_switched_off_takes_its_share(whole: Any, source: str, name: str) -> None:
+    """What the budget says would be left is what a run without the source measures."""
+    _, rows = whole
+    _, less = ridden(swing(2, 0.7), **{**DRY, **{f"platform.{name}[{k}]": 0.0 for k in AXES}})
+    measured = less[BASE_Y, "measured"][0]
+    assert measured == pytest.approx(rows[BASE_Y, source][2], rel=0.1)
+    assert rows[BASE_Y, "measured"][0] > 1.3 * measured
+
+
+def test_reaction_of_the_gimbals_alone(whole: Any) -> None:
+    """Without friction it is all that is left of the base about z: tan(pitch) (I_ry + I_fz) heading'' about roll."""
+    _, rows = whole
+    _, less = ridden(swing(3, 0.9), **{f"platform.viscous[{k}]": 0.0 for k in AXES})
+    assert less[BASE_Z, "measured"][0] == pytest.approx(rows[BASE_Z, "reaction of the gimbals"][0], rel=0.1)
+
+
+def test_output_axes_switched_off_take_their_share() -> None:
+    """Gyros that do not get the angular acceleration have no output-axis coupling; bearings without friction."""
+    free = {f"platform.viscous[{k}]": 0.0 for k in AXES}
+    result, rows = ridden(COMMANDED, **free)
+    wires = load_system("platform_three_axis").wires
+    _, less = ridden(COMMANDED, wires=re.sub(r"(platform -> gyro_.: omega) alpha f", r"\1 f", wires), **free)
+    measured = less[COMMAND, "measured"][0]
+    assert measured == pytest.approx(rows[COMMAND, "output axes of the gyros"][2], rel=0.1)
+    assert rows[COMMAND, "measured"][0] > 1.5 * measured
+    assert any("the most of all, by output axes of the gyros" in s for s in result.summary)
+
+
+@pytest.mark.parametrize(
+    ("source", "noise", "seeds", "scatter"),
+    [("white drift of the gyros", "white", 6, 0.16), ("noise of the pickoffs", "pickoff", 1, 0.1)],
+)
+def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float) -> None:
+    """A hold of 4 s at rest: the mean square of three axes and six seeds; of a random walk about mean and slope nearly
+    all is in a few independent parts an axis, so it scatters by about sqrt(2/(3 6 4)) = 17 %, the rms by 8."""
+    squares = []
+    for seed in range(seeds):
+        values = {f"{g}.{noise}": 2e-6 for g in GYROS}
+        _, rows = ridden(LoopPhase("drift", "hold", settle=1.0, dwell=4.0), seed=seed, **values)
+        squares.append(rows["drift", "measured"][0] ** 2)
+    assert rows["drift", source][0] == pytest.approx((sum(squares) / seeds) ** 0.5, rel=scatter)
+    assert rows["drift", source][1] == pytest.approx(100.0)
