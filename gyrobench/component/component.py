@@ -23,7 +23,7 @@ After the last one ``outputs`` is evaluated and all is checked to be finite but 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -40,6 +40,8 @@ from gyrobench.component.composition import (
     own_equations,
     own_items,
     pieces,
+    stored,
+    view_of,
 )
 from gyrobench.component.declarations import (
     Declaration,
@@ -56,7 +58,17 @@ from gyrobench.component.math import Dual, lift
 from gyrobench.component.numerics import normal, phi1
 from gyrobench.component.vectors import Vector, is_finite
 
+PER = ("start", "step", "second")  # when noise is drawn
 RESERVED = ("der", "noise", "instance")
+
+
+class Watched:
+    """Scalars that must be finite: keys of ``__dict__`` of the single ones, and of the arrays that hold the others."""
+
+    def __init__(self, scalars: Iterable[Scalar]) -> None:
+        self.scalars = list(scalars)
+        self.numbers = [s.path[0] for s in self.scalars if len(s.path) == 1]
+        self.arrays = list(dict.fromkeys(stored(s.path[0]) for s in self.scalars if len(s.path) > 1))
 
 
 class Component:
@@ -107,16 +119,18 @@ class Component:
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in declared.values() if isinstance(d, Noise)]
         cls._by_name = {s.name: s for s in cls.layout}
-        cls._inputs = _by_variable(s for s in cls.layout if s.section == "input")
-        cls._watched = _by_variable(
+        cls._ports = {per: [(k, n) for k, n in enumerate(cls.noises) if n.per == per] for per in PER}
+        cls._inputs = Watched(s for s in cls.layout if s.section == "input")
+        cls._watched = Watched(
             s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory
         )
 
     _own: ClassVar[dict[str, Any]] = {}
     _functions: ClassVar[dict[str, Any]] = {}
     _by_name: ClassVar[dict[str, Scalar]] = {}
-    _inputs: ClassVar[dict[str, list[Scalar]]] = {}  # variable -> its elements; must be finite before each step
-    _watched: ClassVar[dict[str, list[Scalar]]] = {}  # and these after it
+    _ports: ClassVar[dict[str, list[tuple[int, Noise]]]] = {}  # by when they are drawn: number and declaration
+    _inputs: ClassVar[Watched]  # must be finite before each step
+    _watched: ClassVar[Watched]  # and these after it
 
     def __init__(self, name: str = "", **parameters: Any) -> None:
         self.instance = name or type(self).__name__
@@ -154,7 +168,9 @@ class Component:
             raise ComponentError(f"{self.instance}: {e} in {where}") from e
 
     def _view(self, placed: Placed) -> View:
-        return View(self, placed)
+        if placed.view is None:
+            placed.view = view_of(placed)
+        return placed.view(self)
 
     def refuse(self, condition: Any, message: str) -> None:
         """End the run with ``message`` if the condition holds; ``{H}`` in it prints self.H with %g."""
@@ -320,19 +336,19 @@ class Component:
         self._dirty = False
         self._require_finite(self._watched, self.t)
 
-    def _require_finite(self, watched: Mapping[str, list[Scalar]], t: float) -> None:
+    def _require_finite(self, watched: Watched, t: float) -> None:
         """Raise ComponentError naming the first scalar that is not finite."""
         values = self.__dict__
-        for name, scalars in watched.items():
-            if not is_finite(values[name]):
-                s = next(s for s in scalars if not math.isfinite(self._at(s)))
+        total = sum([values[n] for n in watched.numbers])  # finite only if all of them are
+        if math.isfinite(total) and all([is_finite(values[n]) for n in watched.arrays]):
+            return
+        for s in watched.scalars:
+            if not math.isfinite(self._at(s)):
                 raise ComponentError(f"{self.instance}: {s.section} {s.name} is {self._at(s):g} at t = {t:.9g} s")
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:
-        for port, n in enumerate(self.noises):
-            if n.per != per:
-                continue
+        for port, n in self._ports[per]:
             size = getattr(self, n.name)
             x = 0.0
             if size != 0.0:
@@ -408,13 +424,6 @@ class Component:
             k4 = self._flow()
             sums = [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
             move(sums, dt / 6.0)
-
-
-def _by_variable(scalars: Iterable[Scalar]) -> dict[str, list[Scalar]]:
-    by_variable: dict[str, list[Scalar]] = {}
-    for s in scalars:
-        by_variable.setdefault(s.path[0], []).append(s)
-    return by_variable
 
 
 def _dig(x: Any, path: tuple[Any, ...]) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.component.declarations import Declaration, floats, shape_of
@@ -81,6 +82,7 @@ class Placed:
     name: str  # in the part
     names: dict[str, str] = field(default_factory=dict)  # declaration of the block -> of the part
     blocks: dict[str, Placed] = field(default_factory=dict)
+    view: type[View] | None = None  # made when it is first looked at
 
 
 @dataclass(frozen=True)
@@ -94,26 +96,14 @@ class Piece:
 
 
 class View:
-    """A block of one instance of a part: ``self`` of its equations."""
+    """A block of one instance of a part: ``self`` of its equations.  Each block in a part has a class of its own."""
 
-    __slots__ = ("_part", "_placed")
+    __slots__ = ("_part",)
+    _part: Any
+    _placed: ClassVar[Placed]
 
-    def __init__(self, part: Any, placed: Placed) -> None:
+    def __init__(self, part: Any) -> None:
         object.__setattr__(self, "_part", part)
-        object.__setattr__(self, "_placed", placed)
-
-    def __getattr__(self, name: str) -> Any:
-        part, placed = self._part, self._placed
-        if name in placed.names:
-            return getattr(part, placed.names[name])
-        if name in placed.blocks:
-            return part._view(placed.blocks[name])
-        if name in TIMES:
-            return getattr(part, name)
-        if name in ("der", "noise"):
-            return _Names(getattr(part, name), placed.names)
-        attribute = getattr(type(placed.block), name)
-        return attribute.__get__(self) if callable(attribute) else attribute
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._placed.names:
@@ -127,6 +117,21 @@ class View:
             values = {n: getattr(self._part, flat) for n, flat in placed.names.items()}
             shown = {n: f"{float(x):g}" for n, x in values.items() if not isinstance(x, list)}
             self._part._refused(message.format(self=placed.name, **shown))
+
+
+def view_of(placed: Placed) -> type[View]:
+    """Return the class of the views of a block: its names lead to those of the part."""
+    inside: dict[str, Any] = {}
+    for klass in lineage(type(placed.block), Block):
+        inside |= {n: a for n, a in vars(klass).items() if not n.startswith("__")}
+    inside |= {n: property(attrgetter(f"_part.{n}")) for n in TIMES}
+    inside["der"] = property(lambda view: _Names(view._part.der, placed.names))
+    inside["noise"] = property(lambda view: _Names(view._part.noise, placed.names))
+    for n, inner in placed.blocks.items():
+        inside[n] = property(lambda view, inner=inner: view._part._view(inner))  # type: ignore[misc]
+    for n, flat in placed.names.items():
+        inside[n] = property(attrgetter(f"_part.{flat}"))
+    return type(type(placed.block).__name__, (View,), {**inside, "__slots__": (), "_placed": placed})
 
 
 class _Names:
@@ -145,17 +150,19 @@ class _Names:
         setattr(self._of, self._names[name], value)
 
 
-class ArraySlot:
+def stored(name: str) -> str:
+    """Return the name under which an array stands in the ``__dict__`` of its part."""
+    return f"{name}[]"
+
+
+class ArraySlot(property):
     """An array of a part: what is assigned to it is copied, as in C."""
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        def assign(part: Any, value: Any, name: str = stored(name)) -> None:
+            part.__dict__[name] = copied(value)
 
-    def __get__(self, part: Any, owner: type) -> Any:
-        return self if part is None else part.__dict__[self.name]
-
-    def __set__(self, part: Any, value: Any) -> None:
-        part.__dict__[self.name] = copied(value)
+        super().__init__(attrgetter(stored(name)), assign)  # reading it calls no Python
 
 
 class Derivatives:

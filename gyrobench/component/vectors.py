@@ -44,11 +44,12 @@ class Vector(list[Any]):
         return self
 
     def __matmul__(self, o: Any) -> Any:
-        if isinstance(self[0], list):
-            return Vector([row @ o for row in self])
-        if isinstance(o[0], list):
-            return Vector([dot(self, column) for column in o.T])
-        return dot(self, o)
+        columns = o.T if isinstance(next(iter(o)), list) else None  # not o[0]: __getitem__ takes its time
+        if not isinstance(next(iter(self)), list):
+            return dot(self, o) if columns is None else Vector([dot(self, column) for column in columns])
+        if columns is None:
+            return Vector([dot(row, o) for row in self])
+        return Vector([Vector([dot(row, column) for column in columns]) for row in self])
 
     @property
     def T(self) -> Vector:
@@ -63,21 +64,36 @@ def is_finite(x: Any) -> bool:
     """Return whether a number, or each element of an array, is finite."""
     if not isinstance(x, list):
         return math.isfinite(x)
-    return all(map(is_finite if x and isinstance(x[0], list) else math.isfinite, x))
+    for first in x:
+        if isinstance(first, list):
+            return all(map(is_finite, x))
+        return math.isfinite(sum(x)) or all(map(math.isfinite, x))  # a sum may exceed all numbers
+    return True
 
 
 def copied(x: Any) -> Any:
     """Return a number, or a copy of an array."""
-    return Vector([copied(e) for e in x]) if isinstance(x, list | tuple) else x
+    if not isinstance(x, (list, tuple)):  # quicker than list | tuple
+        return x
+    for first in x:
+        if isinstance(first, (list, tuple)):
+            return Vector([copied(e) for e in x])
+        break
+    return Vector(x)
 
 
 def vector(x: Sequence[Any]) -> Vector:
     """Return a new vector, or matrix, with the elements of a list or of another one: a copy."""
-    return Vector([copied(e) for e in x])
+    new: Vector = copied(list(x))
+    return new
 
 
 def dot(a: Any, b: Any) -> Any:
     """Return the scalar product of two vectors of one length."""
+    if len(a) == 3 == len(b):
+        a0, a1, a2 = a
+        b0, b1, b2 = b
+        return a0 * b0 + a1 * b1 + a2 * b2
     pairs = zip(a, b, strict=True)
     x, y = next(pairs)
     total = x * y
