@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import IDENTITY, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.table import AxisTable, SegmentMotion
-from gyrobench.component.math import cos, fabs, floor, sin
+from gyrobench.component.math import cos, fabs, floor, sin, vector
 
 
 class TableRate(AxisTable):
@@ -27,7 +27,7 @@ class TableRate(AxisTable):
 
         f     = face Rz B f_local
         omega = face (w + (0, 0, rate))
-        alpha = face (w_y rate, -w_x rate, acc)       the total derivative of omega, so d(omega)/dt = alpha
+        alpha = face ((w_y rate, -w_x rate, acc) + Rz B alpha_local)   the derivative of omega: d(omega)/dt = alpha
 
     tilt[1], tilt[2] turn the base about its first and then its new second axis, B = R2 R1 base.
 
@@ -36,7 +36,7 @@ class TableRate(AxisTable):
     Source: Hu 1981, sections 5.4 (two-2), 5.5 (two-1), 6.1; frames: CONV-FRAMES.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     angle0 = Parameter(0.0, "rad", "angle at the start")
     acceleration = Parameter(0.1, "rad/s2", "acceleration of every move", above=0.0)
@@ -51,6 +51,8 @@ class TableRate(AxisTable):
     mode = Input(0.0, "1", "0 hold, 1 index, 2 rate")
     target = Input(0.0, "1", "angle in rad (index) or rate in rad/s (rate)")
     face = Input(IDENTITY, "1", "mount: rows are the gyro axes in table axes")
+
+    alpha_local = Input([0.0, 0.0, 0.0], "rad/s2", "derivative of omega_local: ground that moves, ENU")
 
     in_position = Output("1", "1 when the target angle or rate is reached")
 
@@ -93,6 +95,9 @@ class TableRate(AxisTable):
         c = cos(angle)
         s = sin(angle)
         self.feel(c, s, self.tilted[2] @ self.omega_local + rate, rate, acc)
+        if self.alpha_local[0] != 0.0 or self.alpha_local[1] != 0.0 or self.alpha_local[2] != 0.0:
+            b = self.tilted @ self.alpha_local
+            self.alpha = self.alpha + self.face @ vector([c * b[0] + s * b[1], c * b[1] - s * b[0], b[2]])
         self.angle = angle
         self.rate = rate
         self.angle_read = read

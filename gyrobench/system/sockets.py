@@ -20,6 +20,7 @@ __all__ = ["SOCKETS", "Connector", "Shape", "Socket", "element_names", "socket"]
 TABLE = (
     inp("f_local", "m/s2", "specific force at the site, ENU", 3),
     inp("omega_local", "rad/s", "Earth rate at the site, ENU", 3),
+    inp("alpha_local", "rad/s2", "derivative of omega_local: ground that moves, ENU", 3, optional=True),
     inp("mode", "1", "0 hold, 1 index to the target angle, 2 turn at the target rate", whole=True),
     inp("target", "", "angle (rad) or rate (rad/s), by mode"),
     inp("face", "1", "rows: the gyro axes I, O, S in table axes", 3, 3),
@@ -47,6 +48,7 @@ SOCKETS: dict[str, Socket] = {
                 out("f", "m/s2", "specific force of a body at rest, ENU", 3),
                 out("omega", "rad/s", "Earth rate, ENU", 3),
                 out("g", "m/s2", "local gravity", optional=True),
+                out("alpha", "rad/s2", "derivative of omega: ground that moves", 3, optional=True),
             ),
         ),
         Socket(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -109,3 +110,16 @@ def test_a_field_is_refused_where_it_is_not_turned_into_gyro_axes() -> None:
         pytest.raises(InvalidConfigurationError, match="does not turn the field"),
     ):
         session.run()
+
+
+def test_a_gyro_on_tilting_ground_reads_the_rate_of_the_tilt() -> None:
+    """Input axis east, the ground turns by 100 arcsec/h about east: omega_IA is larger by 100/3600 deg/h, and so is k i;
+    the drift rate omega_IA - k i that the reduction states with the Earth rate alone is smaller by it.  The spin axis,
+    which points south here, and so D_S, see gravity by at most 100 arcsec of tilt: 0.7 deg/h/g x 5e-4 = 3e-4 deg/h.
+    """
+    system = load_system("fixed_position")
+    options = {"attitude": "E U", "dwell": 600.0, "readings": 12, **quiet(system)}
+    tilting = {"site.tilt_ramp[1]": 100.0 * math.pi / 648000.0 / 3600.0}
+    with Session(system, {"site": build("ground_motion")}) as session:
+        found = [system.reduce(session.run({**options, **v}, seed=1)).coefficients[0] for v in ({}, tilting)]
+    assert found[1].estimate - found[0].estimate == pytest.approx(-100.0 / 3600.0, abs=1e-4)
