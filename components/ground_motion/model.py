@@ -13,7 +13,7 @@ LIMIT = 0.01  # rad
 class GroundMotion(Place):
     """Site whose ground moves: waves, tides, tilt and seismic noise on gravity and Earth rate.  [ENV-DISTURBANCE]
 
-    Fits every slot of the socket Site.  Up to 8 periodic motions, each along or about E, N, U with one period and phase,
+    Fits every slot of the socket Site.  Up to 8 periodic motions, each along or about E, N, U with a period and phase,
     s = sin(2 pi t / period + phase), and given by its displacement x, its acceleration or, about the axes, its tilt:
 
         a = sum of  -(2 pi / period)2 x s  or  acceleration s      (+ noise)
@@ -77,9 +77,7 @@ class GroundMotion(Place):
                 if given > 0.0 or self.acceleration[k][j] != 0.0 or self.tilt_amplitude[k][j] != 0.0:
                     self.last = k + 1.0
         for j in range(3):
-            self.refuse(
-                sizes[j] > LIMIT, "tilt_amplitude: tilts add up to more than 0.01 rad; the model is for small ones"
-            )
+            self.refuse(sizes[j] > LIMIT, "tilt_amplitude: tilts add up to more than 0.01 rad, which is not small")
 
     @sampled(every=1)
     def tick(self) -> None:

@@ -113,7 +113,7 @@ def test_a_field_is_refused_where_it_is_not_turned_into_gyro_axes() -> None:
 
 
 def test_a_gyro_on_tilting_ground_reads_the_rate_of_the_tilt() -> None:
-    """Input axis east, the ground turns by 100 arcsec/h about east: omega_IA is larger by 100/3600 deg/h, and so is k i;
+    """Input axis east, the ground turns by 100 arcsec/h about east: omega_IA and so k i is larger by 100/3600 deg/h;
     the drift rate omega_IA - k i that the reduction states with the Earth rate alone is smaller by it.  The spin axis,
     which points south here, and so D_S, see gravity by at most 100 arcsec of tilt: 0.7 deg/h/g x 5e-4 = 3e-4 deg/h.
     """
