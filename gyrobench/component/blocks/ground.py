@@ -12,8 +12,8 @@ class NoisePeak(Block):
 
         S(w) = 4 d w0 rms2 w2 / ((w0^2 - w2)^2 + (2 d w0 w)2),   w0 = 2 pi frequency
 
-    two-sided, per rad/s over 2 pi; nothing at frequency 0, so that a mean over a long time is not moved.  It
-    is exact from step to step, its force held over a step: the rms is right to (w0 h)2/12, h the internal step.  It
+    two-sided, per rad/s over 2 pi; nothing at frequency 0, so that a mean over a long time is not moved.  The
+    oscillator is exact from step to step, its force held over a step: the rms is right to (w0 h)2/12, h the step.  It
     starts with a drawn velocity from its middle.
     """
 
