@@ -3,7 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Discrete, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.angle import IncrementalEncoder
 from gyrobench.component.blocks.axis_body import AxisBody
-from gyrobench.component.blocks.command import ARCSEC, CountCommand, SampleClock
+from gyrobench.component.blocks.command import ARCSEC, RATE_MAX, CountCommand, SampleClock
 from gyrobench.component.blocks.control import InPosition, SampledController
 from gyrobench.component.blocks.drive import SquareLawMotor
 from gyrobench.component.blocks.table import AxisTable
@@ -34,9 +34,14 @@ class TableDynamic(AxisTable):
     angle0 = Parameter(0.0, "rad", "angle at the start")
     period = Parameter(5e-3, "s", "sampling period of command and controller", min=1e-3, max=1e-2)
     quantum = Parameter(0.18 * ARCSEC, "rad", "angle of one count (0.18 arcsec)", above=0.0)
+    acceleration = Parameter(1.0, "rad/s2", "acceleration of every move", above=0.0)
+    index_rate = Parameter(0.1, "rad/s", "rate of an index move", above=0.0)
+    rate_max = Parameter(RATE_MAX, "rad/s", "largest rate that may be commanded (1999.9 ERU)", above=0.0)
 
     clock = SampleClock(period="period")
-    command = CountCommand(period="period", quantum="quantum")
+    command = CountCommand(
+        period="period", quantum="quantum", acceleration="acceleration", index_rate="index_rate", rate_max="rate_max"
+    )
     law = SampledController(period="period", quantum="quantum")
     near = InPosition()
     motor = SquareLawMotor()

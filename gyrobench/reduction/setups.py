@@ -21,6 +21,7 @@ from gyrobench import drift, frames
 from gyrobench.attitudes import parse
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.run_metadata import Site, phases, sizes
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Specification
 
@@ -37,6 +38,7 @@ class Setup:
     truth: Mapping[str, float] | None = None
     specification: Specification | None = None
     instrument: str = ""
+    errors: Mapping[str, float] | None = None  # of a simulated set-up, see gyrobench.reduction.simulated_errors
     corrections: str = ""  # measured errors of the set-up, see gyrobench.reduction.estimation.effects
 
     @classmethod
@@ -44,6 +46,7 @@ class Setup:
         """Return the setup that a run.json describes; ``own``: the fields that are the test's own."""
         corrections = run.options.get("corrections", "")
         shared = {"specification": specification, "instrument": run.instrument, "corrections": corrections}
+        shared["errors"] = simulated_errors(run)
         sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
         return cls(**{**shared, **sources, **own})
 
@@ -80,6 +83,7 @@ class SiteSetup(Setup):
             "instrument": self.instrument,
             "simulated": self.truth is not None,
             "robust": self.robust,
+            "errors": self.errors,
         }
 
     @property

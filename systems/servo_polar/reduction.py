@@ -27,6 +27,7 @@ from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, fit
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
@@ -116,6 +117,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,
+        errors=simulated_errors(run),
         simulated=truth is not None,
         no_closed=why,
         closed_caption="From the same windows; the formulas: harmonics of each mount, means of the dwells",

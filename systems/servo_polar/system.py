@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.system import Option
 
@@ -41,7 +41,6 @@ class ServoPolar(ServoTest):
         }
         | CORRECTIONS
         | NUISANCES
-        | type_b("wobble", "angle1", "angle2")
     )
     shorter = "give that time, or turns=0 for as much of a turn as the time gives, or turns=1"
     measured_data = MEASURED

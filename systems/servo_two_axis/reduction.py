@@ -30,6 +30,7 @@ from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.merge_channels import merge
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
@@ -182,6 +183,7 @@ def _channel(
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,
+        errors=simulated_errors(run),
         simulated=truth is not None,
         robust=bool(run.options.get("robust", False)),
         closed_caption="The formulas of Hu 1981 at the middles of the same windows, ordinary least squares",

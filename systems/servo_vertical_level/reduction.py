@@ -26,6 +26,7 @@ from gyrobench.reduction.drift import composite, servo_regression
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
@@ -33,7 +34,7 @@ from . import closed, refusals
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
-SIZES = ("u_axis", "u_mount", "u_unbalance", "u_time")
+SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
 @handling_errors.examined(handling_candidates.servo)
@@ -65,11 +66,10 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     )  # fmt: skip
     found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings",
                 candidates=weighed)  # fmt: skip
-    sizes = {"u_wobble": 0.0, "u_angle1": 0.0, "u_angle2": 0.0, **run_metadata.sizes(run.options, SIZES)}
+    sizes = run_metadata.sizes(run.options, SIZES)
 
     def effects_of(found: Findings) -> list[Effect]:
-        every = servo_regression.effects(held, site, found, columns, phase, sizes)
-        return [e for e in every if "a turn" not in e.source]
+        return servo_regression.effects(held, site, found, columns, phase, sizes)
 
     found = corrected(found, effects_of, run.options.get("corrections", ""))
     statistics: dict[str, composite.Composite | str] = {}
@@ -107,6 +107,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,
+        errors=simulated_errors(run),
         simulated=truth is not None,
         no_closed="" if book else "Hu 1981 has formulas for class 1, for the three-term route and for complete pairs",
         closed_caption="From the same windows; the formulas take every attitude as at angle 0",

@@ -65,7 +65,7 @@ def test_follows_the_loop_written_by_hand(table):
     """Counts of 2e-4 arcsec: what is left, 3 of them, is when a count falls, and the motor's torque taken at the mean
     voltage of an internal step.
     """
-    values = {"quantum": 1e-9, "command_rate_max": 8e-4, "command_index_rate": 8e-4}
+    values = {"quantum": 1e-9, "rate_max": 8e-4, "index_rate": 8e-4}
     expected = by_hand(10.0 * ERU, 140.0 * GCM, 0.4, 1e-9)
     seen = run(table, 0.4, ["angle"], target=10.0 * ERU, M_load=140.0 * GCM, **values)[4::5, 0]
     assert np.abs(seen - expected).max() < 3e-9
@@ -86,7 +86,9 @@ def test_rate_of_the_time_base_whatever_the_load(table, rate):
 def test_goes_to_an_angle(table):
     """10 deg at 100 ERU, 1 rad/s2: 0.174533 / 7.29212e-3 = 23.934 s and one ramp of 7.3 ms; at rest to 1 arcsec."""
     at = math.radians(10.0)
-    rows = run(table, 26.0, ["angle", "in_position", "torque"], mode=1.0, target=at, M_load=140.0 * GCM)
+    rows = run(
+        table, 26.0, ["angle", "in_position", "torque"], mode=1.0, target=at, index_rate=100.0 * ERU, M_load=140.0 * GCM
+    )
     arrived = np.argmax(rows[:, 1] == 1.0) * 1e-3
     assert 23.94 < arrived < 24.2
     assert np.abs(rows[25000:, 0] - at).max() < 0.6 * ARCSEC
@@ -95,7 +97,7 @@ def test_goes_to_an_angle(table):
 
 def test_the_table_goes_where_its_scale_says(table):
     """The loop keeps reading = command: the true angle is the command less the error of the scale, 3 arcsec cos a."""
-    names = {"scale_eccentricity": 3.0 * ARCSEC, "scale_eccentricity_phase": 0.5 * math.pi, "command_index_rate": 0.1}
+    names = {"scale_eccentricity": 3.0 * ARCSEC, "scale_eccentricity_phase": 0.5 * math.pi}
     at = math.radians(60.0)
     rows = run(table, 12.5, ["angle", "angle_read"], mode=1.0, target=at, **names)
     assert np.mean(rows[-500:, 0]) - at == pytest.approx(-1.5 * ARCSEC, abs=0.1 * ARCSEC)
@@ -120,7 +122,7 @@ def test_less_jitter_with_softer_poles(table):
 
 
 def test_refuses_what_the_drive_cannot_do(table):
-    with pytest.raises(InstanceError, match="exceeds command_rate_max"):
+    with pytest.raises(InstanceError, match="rate_max"):
         run(table, 0.1, ["angle"], target=2100.0 * ERU)
 
 

@@ -72,14 +72,15 @@ class Pulses:
         counts = np.sqrt(np.sum((fit.gain * (2.0 * k * self.current / self.f_q / read.length)) ** 2, axis=1))
         return [
             Effect("asymmetry of the pulse currents", u_pulse, "A", 0.5 * k * one, "positive less negative current",
-                   simulated=asymmetry),
-            Effect("mean of the pulse currents", 0.0, "A", k * d, "part of the torquer scale factor", simulated=mean),
+                   simulated=(asymmetry,)),
+            Effect("mean of the pulse currents", 0.0, "A", k * d, "part of the torquer scale factor",
+                   simulated=(mean,)),
             Effect("switching time of the pulses", u_switching, "s", edge * one, "edges too late",
-                   simulated=self.late[0]),
+                   simulated=(self.late[0],)),
             Effect("switching time, proportional to the current", u_switching, "s", edge * d, "at full current",
-                   simulated=self.late[1]),
+                   simulated=(self.late[1],)),
             Effect("switching time, by the square of the current", u_switching, "s", edge * square, "at full current",
-                   simulated=self.late[2]),
+                   simulated=(self.late[2],)),
             Effect("resolution of the counts", 12.0**-0.5, "1", None, "two clocks, independent from window to window",
                    values=counts),
         ]  # fmt: skip

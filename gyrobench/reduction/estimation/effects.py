@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,7 @@ FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) 
 _ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")
 SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
 PHASES = ("phase 0°", "phase 90°")  # of a wobble
+PREDICTED = "Predicted shifts by simulated errors"  # title of the table
 APART = 2  # parts of a source up to which each has a line of its own
 
 
@@ -37,8 +38,8 @@ class Effect:
     error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
     reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
     (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
-    change of the reported values, of a source that is not in the data.  simulated: the error that a simulated set-up
-    has, of a source without parts.
+    change of the reported values, of a source that is not in the data.  simulated: the error of each part that a
+    simulated set-up has.
     """
 
     source: str
@@ -48,7 +49,7 @@ class Effect:
     note: str = ""
     parts: tuple[str, ...] = ()
     values: Array | None = None
-    simulated: float = 0.0
+    simulated: tuple[float, ...] = ()
 
     def changes(self, fit: Findings) -> Array:
         """Return the change (m, q) of the reported values for one unit of each part, SI."""
@@ -162,26 +163,34 @@ def correction_table(fit: Findings) -> list[dict[str, Any]]:
     ]
 
 
-def simulated_table(fit: Findings, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+def simulated_table(
+    fit: Findings, effects: Sequence[Effect], errors: Mapping[str, float] | None = None
+) -> list[dict[str, Any]]:
     """Return the table of the shifts by simulated errors of the set-up; none where the effects have no such error.
 
     A shift is sensitivity times error, less what a correction has taken out; it is known before anything is measured.
+    errors: source -> error, SI, beside those that the effects have.
     """
+    given = errors or {}
     taken = {c.source: c.value for c in fit.corrections}
-    known = [e for e in effects if e.simulated]
+    known: list[tuple[str, float, str, Array]] = []
+    for e in effects:
+        own = dict(zip(e.names, e.simulated, strict=False))
+        for name, change in zip(e.names, e.changes(fit), strict=False):
+            if value := own.get(name, 0.0) or given.get(name, 0.0):
+                known.append((name, value, e.unit, (value - taken.get(name, 0.0)) * change))
     if not known:
         return []
-    shifts = [(e.simulated - taken.get(e.source, 0.0)) * e.changes(fit)[0] for e in known]
     rows = []
     for j, q in enumerate(fit.quantities):
-        each = [float(s[j]) / q.scale for s in shifts]
+        each = [float(shift[j]) / q.scale for *_, shift in known]
         rows.append([q.title, *each, sum(each), float(fit.u[j]) / q.scale, q.unit])
-    errors = [f"({n}) {e.source}, {units.format_quantity(e.simulated, e.unit)}" for n, e in enumerate(known, 1)]
+    said = [f"({n}) {name}, {units.format_quantity(x, unit)}" for n, (name, x, unit, _) in enumerate(known, 1)]
     return [
         {
-            "title": "Predicted shifts by simulated errors",
+            "title": PREDICTED,
             "caption": "Change of each estimate against a set-up without these errors, sensitivity of the budget times "
-            f"error: {'; '.join(errors)}.",
+            f"error: {'; '.join(said)}.",
             "columns": ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"],
             "rows": rows,
         }

@@ -43,7 +43,7 @@ def linear_result(
     no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
     harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
-    robust: bool = False,
+    robust: bool = False, errors: Mapping[str, float] | None = None,
 ) -> DriftTestResult:  # fmt: skip
     """Return the result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
 
@@ -51,7 +51,8 @@ def linear_result(
     unit.  no_closed: why there are no values of the source's formulas, if there should be.  tables: the method's own,
     {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
-    robust: a table with a robust fit beside this one.
+    robust: a table with a robust fit beside this one.  errors: those of a simulated set-up by their source, SI, see
+    gyrobench.reduction.simulated_errors.
     """
     by_source = [standard_changes(fit, e) for e in effects]
     rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])
@@ -93,7 +94,7 @@ def linear_result(
         repeatability=dict(repeatability or {}),
         tables=[
             *correction_table(fit),
-            *simulated_table(fit, effects),
+            *simulated_table(fit, effects, errors),
             *_closed_table(fit, closed_caption),
             *tables,
             *fit.nuisance_tables(),

@@ -103,6 +103,9 @@ class ServoTest(TableTest):
         | type_b(
             "unbalance",
             "time",
+            "wobble",
+            "angle1",
+            "angle2",
             axis="standard uncertainty of the table axis, about each axis, each phase",
             mount="standard uncertainty of the input axis against the table axis",
         )

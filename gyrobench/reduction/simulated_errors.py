@@ -1,0 +1,65 @@
+"""Errors of the set-up that a simulated run has, under the names of the sources of its budget.
+
+With them the report says beforehand, from the sensitivities of the budget, by how much each estimate is off
+(gyrobench.reduction.estimation.effects.simulated_table).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.effects import SINES
+
+OFTEN = ("once", "twice")
+#: parameters of a table whose scale is a block of its own: amplitudes of the orders 1 and 2
+SCALE = ("scale_eccentricity", "scale_tilt")
+
+
+def simulated_errors(run: RunDocument) -> dict[str, float]:
+    """Return source -> error, SI, of what is set in the table and in the mount of the gyro; nothing of measured data.
+
+    Angle readings of the orders 1 and 2 (positive where too much is read), the axis off the pole, the gyro turned on
+    the table.
+    """
+    if run.measured:
+        return {}
+    return {
+        name: x for name, x in (_angles(run.parameters) | _axis(run.parameters) | _mount(run.parameters)).items() if x
+    }
+
+
+def _angles(p: Mapping[str, Any]) -> dict[str, float]:
+    amplitude, phase = (np.atleast_1d(p.get(f"table.encoder_{n}", [])) for n in ("amplitude", "phase"))
+    axes = {"outer angle error": 0, "inner angle error": 1} if amplitude.ndim == 2 else {"angle error": 0}
+    amplitude, phase = np.atleast_2d(amplitude), np.atleast_2d(phase)
+    if SCALE[0] in {n.partition(".")[2] for n in p}:
+        amplitude = np.array([[p[f"table.{n}"] for n in SCALE]])
+        phase = np.array([[p[f"table.{n}_phase"] for n in SCALE]])
+    out = {}
+    for name, row in axes.items():
+        for a, f, often in zip(amplitude[row], phase[row], OFTEN, strict=False):
+            # a sin(n q + f) = a cos f sin n q + a sin f cos n q
+            for part, x in zip(SINES, (math.cos(f), math.sin(f)), strict=True):
+                out[f"{name}, {often} a turn ({part})"] = float(a) * x
+    return out
+
+
+def _axis(p: Mapping[str, Any]) -> dict[str, float]:
+    tilt = p.get("table.tilt", (0.0, 0.0))
+    return {"table axis off the pole, about east": tilt[0], "table axis off the pole, about p × east": tilt[1]}
+
+
+def _mount(p: Mapping[str, Any]) -> dict[str, float]:
+    if "gyro.mount" not in p:
+        return {}
+    m = np.reshape(p["gyro.mount"], (3, 3))
+    # rows are the gyro axes: the transpose turns them
+    x, y, z = 0.5 * np.array([m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]])
+    turned = {f"gyro turned about its {n} axis": v for n, v in zip(("input", "output", "spin"), (x, y, z), strict=True)}
+    turned |= {f"gyro turned about its {n} axis": v for n, v in zip("xyz", (x, y, z), strict=True)}
+    return turned | {"input axis towards output axis": z, "input axis towards spin axis": -y}
