@@ -86,7 +86,7 @@ class TableDynamic(AxisTable):
         self.clock.tick()
         self.law.wait()
         if self.clock_due == 1.0:
-            self.command.advance(self.mode, self.target, self.command_way, self.command_index_rate)
+            self.command.advance(self.mode, self.target, self.command_way, self.index_rate)
             self.law.sample(self.command_count - self.scale_count, self.command.acc())
             self.near.judge(self.law_e, self.period)
         self.motor.advance(self.law_demand, self.axis_v)
