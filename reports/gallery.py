@@ -18,6 +18,7 @@ HERE = Path(__file__).parent
 FIGURE = re.compile(r'<figure class="picture.*?(<svg.*?</svg>).*?<figcaption>(.*?)</figcaption>', re.S)
 # system -> words of the caption of its figure, where it is not the first one
 SHOWN = {
+    "angle_system_test": "first minus second reading",
     "platform_four_gimbal": "Angles",
     "platform_single_axis": "Isolation",
     "platform_three_axis": "open loop",

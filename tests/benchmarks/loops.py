@@ -1,7 +1,8 @@
 """Coverage of loop measures, counted at length: ``python tests/benchmarks/loops.py [--runs 200] [--draws 1000]``.
 
 The tests count the same on fewer runs: tests/systems/test_stabilizer_power_2dof.py (stiffness, platform angle and drift
-of a power gyro stabilizer) and tests/reduction/test_margins.py (measured margins under noise).
+of a power gyro stabilizer), tests/reduction/test_margins.py (measured margins under noise) and
+tests/systems/test_angle_system.py (harmonics, lags and clocks of an angle reading system).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ sys.path[:0] = [str(TESTS), str(TESTS / "systems"), str(TESTS / "reduction")]
 
 
 def main() -> None:
+    import test_angle_system
     import test_margins
     import test_stabilizer_power_2dof
 
@@ -28,6 +30,8 @@ def main() -> None:
     ):
         for name, inside in counted(n).items():
             print(f"{title:24s} {name:10s} {inside / n:.3f} of {n}")
+    for name, share in test_angle_system.covered(given.runs).items():
+        print(f"{'angle_system_test':24s} {name:13s} {share:.3f} of {given.runs}")
 
 
 if __name__ == "__main__":

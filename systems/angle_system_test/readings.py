@@ -1,0 +1,218 @@
+"""Readings of the angle system test as rows of one linear model: positions, rates, gates, degrees.
+
+With E the error of the reader, R that of the reference, theta the table angle, w the rate of the table:
+
+    two heads   r - r_2               = E(theta) - E(theta + head) - h
+                (r + r_2) / 2 - ref   = (E(theta) + E(theta + head)) / 2 - R(theta) + c + h / 2
+    reversal    r - ref               = E(theta) - R(theta) + c
+                r_2 - ref             = E(theta + head) - R(theta) + c + h
+    rates       r - ref - w (t - t_ref) = E(theta) - R(theta) + c - w delay + w ripple cos 2 p theta
+    gates       sum of (rate - w) T   = E(theta_end) - E(theta_start) + ripple ... - clock_gate w T
+    degrees     |w| T - intervals     = -+ (E(theta_end) - E(theta_start)) + clock_inverse |w| T
+
+The noise of the two rows of a position is independent.  Variances are those of rounded counts.  The second turn of a
+reversal takes other angles than the first: where a table repeats an angle better than a count, so does the rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.reduction.window_checks import ReductionError
+
+from .harmonics import waves
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+POSITIONS, MEANS, FIRST, TURNED = "two readings", "mean less reference", "first turn", "scale turned"
+RATES, GATES, DEGREES = "at rates", "gates", "degrees"
+OTHER = ("c", "h", "delay", "ripple", "clock_gate", "clock_inverse")
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What the reduction knows of the set-up; angles in rad, rates in rad/s.
+
+    target, rate: of the phases, 1-based; rate 0 at positions.  turned: phases with the scale turned on its shaft.
+    quanta: of reader and reference.  lsb, interval: of the inverse rate.
+    """
+
+    target: Mapping[int, float]
+    rate: Mapping[int, float]
+    turned: frozenset[int]
+    head: float
+    pole_pairs: int
+    quanta: tuple[float, float]
+    lsb: float
+    interval: float
+    causes: Mapping[int, str]  # order of the reader -> what makes it
+    orders: Sequence[int]  # those of them that the two readings separate
+    reference_orders: Sequence[int]
+    reversal: bool = False
+
+
+@dataclass
+class Rows:
+    """The linear model: design X, data y (rad), variances, the part each row belongs to, what it is drawn against."""
+
+    X: list[Array] = field(default_factory=list)
+    y: list[Array] = field(default_factory=list)
+    variance: list[Array] = field(default_factory=list)
+    kind: list[str] = field(default_factory=list)
+    angle: list[Array] = field(default_factory=list)  # theta in rad
+    rate: list[Array] = field(default_factory=list)  # rad/s
+
+    def add(
+        self, a: Arrangement, kind: str, y: Array, variance: float, angle: Array, rate: Array | float = 0.0,
+        **columns: Array,
+    ) -> None:  # fmt: skip
+        """Add rows; columns: E (n, 2 orders), R (n, 2 orders of the reference), and those of OTHER."""
+        n = y.size
+        parts = [
+            columns.get("E", np.zeros((n, 2 * len(a.orders)))),
+            columns.get("R", np.zeros((n, 2 * len(a.reference_orders)))),
+            np.column_stack([columns.get(name, np.zeros(n)) for name in OTHER]),
+        ]
+        self.X.append(np.hstack(parts))
+        self.y.append(y)
+        self.variance.append(np.full(n, variance))
+        self.kind += [kind] * n
+        self.angle.append(angle)
+        self.rate.append(np.broadcast_to(np.asarray(rate, dtype=float), y.shape))
+
+
+def in_turn(x: Array) -> Array:
+    """Return angles less whole turns, within half a turn."""
+    out: Array = x - 2.0 * math.pi * np.round(x / (2.0 * math.pi))
+    return out
+
+
+@dataclass(frozen=True)
+class Slips:
+    """Readings off by whole fine cycles: where (table angle, rad), by how many, at rest or turning."""
+
+    angle: Array
+    cycles: Array
+    turning: Array
+
+
+def unslipped(difference: Array, cycle: float, zero: float) -> tuple[Array, Array]:
+    """Return the difference of two readings without whole fine cycles from ``zero``, and how many those are."""
+    off = in_turn(difference - zero)
+    n = np.round(off / cycle)
+    return zero + off - n * cycle, n
+
+
+def middle(difference: Array) -> float:
+    """Return the zero between two readings: what most of them agree on."""
+    start = float(difference[0])
+    return start + float(np.median(in_turn(difference - start)))
+
+
+def assemble(windows: Mapping[str, Array], a: Arrangement) -> tuple[Rows, Slips]:
+    """Return the rows of the model, and the readings that are off by whole cycles.
+
+    Gates and degrees need an angle that does not slip and all orders of the reader: else they are left out.
+    """
+    w = {k: np.asarray(v, dtype=float) for k, v in windows.items()}
+    phase = w["phase"].astype(int)
+    rate = np.array([a.rate[p] for p in phase])
+    at_rest, turned = rate == 0.0, np.isin(phase, list(a.turned))
+    first = at_rest & ~turned
+    if np.count_nonzero(first) < 30:
+        raise ReductionError(f"{np.count_nonzero(first)} positions: at least 30 are needed")
+    theta = np.array([a.target.get(p, 0.0) for p in phase])
+    cycle = math.pi / a.pole_pairs
+    zero = middle((w["reading"] - w["reference"])[first])
+    zero_2 = middle((w["reading_2"] - w["reference"])[turned if a.reversal else first])
+    d, n = unslipped(w["reading"] - w["reference"], cycle, zero)
+    d_2, n_2 = unslipped(w["reading_2"] - w["reference"], cycle, zero_2)
+    use = np.where(turned | ((n == 0.0) & first), n_2, n)
+    slipped = np.flatnonzero(use)
+    theta = np.where(at_rest, theta, w["reference"] + zero)
+    slips = Slips(theta[slipped] % (2.0 * math.pi), use[slipped], ~at_rest[slipped])
+    rows = Rows()
+    _positions(rows, a, theta, d, d_2, first, turned)
+    _rates(rows, a, w, theta, d, rate)
+    whole = len(a.orders) == len(a.causes)
+    for p in sorted(set(phase[~at_rest].tolist())) if whole and not slipped.size else ():
+        _readouts(rows, a, {k: v[phase == p] for k, v in w.items()}, theta[phase == p], a.rate[p])
+    return rows, slips
+
+
+def _positions(rows: Rows, a: Arrangement, theta: Array, d: Array, d_2: Array, first: Mask, turned: Mask) -> None:
+    q, q_ref = a.quanta
+    angle = theta[first]
+    here, there = waves(a.orders, angle), waves(a.orders, angle + a.head)
+    other, ones = -waves(a.reference_orders, angle), np.ones_like(angle)
+    if a.reversal:
+        variance = (q * q + q_ref * q_ref) / 12.0
+        rows.add(a, FIRST, d[first], variance, angle, E=here, R=other, c=ones)
+        angle = theta[turned]
+        other, ones = -waves(a.reference_orders, angle), np.ones_like(angle)
+        rows.add(
+            a, TURNED, d_2[turned], variance, angle, E=waves(a.orders, angle + a.head), R=other, c=ones, h=ones
+        )  # fmt: skip
+        return
+    one, two = d[first], d_2[first]
+    rows.add(a, POSITIONS, one - two, 2 * q * q / 12.0, angle, E=here - there, h=-ones)
+    rows.add(
+        a, MEANS, 0.5 * (one + two), (0.5 * q * q + q_ref * q_ref) / 12.0, angle,
+        E=0.5 * (here + there), R=other, c=ones, h=0.5 * ones,
+    )  # fmt: skip
+
+
+def _rates(rows: Rows, a: Arrangement, w: Mapping[str, Array], theta: Array, d: Array, rate: Array) -> None:
+    use = rate != 0.0
+    if not np.any(use):
+        return
+    angle, speed = theta[use], rate[use]
+    y = d[use] - speed * (w["t_reading"][use] - w["t_reference"][use])
+    rows.add(
+        a, RATES, y, (a.quanta[0] ** 2 + a.quanta[1] ** 2) / 12.0, angle, speed,
+        E=waves(a.orders, angle), R=-waves(a.reference_orders, angle), c=np.ones_like(y), delay=-speed,
+        ripple=speed * np.cos(2 * a.pole_pairs * angle),
+    )  # fmt: skip
+
+
+def _readouts(rows: Rows, a: Arrangement, w: Mapping[str, Array], theta: Array, rate: float) -> None:
+    """Add the gates and degrees that lie within a phase of constant rate.
+
+    Neighbours share a reading, and so its error: those that follow one another are added up to one row.
+    """
+    if theta.size < 3:
+        return
+    line = np.polyfit(w["t_reference"] - w["t_reference"][0], np.unwrap(theta), 1)
+
+    def angle(t: Array) -> Array:
+        return np.asarray(np.polyval(line, t - w["t_reference"][0]))
+
+    q = a.quanta[0]
+    for kind, name in ((GATES, "gate"), (DEGREES, "inverse")):
+        seen, start, end = w[f"{name}_rate"], w[f"{name}_start"], w[f"{name}_end"]
+        new = np.append(True, np.diff(w[f"{name}_number"]) != 0.0)
+        use = new & (start >= w["t_start"][0]) & (end > start) & (seen != 0.0)
+        number, seen, start, end = w[f"{name}_number"][use], seen[use], start[use], end[use]
+        for chain in np.split(np.arange(number.size), np.flatnonzero(np.diff(number) != 1.0) + 1):
+            if not chain.size:
+                continue
+            t_0, t_1 = start[chain[:1]], end[chain[-1:]]
+            change = waves(a.orders, angle(t_1)) - waves(a.orders, angle(t_0))
+            p = 2 * a.pole_pairs
+            ripple = rate * (np.cos(p * angle(t_1)) - np.cos(p * angle(t_0)))
+            columns = {"E": change, "ripple": ripple}
+            if kind == GATES:
+                T = np.sum((end - start)[chain], keepdims=True)
+                y = np.sum(((seen - rate) * (end - start))[chain], keepdims=True)
+                rows.add(a, kind, y, 2 * q * q / 12.0, angle(t_1), rate, **columns, clock_gate=-rate * T)
+            else:
+                T = np.sum(a.interval / np.abs(seen[chain]), keepdims=True)
+                y = abs(rate) * T - chain.size * a.interval
+                variance = (2 * q * q + 2 * (rate * a.lsb) ** 2) / 12.0
+                columns = {name: -math.copysign(1.0, rate) * x for name, x in columns.items()}
+                rows.add(a, kind, y, variance, angle(t_1), rate, **columns, clock_inverse=abs(rate) * T)
