@@ -28,6 +28,7 @@ from gyrobench import units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -44,7 +45,6 @@ __all__ = ["PickoffSetup", "ReductionError", "from_record", "reduce"]
 Array = NDArray[np.float64]
 DPH, ARCSEC, ARCMIN = units.factor("deg/h"), units.factor("arcsec"), units.factor("arcmin")
 NEGLIGIBLE = 0.3  # of what white noise leaves in the mean drift of a test
-LASTING = 0.25  # of the test: drift whose correlation time is longer looks constant in it
 TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is estimated
 
 
@@ -102,7 +102,7 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
         ),
     ]
     if both:
-        meaning = "mean drift of the gyro during the test, random drift with it, precession sign"
+        meaning = "drift of the gyro, with random drift that is slower than half the test, precession sign"
         wanted.append(Quantity("drift", meaning, "°/h", DPH, truth.get("drift")))
 
     def derived(b: Array) -> list[float]:
@@ -204,9 +204,9 @@ def _warnings(both: bool, bound: float, span: float) -> list[str]:
     ]
 
 
-def setup_of(run: RunDocument, specification: Specification | None = None) -> PickoffSetup:
-    """The setup a run.json describes: options and the parameters of the gyro."""
-    options = run.options
+def setup_of(record: Record, specification: Specification | None = None) -> PickoffSetup:
+    """The setup that the run.json of a record describes: options and the parameters of the gyro."""
+    run, options = record.run, record.run.options
     site = run_metadata.Site.of(run)
     known = run_metadata.truth_of(run, ("H", "C", "K_sg"))
     gain = float(options.get("gain") or 0.0)
@@ -216,7 +216,8 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Pi
         gain = gain or own
         truth = {"S": known["K_sg"] * own, "K_sg": known["K_sg"]}
         static = run_metadata.truth_of(run, drift_model.NAMES)
-        if static is not None and not _random_drift_lasts(run):
+        time = float(record.windows["t_end"][-1] - record.windows["t_start"][0])  # with the moves, unlike the plan's
+        if static is not None and not _random_drift_lasts(run, time):
             # output axis on the pole, spin axis on east x pole: X = 0, Y = -g sin, Z = -g cos of the latitude
             xyz = np.array([0.0, -site.g * math.sin(site.latitude), -site.g * math.cos(site.latitude)])
             row = drift_model.regressors(xyz, tuple(static))
@@ -233,13 +234,12 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Pi
     )
 
 
-def _random_drift_lasts(run: RunDocument) -> bool:
-    """True for a simulated gyro whose random drift looks constant in the test and is not small beside its white noise:
-    the parameters do not tell the mean drift of the test then.
+def _random_drift_lasts(run: RunDocument, time: float) -> bool:
+    """True for a simulated gyro with random drift that is slower than any in the interval and not small beside its
+    white noise: it is in the estimate, and the parameters are not its truth.
     """
     noise = run_metadata.truth_of(run, ("turn_on", "markov", "markov_tau", "white")) or {}
-    time = sum(row.settle + row.dwell for row in run.plan)
-    lasts = noise.get("markov_tau", 0.0) > LASTING * time
+    lasts = noise.get("markov_tau", 0.0) > noise_model.LONGEST * time
     slow = math.hypot(noise.get("turn_on", 0.0), noise.get("markov", 0.0) * lasts)
     return slow > NEGLIGIBLE * noise.get("white", 0.0) / math.sqrt(time)
 
@@ -247,4 +247,4 @@ def _random_drift_lasts(run: RunDocument) -> bool:
 @handling_errors.examined(handling_candidates.readings)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
     """:func:`reduce` of a gyrobench.record.record.Record, with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)
+    return run_metadata.finish(reduce(record.windows, setup_of(record, specification)), record)
