@@ -206,8 +206,7 @@ def outcome(sheet: Sheet, mistake: str, clean: Result) -> Outcome:
     off = max(abs(a.estimate - b.estimate) / a.u for a, b in both)
     if result.verdict == "pass" and mistake and off < HARMLESS:
         return Outcome("harmless", f"{off:.1f} u")
-    tests = "; ".join(t.name for t in result.tests if t.p is not None and t.p < 1e-3)
-    return Outcome(result.verdict, f"{off:.1f} u; {tests}")
+    return Outcome(result.verdict, f"{off:.1f} u; {' '.join(result.withheld)}")
 
 
 def main() -> int:

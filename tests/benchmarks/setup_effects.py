@@ -7,7 +7,8 @@ noise of the population (--white: white noise), a misalignment of the input axis
 an encoder that is wrong once a turn, outliers.  The same of the polar servo test, of the eight positions (their x
 current) and of tests in one attitude: default plans, setup_plans.py.
 Standard deviation of a window 0.0022 deg/h; 72 windows a turn of 2.4 h, 10 in a dwell, as the default plan has them.
-Prints the coverage of each coefficient, and how wide the intervals are over those of clean records without candidates.
+Prints the coverage of each coefficient, how wide the intervals are over those of clean records without candidates, and
+in which share of the records each candidate is reported with the coefficients: of clean records, falsely.
 """
 
 from __future__ import annotations
@@ -131,8 +132,8 @@ class Bench:
         first[joint + 1] = last[joint]
         return last - first
 
-    def reduce(self, y: np.ndarray, how: bool | str = True) -> tuple[np.ndarray, np.ndarray]:
-        """Errors and half widths of the coefficients; D_F is that of the middle of a ramp.
+    def reduce(self, y: np.ndarray, how: bool | str = True) -> tuple[np.ndarray, ...]:
+        """Errors and half widths of the coefficients, and which candidates joined; D_F is that of the middle of a ramp.
 
         how: with the nuisance model, or not; "named": with it, without the rows that are named as outliers.
         """
@@ -141,24 +142,28 @@ class Bench:
             fitted = fit(self.names, self.X, y, self.t0, self.t1, [], "rate", "", 1.0, candidates=self.seen)
             odd = outliers.find(fitted)
             best = (odd.without if odd else fitted).est
-            return best.beta[:p] - self.truth, best.half_width[:p]
+            return best.beta[:p] - self.truth, best.half_width[:p], np.array([e.joined for e in best.evidence])
         blocks = [c.block for c in self.seen] if how else []
         found = noise_mixture_fit.fit(self.X, y, self.names, self.t0, self.t1, 1e3, self.readings, blocks)
-        return found.beta[:p] - self.truth, found.half_width[:p]
+        return found.beta[:p] - self.truth, found.half_width[:p], np.array([e.joined for e in found.evidence], bool)
 
 
 def count(
     bench: Bench, case: Case, runs: int, seed: int, white: bool = False, candidates: bool | str = True
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of the coefficients, and mean half widths; candidates: see Bench.reduce."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coverage of the coefficients, mean half widths, share of the records in which each candidate joined and, last,
+    any of them; candidates: see Bench.reduce.
+    """
     rng = np.random.default_rng(seed)
     middle = case.ramp * np.mean(bench.time)
     hits, width = np.zeros((2, len(bench.names)))
+    joined = np.zeros((len(bench.seen) if candidates else 0) + 1)
     for _ in range(runs):
-        error, half = bench.reduce(bench.record(case, rng, white) - middle, candidates)
+        error, half, there = bench.reduce(bench.record(case, rng, white) - middle, candidates)
         hits += np.abs(error) <= half
         width += half
-    return hits / runs, width / runs
+        joined += np.append(there, there.any())
+    return hits / runs, width / runs, joined / runs
 
 
 def main() -> int:
@@ -178,12 +183,14 @@ def main() -> int:
             print(f"{'case':<40}{'nuisances':<10}" + " ".join(f"{n[-5:]:>5}" for n in bench.names) + "   width / clean")
         bench, plain = benches[key]
         for candidates in (False, True, *(["named"] if case.outliers else [])):
-            held, width = count(bench, case, given.runs, given.seed, given.white, candidates)
+            held, width, joined = count(bench, case, given.runs, given.seed, given.white, candidates)
             row = " ".join(f"{v:.3f}" for v in held)
             wide = " ".join(f"{v:.2f}" for v in width / plain)
             took = f"{time.monotonic() - began:.0f} s"
             shown = candidates if isinstance(candidates, str) else "auto" if candidates else "none"
-            print(f"{name:<40}{shown:<10}{row}   {wide}  {took}", flush=True)
+            names = [c.name for c in bench.seen] + ["any"]
+            said = ", ".join(f"{n} {v:.3f}" for n, v in zip(names, joined, strict=False)) if candidates else ""
+            print(f"{name:<40}{shown:<10}{row}   {wide}  {took}  {said}", flush=True)
     return 0
 
 

@@ -26,11 +26,13 @@ from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.estimation.uncertainty import p_text
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Series, Test
 
 Array = NDArray[np.float64]
 RAW = "Ljung-Box, residuals"
+CONTRADICTED = 0.01  # probability that the tests of a clean record speak against its model or noise
 IDEAL = 1e-6  # residuals over data, below which there is no noise
 
 
@@ -375,9 +377,10 @@ class Findings:
     def _residual_tests(self) -> list[Test]:
         if self.ideal:
             return []
-        n, e = self.y.size, self.est
-        lags = min(20, max(n // 5, 3))
-        q, p = series.ljung_box(series.autocorrelation(self._parts(e.residual / self.y_scale), lags), n, lags)
+        e = self.est
+        lags = min(20, max(self.y.size // 5, 3))
+        null = series.fitted_noise(e.X)
+        q, p = series.ljung_box_of_fit(self._parts(e.residual), lags, null)
         text = (
             "no significant autocorrelation"
             if p >= 0.05
@@ -387,13 +390,13 @@ class Findings:
         )
         tests = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
         whitened = ", residuals" if self.white else ", whitened residuals"
+        null = series.fitted_noise(e.fitted)
         if not self.white:
-            acf = series.autocorrelation(self._parts(e.whitened), lags)
-            q, p = series.ljung_box(acf, n, lags, 2 if e.best[1] > 0.0 else 0)
+            q, p = series.ljung_box_of_fit(self._parts(e.whitened), lags, null)
             text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
             tests.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
-        z, p = series.runs_test(e.whitened)
-        text = "the signs of the residuals are not random" if p < 0.05 else "compatible with random signs"
+        z, p = series.runs_test(e.whitened, null)
+        text = "neighbours have the same sign too often" if p < 0.05 else "compatible with random signs"
         tests.append(Test("runs" + whitened, z, p, "trends and steps", text))
         w, p = series.normality(e.whitened)
         text = (
@@ -403,54 +406,58 @@ class Findings:
         return tests
 
     def broken(self) -> list[Test]:
-        """Return the tests with p < 0.001, but not that of autocorrelation that the noise model includes."""
-        return [t for t in self.tests if t.p is not None and t.p < 0.001 and (self.white or t.name != RAW)]
+        """Return the tests that contradict the fit: p below CONTRADICTED over their number, so that a clean record has
+        none with a probability of 1 - CONTRADICTED.  That of autocorrelation that the noise model includes is not one.
+        """
+        tests = [t for t in self.tests if t.p is not None and (self.white or t.name != RAW)]
+        return [t for t in tests if t.p is not None and t.p * len(tests) < CONTRADICTED]
 
     def warnings(self) -> list[str]:
         """Return a sentence for each of :meth:`broken`."""
-        return [f"{t.name}: p < 0.001, {t.finding}. The stated u may be too small." for t in self.broken()]
-
-    def whitened_fit(self, extra: Array) -> tuple[Array, Array, float, float, int]:
-        """Return coefficients and covariance of ``extra`` columns (n, k), residual sums without and with them, dof."""
-        model = self.est.X  # with what joined
-        columns = np.column_stack([model, extra, self.y])
-        if self.white:
-            Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
-        else:
-            tau, share = self.est.best
-            likeliest = np.array([tau]), np.array([share]), np.array([self.est.reading])
-            Z = noise_model.whiten(self.t_start, self.t_end, columns, *likeliest)[0][:, 0, :]
-        z, A, p = Z[:, -1], Z[:, :-1], model.shape[1]
-        if any(c.scatter for c, _ in self.joined):  # some of A's columns are alike
-            q, s, _ = np.linalg.svd(A[:, :p], full_matrices=False)
-            basis = q[:, s > 1e-9 * s[0]]
-            p = basis.shape[1]
-            A = np.column_stack([basis, A[:, model.shape[1] :]])
-        plain = np.linalg.lstsq(A[:, :p], z, rcond=None)[0]
-        q, r = np.linalg.qr(A)
-        full = np.linalg.solve(r, q.T @ z)
-        rss0, rss1 = float(np.sum((z - A[:, :p] @ plain) ** 2)), float(np.sum((z - A @ full) ** 2))
-        dof = z.size - A.shape[1]
-        inverse = np.linalg.inv(r)
-        covariance = inverse @ inverse.T * (rss1 / dof)
-        return full[p:], covariance[p:, p:], rss0, rss1, dof
+        return [f"{t.name}: {p_text(t.p or 0.0)}, {t.finding}. The stated u may be too small." for t in self.broken()]
 
     def f_test(
         self, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
     ) -> tuple[Array, Array] | None:
         """Adds an F test of ``extra`` columns (n, k): do they explain more than noise?  ``bad`` is said when they do.
 
-        Returns their amplitudes and standard uncertainties (SI); None, without a test, for ideal data, no columns or
-        fewer than ``minimum`` degrees of freedom.  Raises numpy.linalg.LinAlgError for columns the fit holds already.
+        F is that of the likeliest noise model, p the mean over all, weighted by their probabilities: what a slower
+        noise than the likeliest may do by chance is no effect.  Returns the amplitudes of the columns and their
+        standard uncertainties (SI).  Of columns that the fit holds in part only the rest is tested.  None, without a
+        test, for ideal data, fewer than ``minimum`` degrees of freedom, or columns that the fit holds all.
         """
-        k = extra.shape[1]
-        if self.ideal or not k or self.dof - k < minimum:
+        basis, s, _ = np.linalg.svd(self.est.X, full_matrices=False)  # of what joined some columns may be alike
+        basis = basis[:, s > 1e-9 * s[0]]
+        size = np.linalg.norm(extra, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
+        there = s > 1e-6
+        k, p = int(np.count_nonzero(there)), basis.shape[1]
+        Q = np.column_stack([basis, new[:, there]])
+        dof = self.y.size - Q.shape[1]
+        if self.ideal or not k or dof < minimum:
             return None
-        values, covariance, rss0, rss1, dof = self.whitened_fit(extra)
-        f = ((rss0 - rss1) / k) / (rss1 / dof)
-        p = float(special.fdtrc(k, dof, f))
-        self.tests.append(Test(name, f, p, what, bad if p < 0.05 else good))
-        return values, np.sqrt(np.diag(covariance))
+        M, xy, yy = self._whitened_moments(np.column_stack([Q, self.y - basis @ (basis.T @ self.y)]))
+        inner = np.linalg.inv(M[:, :p, :p])
+        rss0 = yy - np.einsum("gp,gpq,gq->g", xy[:, :p], inner, xy[:, :p])
+        inverse = np.linalg.inv(M)
+        rss1 = yy - np.einsum("gp,gpq,gq->g", xy, inverse, xy)
+        f = ((rss0 - rss1) / k) / (np.maximum(rss1, 1e-300) / dof)
+        probability = float(self.est.models[:, 3] @ special.fdtrc(k, dof, f))
+        self.tests.append(Test(name, float(f[0]), probability, what, bad if probability < 0.05 else good))
+        back = turned[there].T / s[there] / size[:, None]
+        covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
+        return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.diag(covariance))
+
+    def _whitened_moments(self, columns: Array) -> tuple[Array, Array, Array]:
+        """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
+        if not self.white:
+            tau, share, reading, weight = self.est.models.T
+            grid = noise_model.NoiseGrid(tau, share, weight, reading)
+            return noise_mixture_fit.moments(self.t_start, self.t_end, columns, grid)[:3]
+        Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
+        square = (Z.T @ Z)[None]
+        return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1]
 
 
 def _behind(first: Estimates, of: Estimates, p: int) -> Estimates:

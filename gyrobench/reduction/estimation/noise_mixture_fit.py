@@ -34,7 +34,7 @@ from gyrobench.reduction.estimation.regression import Design, RegressionError, c
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
-JOINED = 0.95  # probability from which on a possible effect is reported with the coefficients
+JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -112,6 +112,9 @@ class Estimate:
     sigma_reading: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of one reading: likeliest, 5 % and 95 % point
     X: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns of ``names``
     evidence: tuple[Evidence, ...] = ()  # of each block
+    fitted: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns that ``whitened`` are residuals of
+    models: Array = field(default_factory=lambda: np.array([[1.0, 0.0, 0.0, 1.0]]))
+    # (g, 4): tau, share, reading and weight of the noise models that count, the most likely one first
 
 
 def fit(
@@ -138,7 +141,7 @@ def fit(
     start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
     remainder = y - Q @ start[:p]
     both = np.column_stack([Q, Z / z_scale, remainder])
-    M, xy, yy, logdet = _moments(t0, t1, both, grid)
+    M, xy, yy, logdet = moments(t0, t1, both, grid)
     T = np.zeros((start.size, start.size))  # back from the columns of both
     T[:p, :p] = np.linalg.inv(R) / scale[:, None]
     T[p:, p:] = np.diag(1.0 / z_scale)
@@ -210,7 +213,18 @@ def fit(
         y - columns @ beta[keep], scatter / math.sqrt(max(float(s2[at]), 1e-300)), gain, design, white, tau, sigma,
         density, model[:2], tuple(warnings), mixture, model[2],
         _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
+        Zk[:, index], _listed(grid, models, int(k)),
     )  # fmt: skip
+
+
+def _listed(grid: noise.NoiseGrid, weight: Array, k: int) -> Array:
+    """Return tau, share, reading and weight (g, 4) of the models with more than a hundredth of the largest weight and
+    of model k, which comes first.
+    """
+    counts = np.flatnonzero(weight > 0.01 * weight.max())
+    order = np.concatenate([[k], counts[counts != k]])
+    w = weight[order] / weight[order].sum()
+    return np.column_stack([grid.tau[order], grid.share[order], grid.reading[order], w])
 
 
 def _all_in(
@@ -323,6 +337,7 @@ def ordinary(
         ols.names, ols.beta, ols.covariance, ols.u, ols.half_width(), ols.p, dof, ols.residual, whitened,
         ols.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
         Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof), X=X,
+        fitted=X * root[:, None],
     )  # fmt: skip
 
 
@@ -388,7 +403,7 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     return float(values[k]), low, high
 
 
-def _moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
+def moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
     """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model."""
     models, c = grid.tau.size, columns.shape[1]
     square, logdet = np.zeros((models, c, c)), np.zeros(models)

@@ -4,7 +4,7 @@
     found = fit(quantities, X, y, ..., candidates=candidates)          # gyrobench.reduction.estimation.linear_fit
 
 A candidate whose columns the coefficients (and the candidates before it) make up themselves is not observable and is
-named with what it is aliased with.  The others are weighed by the fit (nuisance_states); from a probability of 95 % on
+named with what it is aliased with.  The others are weighed by the fit (nuisance_states); from a probability of 99 % on
 they are reported with the coefficients, below it only the intervals hold them.
 """
 
