@@ -9,22 +9,22 @@ NONE = [0.0] * ITEMS
 
 
 class FaultMonitor(Component):
-    """Monitor of scalars and of a pulse train: each in its range, or an alarm naming the first item.  [CTRL-SUPERVISION]
+    """Monitor of scalars and a pulse train: each in its range, or an alarm naming the first item.  [CTRL-SUPERVISION]
 
     Every `period` the first n of 8 scalars are read, one a communication step, and a burst of the pulse train is taken,
     one sample a step.  Features of the train y = (f, duty, amplitude): f from the first to the last rising edge of the
-    burst, crossings of the middle between its levels interpolated; duty from the samples above it between them; amplitude from the
-    means above and below.  An item with value v and range low to high is inside where
+    burst, crossings of the middle between its levels interpolated; duty from the samples above it between them;
+    amplitude from the means above and below.  An item with value v and range low to high is inside where
 
         g = |v - (low + high)/2| / ((high - low)/2) - 1 <= 0
 
-    and the whole is normal where the largest g of all items is.  Only where it is not, the items are looked at one by one:
-    `first` is the first one outside: 1 to 8 scalars, 9 frequency, 10 duty, 11 amplitude.  An item counts as outside
-    after `hold_off` periods in a row.  The alarm is latched until `clear`.  A train with fewer than three edges in the
-    burst, or with less than a fifth of its lower amplitude, has the frequency 0.
+    and the whole is normal where the largest g of all items is.  Only where it is not, the items are looked at one by
+    one: `first` is the first one outside: 1 to 8 scalars, 9 frequency, 10 duty, 11 amplitude.  An item counts as
+    outside after `hold_off` periods in a row.  The alarm is latched until `clear`.  A train with fewer than three
+    edges in the burst, or with less than a fifth of its lower amplitude, has the frequency 0.
 
-    Refused: inverted ranges, a burst with fewer than three edges at the lowest frequency, fewer than 20 samples a period
-    at the highest, more scalars and burst than steps in a period.  Values that are not finite end the run.
+    Refused: inverted ranges, a burst with fewer than three edges at the lowest frequency, fewer than 20 samples a
+    period at the highest, more scalars and burst than steps in a period.  Values that are not finite end the run.
     Not modelled: detection before a limit is reached (trends), correlation between items.
     Source: Hu 1981, section 6.1 (item 1); the inside of a region is g <= 0, not g = 0.
     """
@@ -199,7 +199,7 @@ class FaultMonitor(Component):
             self.samples = floor(self.burst / self.h + 0.5)
             self.refuse(
                 self.pulses and self.h > 0.05001 / self.frequency_high,
-                "the step is too long for pulses of frequency_high = {frequency_high} Hz: 20 samples a period are needed",
+                "the step is too long for frequency_high = {frequency_high} Hz: 20 samples a period are needed",
             )
             self.refuse(
                 self.steps < self.n or (self.pulses and self.steps < self.samples),

@@ -17,15 +17,17 @@ class ModeSupervisor(Component):
         2 synchronous rate  command counts - encoder       5 tacho rate   set point - tachometer
         3 position          the same, at rest at the end
 
-    `select` has exactly one 1 while the motor is on, none otherwise; `preset` is 1 for one sample after a switch, so that
-    the compensator begins with the states of the new error.  A request is not followed, and `reason` says why, where
+    `select` has exactly one 1 while the motor is on, none otherwise; `preset` is 1 for one sample after a switch, so
+    that the compensator begins with the states of the new error.  A request is not followed, and `reason` says why,
+    where
 
         1 pressure of the air below pressure_min           4 encoder lost, modes 2 to 4, which it feeds
         2 rate above rate_max                              5 change of mode above rate_change (bumpless = 0)
         3 temperature above temperature_max                6 two requests at once
 
-    1 to 4 switch a running motor off too, after `confirm` samples in a row, and stay so (`tripped`, time `t_trip`) until
-    no mode is requested and `clear` is given.  6 while running keeps the mode that is on.  Sampled every `period`.
+    1 to 4 switch a running motor off too, after `confirm` samples in a row, and stay so (`tripped`, time `t_trip`)
+    until no mode is requested and `clear` is given.  6 while running keeps the mode that is on.  Sampled every
+    `period`.
 
     Not modelled: contactors, brake (a table without motor runs out on its bearing), motor current.
     Source: Hu 1981, sections 5.2..5.4, 6.1 (items 1, 6); logic: our own.
