@@ -164,7 +164,9 @@ def fit(
     beta = flat @ estimates
     off = estimates - beta
     counts = flat > LIGHT * flat.max()
-    cov_each = T @ np.concatenate([part[3] for part in parts])[counts] @ T.T
+    chosen = zip(each, parts, counts.reshape(w.shape), strict=True)
+    covariances = [_covariance(s, part[2], part[3], models, start.size) for s, part, models in chosen]
+    cov_each = T @ np.concatenate(covariances) @ T.T
     best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
     dof = n - p - each[best].flat
     mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof)
@@ -244,9 +246,10 @@ def _all_in(
 def _posterior(
     s: State, M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Log likelihood, coefficients (G, all), variance of unit weight and covariance (G, all, all)."""
+    """Log likelihood, coefficients (G, all), variance of unit weight and cofactors (G, k, k) of the k in s.index."""
     index = np.array(s.index)
-    A = M[:, index][:, :, index] + s.precision[:, :, None] * np.eye(len(index))
+    A = M[:, index][:, :, index]
+    np.einsum("gpp->gp", A)[:] += s.precision
     inverse = np.linalg.inv(A)
     b = np.zeros(xy.shape)
     b[:, index] = np.einsum("gpq,gq->gp", inverse, xy[:, index])
@@ -254,10 +257,16 @@ def _posterior(
     m = n - p - s.flat
     ll = -0.5 * (logdet + np.linalg.slogdet(A)[1] + m * np.log(np.maximum(math.pi * rss, 1e-300)))
     ll += s.log_weight + math.lgamma(m / 2.0)
-    s2 = rss / m
-    covariance = np.zeros(M.shape)
-    covariance[:, index[:, None], index] = s2[:, None, None] * inverse
-    return ll, b, s2, covariance
+    s2: Array = rss / m
+    return ll, b, s2, inverse
+
+
+def _covariance(s: State, s2: Array, cofactors: Array, models: NDArray[np.bool_], size: int) -> Array:
+    """Covariance (m, size, size) of the coefficients under those ``models`` (G,) that are true."""
+    index = np.array(s.index)
+    covariance = np.zeros((int(models.sum()), size, size))
+    covariance[:, index[:, None], index] = s2[models, None, None] * cofactors[models]
+    return covariance
 
 
 def _evidence(

@@ -70,6 +70,16 @@ def states(blocks: Sequence[Block], scale: Array, M: Array, p: int, likely: Arra
     options = [(0.0, *SCATTERS) if b.scatter else (0.0, SIZE) for b in blocks]
     most = len(blocks) if math.prod(len(o) for o in options) <= MOST else 2
     inside = np.linalg.inv(M[:, :p, :p])
+    alone = []  # of each block: log weight of a single effect, standard deviation of a scatter in SCATTERS
+    for b, own in zip(blocks, places, strict=True):
+        if b.scatter:
+            one = np.median(M[:, own, own] * scale[[o - p for o in own]] ** 2, axis=1)
+            alone.append(math.exp(-0.5 * float(likely @ np.log(one))))
+        else:
+            cross = M[:, own, :p]
+            S = M[:, own][:, :, own] - cross @ inside @ cross.transpose(0, 2, 1)
+            unit = SIZE * sigma * math.sqrt(2.0 * math.pi)
+            alone.append(0.5 * float(likely @ np.linalg.slogdet(S)[1]) - len(own) * math.log(unit))
     for chosen in product(*options):
         if sum(c > 0.0 for c in chosen) > most:
             continue
@@ -81,19 +91,12 @@ def states(blocks: Sequence[Block], scale: Array, M: Array, p: int, likely: Arra
             if not size:
                 continue
             index += own
-            diagonal = M[:, own, own]
             if b.scatter:
-                columns = scale[[o - p for o in own]]
-                one = np.median(diagonal * columns**2, axis=1)
-                sd = np.full(M.shape[0], size * math.exp(-0.5 * float(likely @ np.log(one))))
-                precision.append(1.0 / np.square(np.outer(sd, columns)))
+                scatter[j] = np.full(M.shape[0], size * alone[j])
+                precision.append(1.0 / np.square(np.outer(scatter[j], scale[[o - p for o in own]])))
                 weight += 0.5 * np.sum(np.log(precision[-1]), axis=1) - math.log(len(SCATTERS))
-                scatter[j] = sd
             else:
-                cross = M[:, own, :p]
-                S = M[:, own][:, :, own] - cross @ inside @ cross.transpose(0, 2, 1)
-                unit = size * sigma * math.sqrt(2.0 * math.pi)
-                weight += 0.5 * float(likely @ np.linalg.slogdet(S)[1]) - len(own) * math.log(unit)
-                precision.append(np.zeros_like(diagonal))
+                weight += alone[j]
+                precision.append(np.zeros((M.shape[0], len(own))))
                 flat += len(own)
         yield State(tuple(c > 0.0 for c in chosen), index, np.concatenate(precision, axis=1), weight, flat, scatter)
