@@ -250,8 +250,8 @@ def _posterior(
     index = np.array(s.index)
     A = M[:, index][:, :, index]
     np.einsum("gpp->gp", A)[:] += s.precision
-    inverse = np.linalg.inv(A)
-    b = np.zeros(xy.shape)
+    inverse: Array = np.linalg.inv(A)
+    b: Array = np.zeros(xy.shape)
     b[:, index] = np.einsum("gpq,gq->gp", inverse, xy[:, index])
     rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
     m = n - p - s.flat
