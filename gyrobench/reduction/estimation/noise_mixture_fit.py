@@ -250,7 +250,7 @@ def _posterior(
     index = np.array(s.index)
     A = M[:, index][:, :, index]
     np.einsum("gpp->gp", A)[:] += s.precision
-    inverse: Array = np.linalg.inv(A)
+    inverse = np.asarray(np.linalg.inv(A), dtype=float)
     b: Array = np.zeros(xy.shape)
     b[:, index] = np.einsum("gpq,gq->gp", inverse, xy[:, index])
     rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
