@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pulse_loop import ARCSEC, RATIO, SCALE, TAU, Loop, loop_gain
 from scipy.integrate import solve_ivp
 from scipy.signal import welch
 from wired import DEG_H, RebalanceAnalog
@@ -95,6 +96,41 @@ def test_meter_noise_density_does_not_depend_on_the_step(h):
     assert np.mean(density) == pytest.approx(4e-14, rel=5 / math.sqrt(n))
     blocks = read.reshape(-1, 50).mean(axis=1)
     assert blocks.var() == pytest.approx(4e-14 / (50 * h), rel=5 * math.sqrt(2 / len(blocks)))
+
+
+EARTH = 7.2921159e-5  # rad/s
+K_V = RATIO * 15.04106  # 1/s: 1 arcsec of float angle at one Earth rate, whatever H
+
+
+def proportional(rate: float, step: float) -> Loop:
+    return Loop(rate, step, RebalanceAnalog, meter=0.0, i_max=1.0, **loop_gain(K_V / 2.0 / math.pi))
+
+
+def test_gain_rule_of_the_proportional_loop():
+    """H/C = 4/3: K_v = 20.05 1/s; at rest i = w/k and the float stands at 1 arcsec [eq. 5-64, 5-67]."""
+    loop = proportional(EARTH, 1e-3)
+    loop.run(1.0)
+    assert pytest.approx(20.05, abs=0.005) == K_V
+    assert loop.theta / ARCSEC == pytest.approx(1.0, rel=1e-5)
+    assert SCALE * loop.part.i == pytest.approx(EARTH, rel=1e-8)
+
+
+@pytest.mark.parametrize("hertz", [3.25, 8.0])
+def test_frequency_response_of_the_proportional_loop(hertz):
+    """|k i / w| = K_v / sqrt(w2 + (K_v - tau w2)2) with the square on the bracket (ET16); -3 dB at 3.25 Hz."""
+    w, step = 2.0 * math.pi * hertz, 1e-4
+    loop = proportional(0.0, step)
+    seen = []
+    for k in range(round((0.5 + 2.0 / hertz) / step)):
+        loop.rate = EARTH * math.sin(w * (k + 0.5) * step)
+        loop.run(step)
+        seen.append(SCALE * loop.part.i)
+    t = np.arange(1, len(seen) + 1) * step
+    last = t > t[-1] - 1.0 / hertz
+    fit = np.linalg.lstsq(np.column_stack([np.sin(w * t), np.cos(w * t)])[last], np.array(seen)[last], rcond=None)[0]
+    gain = np.hypot(*fit) / EARTH
+    assert gain == pytest.approx(K_V / math.hypot(w, K_V - TAU * w * w), rel=2e-3)
+    assert hertz != 3.25 or gain == pytest.approx(math.sqrt(0.5), rel=3e-3)
 
 
 @pytest.mark.parametrize(

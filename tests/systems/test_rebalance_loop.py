@@ -1,0 +1,148 @@
+"""Rebalance loop test: errors drawn at random come back, three loops by swap, resolution, ripple, refusals."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.engine.session import Session
+from gyrobench.errors import GyrobenchError
+from gyrobench.result import DriftTestResult
+from gyrobench.system.system import load_system
+
+NAME = "rebalance_loop_test"
+QUICK: dict[str, Any] = {"gate": 0.2, "rest": 20, "readings": 6, "settle": 1.5}
+I, F_Q = 3.6 / 17.2, 1e6  # noqa: E741  A, Hz
+ARCSEC = math.pi / 648000.0
+
+
+@pytest.fixture(scope="module")
+def pwm() -> Any:
+    with Session(NAME) as session:
+        yield session
+
+
+def run(session: Session, values: dict[str, Any], seed: int = 1, step: float = 1e-3) -> DriftTestResult:
+    record = session.run({**QUICK, **values}, seed, step)
+    result = load_system(NAME).reduce(record)
+    assert isinstance(result, DriftTestResult)
+    return result
+
+
+def value(result: DriftTestResult, name: str) -> float:
+    return result[name].estimate
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_errors_of_the_pulses_come_back(pwm: Session, seed: int) -> None:
+    """Drawn currents and switching times; expected by hand with s_j = dT_j f_s, D = dI_plus + dI_minus:
+
+    I_0 = (dI_plus - dI_minus)/2 + (2 I + D) s_1    κ = (D/2 + (2 I + D) s_2)/I    κ_2 at i = 0.95 I: 0.95 (2 + D/I) s_3
+    """
+    draw = np.random.default_rng(seed).normal
+    plus, minus = 2e-3 * I * draw(), 2e-3 * I * draw()
+    late = [3e-7 * draw(), 5e-7 * draw(), 5e-7 * draw()]
+    result = run(pwm, {"rebalance.dI_plus": plus, "rebalance.dI_minus": minus, "rebalance.dT": late}, seed)
+    s, both = [x * 1e3 for x in late], plus + minus
+    expected = {
+        "I_0": ((plus - minus) / 2.0 + (2.0 * I + both) * s[0]) * 1e6,
+        "κ": (both / 2.0 + (2.0 * I + both) * s[1]) / I * 1e6,
+        "κ_±": 0.0,
+        "κ_2": 0.95 * (2.0 + both / I) * s[2] * 1e6,
+        "κ_3": 0.0,
+    }
+    for name, truth in expected.items():
+        c = result[name]
+        assert c.truth == pytest.approx(truth, abs=1e-6 * abs(truth) + 1e-9), name
+        assert abs(c.estimate - truth) < 4.0 * c.u, name
+    assert abs(value(result, "I_0")) > 20.0 * result["I_0"].u and result["I_0"].u < 10.0  # uA: 5e-5 of full scale
+
+
+def test_resolution_is_two_clocks(pwm: Session) -> None:
+    """2 k I/(f_q T) = 2 deg/s / 1e6 / 0.2 s = 0.036 deg/h (ET17), half of it at half the current."""
+    quiet = {"rates": "0.2 0.5 1", "readings": 2, "rest": 60}
+    assert value(run(pwm, quiet), "resolution") == pytest.approx(0.036, rel=1e-9)
+    half = run(pwm, {**quiet, "rebalance.I": I / 2.0, "range": "0.4deg/s"})
+    assert value(half, "resolution") == pytest.approx(0.018, rel=1e-9)
+    # full scale over noise of a reading: 0.0178 deg/h/sqrt(Hz) / sqrt(0.2 s) = 0.04 deg/h at least
+    assert 1800.0 / 0.1 < value(half, "dynamic range") < 1800.0 / 0.04
+
+
+def test_quantum_of_readings() -> None:
+    """Whole multiples of 3.7e-7 A, few and many; readings without a quantum."""
+    quantum = importlib.import_module(".reduction", type(load_system(NAME)).__module__).quantum
+    rng = np.random.default_rng(0)
+    for size in (3, 40, 4000):
+        x = 3.7e-7 * np.concatenate([rng.integers(-size, size, 60), [size, size + 1]])
+        assert quantum(x) == pytest.approx(3.7e-7, rel=1e-12)
+    assert quantum(rng.normal(size=50) * 1e-4) == 0.0 and quantum(np.zeros(5)) == 0.0
+
+
+def ripple(ratio: float, tau: float, full: float) -> float:
+    """Standard deviation of the float angle at zero input: the float's equation over a saw, from its periodic state."""
+    T, n = 1e-3, 4000
+    t = (np.arange(n) + 0.5) * T / n
+    r = np.where(t < T / 2.0, -1.0, 1.0) * ratio * full
+    # v' = (r - v)/tau, periodic: half periods mirror each other, v(0) = V with V = A tanh(T/(4 tau))
+    V = ratio * full * math.tanh(T / 4.0 / tau)
+    v = np.where(t < T / 2, r + (V - r) * np.exp(-t / tau), r + (-V - r) * np.exp(-(t - T / 2) / tau))
+    theta = np.cumsum(v) * T / n
+    return float(np.std(theta))
+
+
+def test_ripple_in_steps_of_a_fraction_of_the_saw(pwm: Session) -> None:
+    """Steps of 20 us show the cycle of the saw, 1 ms does not; gyro without noise, H/C = 1, tau = 1 ms, 1 deg/s."""
+    noise = {"gyro.pickoff": 0.0, "gyro.white": 0.0, "gyro.markov": 0.0}
+    plan = {"gate": 0.05, "rest": 6, "readings": 1, "rates": "0.1 0.2 0.3", "settle": 0.5, "latitude": "0.01deg"}
+    fine = run(pwm, {**noise, **plan}, step=2e-5)
+    closed = ripple(1.0, 1e-3, math.radians(1.0)) / ARCSEC
+    assert value(fine, "ripple") == pytest.approx(closed, rel=5e-3) and closed > 0.05
+    assert value(run(pwm, {**noise, **plan}), "ripple") < 0.1 * closed
+
+
+def test_three_loops() -> None:
+    """The same asymmetry of the currents: a bias in the binary loop, a scale factor by sign in the one on demand; the
+    analog loop has neither, but what its torquer does.
+    """
+    results = {}
+    errors = {"rebalance.dI_plus": 1e-3 * I, "rebalance.dI_minus": -1e-3 * I}
+    for part, values in (
+        ("rebalance_pwm", errors),
+        ("rebalance_pulse", errors),
+        ("rebalance_analog", {"rebalance.i_max": 0.22, "gyro.k2": 2e-3, "gyro.k3": -5e-3}),
+    ):
+        with Session(NAME, {"rebalance": part}) as session:
+            results[part] = run(session, values)
+    for part, result in results.items():
+        for name in ("I_0", "κ", "κ_±", "κ_2", "κ_3"):
+            assert abs(result[name].estimate - result[name].truth) < 4.0 * result[name].u, (part, name)
+    full = 0.95 * I
+    assert results["rebalance_pwm"]["I_0"].truth == pytest.approx(1e-3 * I * 1e6)
+    assert results["rebalance_pulse"]["I_0"].truth == 0.0
+    assert results["rebalance_pulse"]["κ_±"].truth == pytest.approx(1000.0)
+    assert results["rebalance_analog"]["κ_2"].truth == pytest.approx(2e-3 * full * 1e6)
+    assert results["rebalance_analog"]["κ_3"].truth == pytest.approx(-5e-3 * full**2 * 1e6)
+    # one pulse of 1/1e5 s in 0.2 s: 1 deg/s / 2e4 = 0.18 deg/h; the analog one is not quantized
+    assert value(results["rebalance_pulse"], "resolution") == pytest.approx(0.18, rel=1e-9)
+    assert value(results["rebalance_analog"], "resolution") == 0.0
+
+
+@pytest.mark.parametrize(
+    "values, message",
+    [
+        ({"gate": 0.2005}, "gate = 0.2005 s must be whole saws of the rebalance, 0.001 s"),
+        ({"range": "1deg/s"}, "the float would run away"),
+        ({"rates": "0.5 1.2 0.1"}, "1.2 is not above 0 and up to 1"),
+        ({"rates": "0.5 1"}, "at least three different ones"),
+        ({"rates": "fast"}, "numbers are expected"),
+        ({"rebalance.K_p": 700.0, "rebalance.f_s": 500.0}, "crosses over at 92.9 Hz"),
+        ({"rebalance.K_p": 1300.0, "rebalance.f_s": 5e3}, "τ K_v = 1.08; above 1 the loop needs"),
+    ],
+)
+def test_refuses(pwm: Session, values: dict[str, Any], message: str) -> None:
+    with pytest.raises(GyrobenchError, match=message):
+        pwm.run({**QUICK, **values}, 1)
