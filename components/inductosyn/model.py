@@ -85,6 +85,7 @@ class Inductosyn(Component):
     off = Discrete(0.0, "1", "coarse minus fine reading in counts")
     gone = Discrete(0.0, "1", "the angle is lost")
     acc = Discrete(0.0, "rad/s2", "mean acceleration of the last step")
+    periods = Discrete(0.0, "1", "excitation periods begun")
 
     def start(self) -> None:
         self.N = nearest(self.f_T / self.f_0)
@@ -127,6 +128,7 @@ class Inductosyn(Component):
         self.offset = -self.head_count
         self.acc = 0.0
         self.gone = 0.0
+        self.periods = floor(self.t * self.f_0 + 1e-9)
         self.loop.rate_last = self.rate
         self.encoder.count = self.head_count
         self.encoder.t_read = self.t
@@ -177,11 +179,12 @@ class Inductosyn(Component):
                 self.gone = 1.0
             self.encoder.count = self.scale_count(0.0, self.loop.lag + self.loop.slipped * cycle)
         else:
-            most = self.slew * (periods - floor((self.t - self.h) * self.f_0 + 1e-9))
+            most = self.slew * (periods - self.periods)
             way = self.scale_count(0.0, 0.0) - self.encoder.count
             if fabs(way) > 0.5 * self.N:
                 self.gone = 1.0
             self.encoder.count = self.encoder.count + clip(way, -most, most)
+        self.periods = periods
 
     def read_absolute(self, k: Number) -> None:
         """Take the reading of excitation period k, or that of the one before while its second crossing is to come."""

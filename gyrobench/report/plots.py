@@ -27,6 +27,7 @@ from gyrobench.report.style import (
 )
 
 Json = Mapping[str, Any]
+MANY = 20  # coefficients, from which a correlation below 0.3 is colour only
 
 
 def short(label: str, length: int = 26) -> str:
@@ -220,12 +221,13 @@ def plain_log(ax: Any, ratio: float) -> None:
 
 
 def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: str) -> str:
-    """Return the correlation of the estimates, lower triangle, in hundredths."""
+    """Return the correlation of the estimates, lower triangle, in hundredths; among many only the large ones."""
     from matplotlib.patches import Rectangle
 
     n = len(names)
     if n < 2 or len(matrix) != n:
         return ""
+    least = 0.0 if n <= MANY else 0.3  # whose number is written
     side = HALF if n < 11 else WIDE
     fig, axes = figure(side, 14 + 6.4 * n)
     ax = axes[0, 0]
@@ -237,6 +239,8 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
                 continue
             colour, depth = (BLUE if r > 0.0 else VERMILION), 0.6 * min(1.0, abs(r))
             ax.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, facecolor=colour, alpha=depth, linewidth=0))
+            if abs(r) < least:
+                continue
             text = f"{r:.2f}".replace("-", "−") if abs(r) >= 0.005 else "0"
             ax.text(j, i, text, ha="center", va="center", color=INK, fontsize=7 if n < 11 else 8)
     ax.set_xlim(-0.5, n - 1.5)

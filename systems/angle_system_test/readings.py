@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,21 +57,33 @@ class Arrangement:
     reversal: bool = False
 
 
+@dataclass(frozen=True)
+class At:
+    """When and where rows are: t (s), angle and rate of the table (rad, rad/s), each (n,)."""
+
+    t: Array
+    angle: Array
+    rate: Array
+
+    def __getitem__(self, rows: Any) -> At:
+        return At(self.t[rows], self.angle[rows], self.rate[rows])
+
+
 @dataclass
 class Rows:
-    """The linear model: design X, data y (rad), variances, the part each row belongs to, what it is drawn against."""
+    """The linear model: design X, data y (rad), variances, the kind of each row, when and where it is."""
 
     X: list[Array] = field(default_factory=list)
     y: list[Array] = field(default_factory=list)
     variance: list[Array] = field(default_factory=list)
     kind: list[str] = field(default_factory=list)
-    angle: list[Array] = field(default_factory=list)  # theta in rad
-    rate: list[Array] = field(default_factory=list)  # rad/s
+    places: list[At] = field(default_factory=list)
 
-    def add(
-        self, a: Arrangement, kind: str, y: Array, variance: float, angle: Array, rate: Array | float = 0.0,
-        **columns: Array,
-    ) -> None:  # fmt: skip
+    @property
+    def at(self) -> At:
+        return At(*(np.concatenate([getattr(p, n) for p in self.places]) for n in ("t", "angle", "rate")))
+
+    def add(self, a: Arrangement, kind: str, y: Array, variance: float, at: At, **columns: Array) -> None:
         """Add rows; columns: E (n, 2 orders), R (n, 2 orders of the reference), and those of OTHER."""
         n = y.size
         parts = [
@@ -82,8 +95,7 @@ class Rows:
         self.y.append(y)
         self.variance.append(np.full(n, variance))
         self.kind += [kind] * n
-        self.angle.append(angle)
-        self.rate.append(np.broadcast_to(np.asarray(rate, dtype=float), y.shape))
+        self.places.append(at)
 
 
 def in_turn(x: Array) -> Array:
@@ -136,47 +148,44 @@ def assemble(windows: Mapping[str, Array], a: Arrangement) -> tuple[Rows, Slips]
     slipped = np.flatnonzero(use)
     theta = np.where(at_rest, theta, w["reference"] + zero)
     slips = Slips(theta[slipped] % (2.0 * math.pi), use[slipped], ~at_rest[slipped])
-    rows = Rows()
-    _positions(rows, a, theta, d, d_2, first, turned)
-    _rates(rows, a, w, theta, d, rate)
+    rows, at = Rows(), At(w["t_end"], theta, rate)
+    _positions(rows, a, at, d, d_2, first, turned)
+    _rates(rows, a, w, at, d)
     whole = len(a.orders) == len(a.causes)
     for p in sorted(set(phase[~at_rest].tolist())) if whole and not slipped.size else ():
         _readouts(rows, a, {k: v[phase == p] for k, v in w.items()}, theta[phase == p], a.rate[p])
     return rows, slips
 
 
-def _positions(rows: Rows, a: Arrangement, theta: Array, d: Array, d_2: Array, first: Mask, turned: Mask) -> None:
+def _positions(rows: Rows, a: Arrangement, at: At, d: Array, d_2: Array, first: Mask, turned: Mask) -> None:
     q, q_ref = a.quanta
-    angle = theta[first]
-    here, there = waves(a.orders, angle), waves(a.orders, angle + a.head)
-    other, ones = -waves(a.reference_orders, angle), np.ones_like(angle)
+    angle, ones = at.angle[first], np.ones(np.count_nonzero(first))
+    here, there, other = waves(a.orders, angle), waves(a.orders, angle + a.head), -waves(a.reference_orders, angle)
     if a.reversal:
         variance = (q * q + q_ref * q_ref) / 12.0
-        rows.add(a, FIRST, d[first], variance, angle, E=here, R=other, c=ones)
-        angle = theta[turned]
-        other, ones = -waves(a.reference_orders, angle), np.ones_like(angle)
-        rows.add(
-            a, TURNED, d_2[turned], variance, angle, E=waves(a.orders, angle + a.head), R=other, c=ones, h=ones
-        )  # fmt: skip
+        rows.add(a, FIRST, d[first], variance, at[first], E=here, R=other, c=ones)
+        angle, ones = at.angle[turned], np.ones(np.count_nonzero(turned))
+        there, other = waves(a.orders, angle + a.head), -waves(a.reference_orders, angle)
+        rows.add(a, TURNED, d_2[turned], variance, at[turned], E=there, R=other, c=ones, h=ones)
         return
     one, two = d[first], d_2[first]
-    rows.add(a, POSITIONS, one - two, 2 * q * q / 12.0, angle, E=here - there, h=-ones)
+    rows.add(a, POSITIONS, one - two, 2 * q * q / 12.0, at[first], E=here - there, h=-ones)
+    variance = (0.5 * q * q + q_ref * q_ref) / 12.0
     rows.add(
-        a, MEANS, 0.5 * (one + two), (0.5 * q * q + q_ref * q_ref) / 12.0, angle,
-        E=0.5 * (here + there), R=other, c=ones, h=0.5 * ones,
+        a, MEANS, 0.5 * (one + two), variance, at[first], E=0.5 * (here + there), R=other, c=ones, h=0.5 * ones
     )  # fmt: skip
 
 
-def _rates(rows: Rows, a: Arrangement, w: Mapping[str, Array], theta: Array, d: Array, rate: Array) -> None:
-    use = rate != 0.0
+def _rates(rows: Rows, a: Arrangement, w: Mapping[str, Array], at: At, d: Array) -> None:
+    use = at.rate != 0.0
     if not np.any(use):
         return
-    angle, speed = theta[use], rate[use]
-    y = d[use] - speed * (w["t_reading"][use] - w["t_reference"][use])
+    at = at[use]
+    y = d[use] - at.rate * (w["t_reading"][use] - w["t_reference"][use])
     rows.add(
-        a, RATES, y, (a.quanta[0] ** 2 + a.quanta[1] ** 2) / 12.0, angle, speed,
-        E=waves(a.orders, angle), R=-waves(a.reference_orders, angle), c=np.ones_like(y), delay=-speed,
-        ripple=speed * np.cos(2 * a.pole_pairs * angle),
+        a, RATES, y, (a.quanta[0] ** 2 + a.quanta[1] ** 2) / 12.0, at,
+        E=waves(a.orders, at.angle), R=-waves(a.reference_orders, at.angle), c=np.ones_like(y), delay=-at.rate,
+        ripple=at.rate * np.cos(2 * a.pole_pairs * at.angle),
     )  # fmt: skip
 
 
@@ -201,18 +210,18 @@ def _readouts(rows: Rows, a: Arrangement, w: Mapping[str, Array], theta: Array, 
         for chain in np.split(np.arange(number.size), np.flatnonzero(np.diff(number) != 1.0) + 1):
             if not chain.size:
                 continue
-            t_0, t_1 = start[chain[:1]], end[chain[-1:]]
-            change = waves(a.orders, angle(t_1)) - waves(a.orders, angle(t_0))
-            p = 2 * a.pole_pairs
-            ripple = rate * (np.cos(p * angle(t_1)) - np.cos(p * angle(t_0)))
+            begin, t = angle(start[chain[:1]]), end[chain[-1:]]
+            at = At(t, angle(t), np.full(1, rate))
+            change = waves(a.orders, at.angle) - waves(a.orders, begin)
+            ripple = rate * (np.cos(2 * a.pole_pairs * at.angle) - np.cos(2 * a.pole_pairs * begin))
             columns = {"E": change, "ripple": ripple}
             if kind == GATES:
                 T = np.sum((end - start)[chain], keepdims=True)
                 y = np.sum(((seen - rate) * (end - start))[chain], keepdims=True)
-                rows.add(a, kind, y, 2 * q * q / 12.0, angle(t_1), rate, **columns, clock_gate=-rate * T)
+                rows.add(a, kind, y, 2 * q * q / 12.0, at, **columns, clock_gate=-rate * T)
             else:
                 T = np.sum(a.interval / np.abs(seen[chain]), keepdims=True)
                 y = abs(rate) * T - chain.size * a.interval
                 variance = (2 * q * q + 2 * (rate * a.lsb) ** 2) / 12.0
                 columns = {name: -math.copysign(1.0, rate) * x for name, x in columns.items()}
-                rows.add(a, kind, y, variance, angle(t_1), rate, **columns, clock_inverse=abs(rate) * T)
+                rows.add(a, kind, y, variance, at, **columns, clock_inverse=abs(rate) * T)

@@ -143,6 +143,7 @@ def reduce(
         [q for q, s in zip(known, seen, strict=True) if s], X[:, seen], y, None, None, _groups(rows, kind, seen),
         "difference", "″", ARCSEC, noise="white", weights=1.0 / variance,
     )  # fmt: skip
+    found.t_start = found.t_end = rows.at.t
     # rounding leaves bounded residuals: that they are not normal says nothing of outliers
     found.tests = [t for t in found.tests if not t.name.startswith("Shapiro")]
     result = linear_result(
@@ -153,11 +154,12 @@ def reduce(
                  "READOUT-RATE; Hu 1981, eq. 5-2..5-6 with ET4"],
         equation='r = theta + E(theta) - dot(theta) tau, quad E = sum_k a_k cos k theta + b_k sin k theta, '
         'quad r - r_2 = E(theta) - E(theta + delta)',
-        conventions=_conventions(a), effects=_effects(found, X[:, seen], kind, run), specification=specification,
+        conventions=_conventions(a), effects=_effects(found, X[:, seen], run), specification=specification,
         instrument=run.instrument, tables=[*_tables(found, a, slips), *_readouts(found, rows, kind)],
         random="counting and reading noise",
         warnings=_warnings(a, slips, lost),
     )  # fmt: skip
+    result.allan, result.psd = {}, {}  # several rows to an instant, and long gaps: no time series
     result.summary = _summary(result, found, a, slips)
     if slips.cycles.size:
         count = slips.cycles.size
@@ -167,7 +169,7 @@ def reduce(
 
 def _groups(rows: Rows, kind: NDArray[np.str_], seen: NDArray[np.bool_]) -> list[Group]:
     """Return what is drawn: readings at rest against the angle, at rates against the rate (the line: zero and lag)."""
-    angle, rate = np.degrees(np.concatenate(rows.angle)) % 360.0, np.degrees(np.concatenate(rows.rate))
+    angle, rate = np.degrees(rows.at.angle) % 360.0, np.degrees(rows.at.rate)
     labels = {
         POSITIONS: "first minus second reading of the scale",
         MEANS: "mean of both readings minus reference",
@@ -193,7 +195,7 @@ def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[dict[
     """Return the table of rates by gates and by degrees, less what the errors of the scale make of them."""
     names = {q.name: j for j, q in enumerate(found.linear)}
     weights = np.ones_like(found.y) if found.weights is None else found.weights
-    rate, lines = np.concatenate(rows.rate), []
+    rate, lines = rows.at.rate, []
     spread = math.sqrt(float(np.sum(weights * found.est.residual**2)) / found.dof)
     for name, clock in ((GATES, "clock_gate"), (DEGREES, "clock_inverse")):
         for r in sorted(set(rate[kind == name].tolist()), key=lambda v: (abs(v), -v)):
@@ -203,21 +205,17 @@ def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[dict[
             left = found.est.residual[use] + turned * found.est.beta[names[clock]]
             share = -float(np.sum(weight * left / turned) / np.sum(weight))
             u = spread / math.sqrt(float(np.sum(weight)))
-            lines.append([name, r / ERU, (1.0 + share) * r / ERU, u * abs(r) / ERU, u * 1e6])
+            lines.append([name, round(r / ERU, 6), share * 1e6, u * 1e6, u * abs(r) / ERU])
     caption = "Errors of the scale taken out; u: counting, LSB and noise. Type A"
-    head = ["readout", "rate of the table / ERU", "rate read / ERU", "u / ERU", "u / 1e-6"]
+    head = ["readout", "rate of the table / ERU", "rate read, deviation / 1e-6", "u / 1e-6", "u / ERU"]
     return [{"title": "Rate readouts", "caption": caption, "columns": head, "rows": lines}] if lines else []
 
 
-def _effects(found: Findings, X: Array, kind: NDArray[np.str_], run: RunDocument) -> list[Effect]:
-    """The table's rate, which gates and degrees are held against: too large by one, they show too little."""
-    turned = np.zeros(found.y.size)
-    for name, sign in (("clock_gate", 1.0), ("clock_inverse", 1.0)):
-        for j, q in enumerate(found.linear):
-            if q.name == name:
-                turned += sign * X[:, j]
+def _effects(found: Findings, X: Array, run: RunDocument) -> list[Effect]:
+    """The rate of the table, which gates and degrees are compared with: faster than known, they show more."""
+    clocks = [j for j, q in enumerate(found.linear) if q.name.startswith("clock")]
     u = float(run.options.get("u_rate", 0.0))
-    return [Effect("rate of the table", u, "1", turned, "relative")]
+    return [Effect("rate of the table", u, "1", -X[:, clocks].sum(axis=1), "relative")]
 
 
 def _conventions(a: Arrangement) -> list[str]:

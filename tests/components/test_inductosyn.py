@@ -364,6 +364,34 @@ def test_pulse_widths_drive_like_sine_and_cosine():
     assert part.angle_read == pytest.approx(0.5, abs=0.51 * ARCSEC)
 
 
+def test_the_pulse_width_reading_is_the_null_of_the_output():
+    """5-38, 5-39: U_2 = K U_1 sin(a_i - p alpha) is 0 within half a clock where a_i = p times the reading."""
+    for a in np.linspace(-1.0, 2.0, 17):
+        part = started(a, **PULSE)
+        a_i = 2 * math.pi * (part.count % 3600) / 3600
+        assert abs(math.sin(a_i - 360 * a)) <= math.sin(math.pi / 3600) + 1e-9 and math.cos(a_i - 360 * a) > 0
+
+
+def test_a_late_hour_changes_nothing():
+    """At 1e6 s the excitation periods are still counted one by one: slew limit and stamps as at the start."""
+    t0 = 1e6
+    part = Inductosyn(**{**CLEAN, **PULSE})
+    part.initialize(t0)
+    for k in range(300):
+        part.angle = 1900 * ARCSEC * (k + 1) * H
+        part.rate = 1900 * ARCSEC
+        part.do_step(t0 + k * H, H)
+        assert abs(part.angle_read - part.angle) <= 1.6 * ARCSEC
+    part = Inductosyn(**{**CLEAN, **KHZ2, "mode": 0})
+    part.rate = 1.0
+    part.initialize(t0)
+    for k in range(300):
+        part.angle = (k + 1) * H
+        part.do_step(t0 + k * H, H)
+        if k > 1:
+            assert abs(part.angle_read - (part.t_read - t0)) <= 0.51e-4 * DEG + 1e-9
+
+
 def test_the_pulse_width_counter_follows_one_clock_a_period():
     part = started(0.0, **PULSE)  # at 2 kHz: 2000 arcsec/s
     rows = follow(part, lambda t: 1900 * ARCSEC * t, lambda t: 1900 * ARCSEC, 0.5)

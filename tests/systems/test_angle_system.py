@@ -149,6 +149,21 @@ def test_a_reading_off_by_a_cycle_is_named_and_taken_out(document: Any) -> None:
     assert "clock_gate" not in result.names
 
 
+def test_a_wrong_rate_of_the_table_is_in_the_budget(session: Session) -> None:
+    """A table that is faster by 1e-5 than known makes both clocks look slow by that: the budget says so, with sign."""
+    record = session.run({"u_rate": 1e-5})
+    result = reduction().reduce(record.windows, record.run)
+    slower = [
+        p.model_copy(update={"target": p.target / (1 + 1e-5)}) if p.mode == "rate" else p for p in record.run.plan
+    ]
+    moved = reduction().reduce(record.windows, record.run.model_copy(update={"plan": slower}))
+    lines = {b.coefficient: b for b in result.budget if b.source == "rate of the table"}
+    for name in ("clock_gate", "clock_inverse"):
+        assert moved[name].estimate - result[name].estimate == pytest.approx(-10.0, rel=1e-2)
+        assert lines[name].sensitivity == pytest.approx(-1e6, rel=1e-6)  # in 1e-6, for a relative error of 1
+        assert lines[name].contribution == pytest.approx(10.0, rel=1e-6)
+
+
 # ------------------------------------------------------------------------------------------ co-simulation
 @pytest.fixture(scope="module")
 def runs(session: Session) -> list[Any]:
@@ -165,6 +180,17 @@ def test_random_systems_come_back(runs: list[Any]) -> None:
         [c.interval[0] <= c.truth <= c.interval[1] for r in runs for c in r.coefficients if c.z is not None]
     )
     assert 0.92 < inside < 0.98
+
+
+def test_each_rate_is_read_within_its_u(runs: list[Any]) -> None:
+    """Deviation of gates and degrees from the rate of the table: that of the clock drawn, within 4 u each."""
+    for k, result in enumerate(runs):
+        table = next(t for t in result.tables if t["title"] == "Rate readouts")
+        assert len(table["rows"]) == 12  # two readouts, three rates, both ways
+        drawn = {"gates": random_system(k)["gate.clock"], "degrees": random_system(k)["inverse.clock"]}
+        for readout, rate, deviation, u, in_eru in table["rows"]:
+            assert abs(deviation + drawn[readout] * 1e6) < 4.0 * u
+            assert in_eru == pytest.approx(u * 1e-6 * abs(rate), rel=1e-9)
 
 
 def test_lag_of_type_1_against_type_2(session: Session) -> None:
