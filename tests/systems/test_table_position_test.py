@@ -1,0 +1,93 @@
+"""The position test of a table: harmonics told from the polygon, wobble, tilt, squareness, lost motion, refusals."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import gyrobench as gb
+
+ARCSEC = math.pi / 648000
+QUICK = {"move_rate": "8deg/s", "settle": "0.5s", "dwell": "0.3s"}
+TRUE = {
+    "reader.encoder_eccentricity": "0.7arcsec", "reader.encoder_eccentricity_phase": 0.4,
+    "reader.encoder_tilt": "-0.4arcsec", "reader.encoder_tilt_phase": 2.0,
+    "wobble.amplitude": "1.2arcsec", "wobble.phase": 1.1,
+    "body.tilt[1]": "3arcsec", "body.tilt[2]": "-5arcsec",
+    "reference.plate[1]": "-2arcsec", "reference.plate[2]": "4arcsec", "reference.level_zero[1]": "9arcsec",
+    "reference.errors[2]": "1.5arcsec", "reference.errors[7]": "-0.8arcsec",
+}  # fmt: skip
+
+
+def position_run(seed: int = 1, **values: Any) -> Any:
+    test = gb.load("table_position_test", **QUICK)
+    for name, value in {**TRUE, **values}.items():
+        test.set(name, value)
+    return test.run(seed=seed)
+
+
+@pytest.fixture(scope="module")
+def found() -> Any:
+    return position_run().result
+
+
+def test_harmonics_come_back_in_spite_of_the_polygon(found: Any) -> None:
+    for name in ("E1 cos", "E1 sin", "E2 cos", "E2 sin", "E3 cos", "E3 sin"):
+        c = found[name]
+        assert abs(c.z) < 3.5 and c.u < 0.1
+    # the scale reads 0.7 sin(theta + 0.4) too much, the table stands that much short
+    assert found["E1 sin"].truth == pytest.approx(-0.7 * math.cos(0.4))
+    assert found["E1 sin"].estimate == pytest.approx(-0.7 * math.cos(0.4), abs=0.2)
+    assert (
+        found["accuracy"].estimate == pytest.approx(found["accuracy"].truth, abs=0.1) and abs(found["accuracy"].z) < 4
+    )
+
+
+def test_faces_of_the_polygon(found: Any) -> None:
+    rows = found.tables[0]["rows"]
+    assert rows[1][3] == pytest.approx(1.5 - (1.5 - 0.8) / 12)
+    for _, value, u, truth in rows:
+        assert abs(value - truth) < 4 * u
+    assert sum(row[1] for row in rows) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_wobble_tilt_and_squareness(found: Any) -> None:
+    for name, value in (
+        ("tilt 1", 3.0), ("tilt 2", -5.0), ("wobble cos", 1.2 * math.cos(1.1)), ("wobble sin", 1.2 * math.sin(1.1)),
+        ("squareness x", -2.0), ("squareness y", 4.0),
+    ):  # fmt: skip
+        assert found[name].estimate == pytest.approx(value, abs=0.1) and abs(found[name].z) < 4
+    assert found["repeatability"].estimate < 0.18  # a count
+
+
+def test_one_mount_separates_only_what_two_heads_do() -> None:
+    """Reversal alone: odd orders by the heads, even ones stay with the polygon, the plate with the level's zero."""
+    r = position_run(mounts="0").result
+    assert abs(r["E1 sin"].z) < 4 and abs(r["E3 cos"].z) < 4
+    for name in ("E2 cos", "E2 sin", "squareness x"):
+        assert r[name].no_value and math.isnan(r[name].estimate)
+    assert "order 2 is the same in all mounts" in r["E2 cos"].no_value
+
+
+def test_friction_loses_motion() -> None:
+    """A table that is held by friction inside a count stops short on both ways."""
+    r = position_run(**{"body.axis_friction": 0.3, "positions": 6, "mounts": "0 60", "orders": 2}).result
+    assert 0.0 < abs(r["lost motion"].estimate) < 0.4 or r["lost motion"].u < 0.05
+    assert abs(r["E1 sin"].z) < 4
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"positions": 24}, "at most 99 are possible"),
+        ({"mounts": "0 45"}, "must be whole faces of 30 deg"),
+        ({"mounts": "0, 90"}, "angles in deg with spaces"),
+        ({"orders": 6}, "at most 5 harmonics follow from 12 positions"),
+        ({"command.reference_limit": "190deg"}, "goes through a whole turn"),
+    ],
+)
+def test_refusals(values: dict[str, Any], text: str) -> None:
+    with pytest.raises(gb.GyrobenchError, match=text):
+        position_run(**values)
