@@ -163,7 +163,7 @@ def read_measured(
     rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
     if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
         rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
-    expected = {c.name: c for c in (*columns, *temperatures(header))}
+    expected = {c.name: c for c in (*columns, *conditions(header))}
     places, problems = header_places(header, expected)
     if short := [(n, len(r)) for n, r in rows if len(r) != len(header)]:
         problems.append(f"{_rows([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
@@ -183,10 +183,11 @@ def read_measured(
     return columns_si, meta
 
 
-def temperatures(header: list[str]) -> list[Column]:
-    """Columns that any record may have: temperature [degC], temperature 2 [degC] ..., for the nuisance model."""
+def conditions(header: list[str]) -> list[Column]:
+    """Columns that any record may have, for the nuisance model: temperature [degC], temperature 2 ..., turn_on."""
     names = [t.split("[")[0].strip() for t in header]
-    return [Column(n, "K", "temperature", required=False) for n in names if n.startswith("temperature")]
+    found = [Column(n, "K", "temperature", required=False) for n in names if n.startswith("temperature")]
+    return [*found, *(Column(n, "1", "number of the turn-on", required=False) for n in names if n == "turn_on")]
 
 
 def header_places(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str, tuple[int, Factor]], list[str]]:

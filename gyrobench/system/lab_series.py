@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench import units
-from gyrobench.record.csv_reader import Column, DataError, Head, temperatures
+from gyrobench.record.csv_reader import Column, DataError, Head, conditions
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
 from gyrobench.system import table_motion
 from gyrobench.system.plan import Phase
@@ -78,7 +78,7 @@ def windows_of_series(
 
     attitudes: what a phase may be called.  Raises DataError.
     """
-    columns = (*columns, *temperatures(head.names))
+    columns = (*columns, *conditions(head.names))
     names = _Names.of(columns)
     there = {n.split("[")[0].strip() for n in head.names}
     keys = [k for k in names.keys if k in there]

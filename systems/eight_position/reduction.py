@@ -107,7 +107,7 @@ def averaged(windows: Mapping[str, Array]) -> dict[str, Array]:
     keys = np.stack([np.asarray(windows[n]).astype(int) for n in ("cycle", "position")], axis=1)
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    means = ["mean_x", "mean_y", *(n for n in windows if n.startswith("temperature"))]
+    means = ["mean_x", "mean_y", *(n for n in windows if n.startswith(("temperature", "turn_on")))]
     found: dict[str, list[float]] = {n: [] for n in ("cycle", "position", "t_start", "t_end", *means)}
     for k in np.argsort(first):
         mine = np.flatnonzero(group.ravel() == k)
@@ -183,8 +183,8 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
 
 
 def _candidates(channel: str, data: Mapping[str, Array], s: Setup, d: Array, lin: model.Linear) -> list[Candidate]:
-    """Set-up effects of a current: misalignment of its measuring axis towards the other one, trend, temperature and,
-    where the single readings are data, constants that differ from standing to standing.
+    """Set-up effects of a current: misalignment of its measuring axis towards the other one, trend, temperature,
+    asymmetry of its torquer, constants of the turn-ons and, where the single readings are data, of the standings.
 
     Readings averaged by position and cycle hold one datum of each standing, whose scatter is in their white noise.
     """
@@ -192,6 +192,7 @@ def _candidates(channel: str, data: Mapping[str, Array], s: Setup, d: Array, lin
     across = s.earth_rate * d[:, 0, "xyz".index(axes[1])]
     text = f"misalignment of the {axes[0]} axis towards the {axes[1]} axis"
     found = [Candidate.of(f"ε_{axes}", text, "arcsec", -across), *nuisances.common(data, f",{channel}")]
+    found.append(nuisances.torquer(lin.k0 * lin.X[:, 0], channel)[0])  # the scale factor is a result
     standing = list(zip(np.asarray(data["cycle"]).tolist(), np.asarray(data["position"]).tolist(), strict=True))
     if len(set(standing)) < len(standing):
         found.append(nuisances.scatter(f"σ_mount,{channel}", nuisances.MOUNTS, standing))

@@ -6,8 +6,8 @@ Every window is a row; regressors are averaged over the window as the current is
 The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The closed
 formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
 
-Misalignment of the input axis, a trend in time, temperature and constants that differ from mount to mount are weighed
-by the data (gyrobench.reduction.estimation.nuisances).
+Misalignment of the input axis, a trend in time, temperature, asymmetry of the torquer and constants that differ from
+mount to mount or from turn-on to turn-on are weighed by the data (gyrobench.reduction.estimation.nuisances).
 
 Not modelled: change of the drift with time other than linear, torquer nonlinearity (a line of the budget).
 """
@@ -86,7 +86,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         "drift rate",
         "°/h",
         DPH,
-        candidates=_candidates(setup, turning, phase, windows),
+        candidates=_candidates(setup, turning, phase, windows, nuisances.fitted(rate, X, y)),
     )
     found = corrected(found, lambda f: budget.effects(setup, turning, current, spread, f), setup.corrections)
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
@@ -138,15 +138,18 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
 
 
 def _candidates(
-    s: TumbleSetup, turning: window_regressors.Turning, phase: Array, windows: Mapping[str, Array]
+    s: TumbleSetup, turning: window_regressors.Turning, phase: Array, windows: Mapping[str, Array], torque: Array
 ) -> list[Candidate]:
-    """Set-up effects that a tumble may have: misalignment, trend, temperature, constants from mount to mount."""
+    """Set-up effects that a tumble may have: misalignment, trend, temperature, torquer (its rate ``torque``, rad/s),
+    constants from mount to mount and from turn-on to turn-on.
+    """
     if not s.nuisances:
         return []
     along = window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, 1)
     found = [] if s.tilt is not None else [Candidate.of(budget.TILT, TILT_MEANING, "arcsec", -along)]
     mounts = nuisances.mounts(phase, s.faces)
-    return [*found, *nuisances.common(windows), nuisances.scatter("σ_mount", nuisances.MOUNTS, mounts)]
+    found += [*nuisances.common(windows), *nuisances.torquer(torque)]
+    return [*found, nuisances.scatter("σ_mount", nuisances.MOUNTS, mounts)]
 
 
 def _quantity(s: TumbleSetup, name: str, book: Mapping[str, float]) -> Quantity:

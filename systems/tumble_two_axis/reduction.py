@@ -85,14 +85,16 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
     outer, inner = ((w[f"{a}_start"] + w[f"{a}_end"]) / 2.0 for a in ("outer", "inner"))
     current = w["mean"] if s.polarity == "project" else -w["mean"]
     C = geometry.attitude(s.latitude, outer, inner)
-    y = C[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate) - s.k * current
+    rate = C[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate)
+    y = rate - s.k * current
     X = _design(s, C)
+    weighed = [*nuisances.common(windows), *nuisances.torquer(nuisances.fitted(rate, X, y))] if s.nuisances else []
     theta, book, harmonics, ties, why = _harmonic_route(s, w["phase"], w["t_end"] - w["t_start"], outer, inner, y)
     if s.harmonic and why:
         raise ReductionError(why)
     found = fit(
         [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
-        "drift rate", "°/h", DPH, candidates=nuisances.common(windows) if s.nuisances else (),
+        "drift rate", "°/h", DPH, candidates=weighed,
     )  # fmt: skip
     found = corrected(found, lambda f: _effects(s, f, outer, inner, C, current), s.corrections)
     _model_test(found, theta)

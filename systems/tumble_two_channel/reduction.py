@@ -94,7 +94,7 @@ def _channel(
     found = fit(
         [_quantity(s, c, n, book) for n in names], X, y, turning.t_start, turning.t_end,
         evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
-        candidates=_candidates(s, c, phase, turning, windows),
+        candidates=_candidates(s, c, phase, turning, windows, nuisances.fitted(y + s.k[OTHER[c]] * current, X, y)),
     )  # fmt: skip
     other = evidence.own_sources(OTHER[c])
     found = corrected(found, lambda f: evidence.effects(s, c, f, turning, current), s.corrections, other)
@@ -136,15 +136,19 @@ def _channel(
 
 
 def _candidates(
-    s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, windows: Mapping[str, Array]
-) -> list[Candidate]:
-    """Set-up effects: tilt of the measuring axis, trend, temperature, constants from mount to mount."""
+    s: TwoChannelSetup, c: str, phase: Array, turning: window_regressors.Turning, windows: Mapping[str, Array],
+    torque: Array,
+) -> list[Candidate]:  # fmt: skip
+    """Set-up effects: tilt of the measuring axis, trend, temperature, torquer (its rate ``torque``, rad/s), constants
+    from mount to mount and from turn-on to turn-on.
+    """
     if not s.nuisances:
         return []
     along = window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, 2)
     tilt = Candidate.of(geometry.TILT[c], _tilt_meaning(c), "arcsec", -along)
     mounts = nuisances.scatter(f"σ_mount,{c}", nuisances.MOUNTS, nuisances.mounts(phase, s.faces))
-    return [*([tilt] if s.tilt is None else []), *nuisances.common(windows, f",{c}"), mounts]
+    found = [*nuisances.common(windows, f",{c}"), *nuisances.torquer(torque, OTHER[c])]
+    return [*([tilt] if s.tilt is None else []), *found, mounts]
 
 
 def _tilt_meaning(c: str) -> str:

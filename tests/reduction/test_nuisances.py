@@ -109,6 +109,34 @@ def test_scatter_between_mounts_is_a_result() -> None:
     assert found.u[0] / DPH == pytest.approx(0.05 / np.sqrt(10), rel=0.5)
 
 
+def test_turn_ons_are_told_from_mounts() -> None:
+    """Ten mounts of six windows; turn-ons twice a mount, constants of 0.03 deg/h that change with them alone.  Where
+    each mount is one turn-on there is one scatter, and the other is said to be the same."""
+    group, turn = np.repeat(np.arange(10), 6), np.repeat(np.arange(20), 3)
+    drawn = 0.03 * np.random.default_rng(5).normal(size=20)
+    mounts = nuisances.scatter("σ_mount", nuisances.MOUNTS, group.tolist())
+    found = line(noisy() + DPH * drawn[turn], [mounts, *nuisances.common({**windows(), "turn_on": 1.0 + turn})])
+    assert [q.name for q in found.quantities] == ["a", "b", "σ_turn_on"]
+    value, half = found.value[2] / DPH, found.reported.half_width[2] / DPH
+    assert abs(value - np.std(drawn, ddof=1)) < half < 0.03
+    same = line(noisy() + DPH * drawn[group], [mounts, *nuisances.common({**windows(), "turn_on": 1.0 + group})])
+    rows = {r[0]: r for r in same.nuisance_tables()[0]["rows"]}
+    assert rows["σ_turn_on"][6] == "not observable: its groups are those of σ_mount"
+    assert [q.name for q in same.quantities] == ["a", "b", "σ_mount"]
+
+
+def test_clean_records_gain_no_turn_on_and_no_asymmetry() -> None:
+    """Of 24 records at most one gains one (of 60 none did): white noise, twenty turn-ons, a current of both signs."""
+    x = np.cos(2.0 * np.pi * np.arange(60) / 12.0)
+    turn, current = np.repeat(np.arange(20), 3), DPH * 20.0 * (0.2 + x)
+    joined = 0
+    for seed in range(24):
+        weighed = [*nuisances.common({**windows(), "turn_on": 1.0 + turn}), nuisances.torquer(current)[0]]
+        names = [q.name for q in line(noisy(seed=seed), weighed).quantities]
+        joined += "σ_turn_on" in names or "k_±" in names
+    assert joined <= 1
+
+
 def test_noise_free_records_have_no_nuisances() -> None:
     x = np.cos(2.0 * np.pi * np.arange(60) / 12.0)
     found = line(DPH * (0.3 - 0.2 * x + 1e-9 * np.arange(60)), nuisances.common(windows()))

@@ -155,7 +155,7 @@ def test_eight_positions() -> None:
         clean = reduced(session.run(values, seed=1))
         record = session.run({**values, "gyro.mount": mount}, seed=1)
     holds(clean)
-    assert set(candidates(clean)) == {"ε_xy", "trend,x", "ε_yx", "trend,y"}
+    assert set(candidates(clean)) == {"ε_xy", "trend,x", "k_±,x", "ε_yx", "trend,y", "k_±,y"}
     turned = reduced(record)
     holds(turned, ε_xy=300.0, ε_yx=-300.0)
     assert worst(reduced(record, nuisances="none"), clean) > 5.0

@@ -119,7 +119,7 @@ def fit(
     known = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in quantities)
     names = [q.name for q in known]
     tested = candidates if noise != "white" and not _noise_free(X, y) else ()
-    seen, hidden = nuisances.observable(X, names, tested)
+    seen, hidden = nuisances.observable(X, names, tested, y)
     try:
         if noise == "white":
             est = noise_mixture_fit.ordinary(X, y, names, t_start, t_end, weights, limit)

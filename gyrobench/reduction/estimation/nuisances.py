@@ -10,6 +10,7 @@ they are reported with the coefficients, below it only the intervals hold them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -23,10 +24,14 @@ from gyrobench.reduction.estimation.nuisance_states import Block
 
 Array = NDArray[np.float64]
 MOUNTS = "standard deviation of the drift from mount to mount"
+TURN_ONS = "standard deviation of the drift from turn-on to turn-on"
 DPH = units.factor("deg/h")
 FREEDOM = 10  # degrees of freedom that must be left beside all candidates
 CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
 VISIBLE = 1e-3  # least share of a column's length at right angles to the others
+TORQUER = 0.02  # the same of an effect of the torquer
+ASYMMETRY, SCALE_FACTOR = 1e-3, 1e-2  # largest of a sound torquer; also what a scale factor may have been mistaken by
+FLAGRANT = 10.0  # white-noise uncertainties from which on an effect beyond its bound is weighed too
 TITLE = "Nuisance model"
 COLUMNS = ["candidate", "meaning", "estimate", "u", "unit", "probability", "in the model", "largest change", "of u"]
 
@@ -42,10 +47,13 @@ class Candidate:
     columns: Array
     scatter: bool = False
     visible: float = VISIBLE  # least share of its length at right angles to the coefficients
+    bound: float = math.inf  # SI; an effect that a record determines less well than this is not weighed
 
     @classmethod
-    def of(cls, name: str, meaning: str, unit: str, columns: Array, visible: float = VISIBLE) -> Candidate:
-        return cls(name, meaning, units.display(unit), units.factor(unit), columns, visible=visible)
+    def of(
+        cls, name: str, meaning: str, unit: str, columns: Array, visible: float = VISIBLE, bound: float = math.inf
+    ) -> Candidate:
+        return cls(name, meaning, units.display(unit), units.factor(unit), columns, visible=visible, bound=bound)
 
     @property
     def block(self) -> Block:
@@ -82,13 +90,40 @@ def scatter(name: str, meaning: str, groups: Sequence[object]) -> Candidate:
 
 
 def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
-    """The candidates of every test: what thermometers read (columns temperature...), and a trend.
+    """The candidates of every test: what thermometers read (columns temperature...), a trend, and constants that
+    differ from turn-on to turn-on (column turn_on, their numbers).
 
     A temperature that only ramps is a trend: what was measured comes first, and the trend is named as its alias.
     channel: appended to their names, where several channels are reported together.
     """
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    return [replace(c, name=c.name + channel) for c in (*temperature(windows), trend(t0, t1))]
+    found = [*temperature(windows), trend(t0, t1)]
+    if "turn_on" in windows:
+        found.append(scatter("σ_turn_on", TURN_ONS, np.round(windows["turn_on"]).tolist()))
+    return [replace(c, name=c.name + channel) for c in found]
+
+
+def torquer(rate: Array, axis: str = "") -> list[Candidate]:
+    """Return what a torquer may do to a rebalance test: rate = k i (n,), as the model has it, rad/s.
+
+    A torquer whose scale factor is k (1 + a) for positive and k (1 - a) for negative currents leaves a |k i| in the
+    drift omega_IA - k i, one whose scale factor is k (1 + d) leaves d k i.  Of k i the fitted one is taken: the noise of
+    the measured one is in the drift too.  A window in which the current changes its sign counts with its mean.
+    Small currents determine them less well than torquers are sound; weighed all the same, they would only widen the
+    intervals.  Then u_nonlinearity and u_scale_factor state them.
+    axis: about which the torquer acts, where there are two.
+    """
+    end, which = (f",{axis}", f" about {axis}") if axis else ("", "")
+    kinds = (
+        (f"k_±{end}", f"asymmetry of the torquer{which}, (k₊ − k₋)/(k₊ + k₋)", np.abs(rate), ASYMMETRY),
+        (f"δk{end}", f"relative error of the scale factor of the torquer{which}", rate, SCALE_FACTOR),
+    )
+    return [Candidate.of(name, text, "%", column, TORQUER, bound) for name, text, column, bound in kinds]
+
+
+def fitted(rate: Array, X: Array, y: Array) -> Array:
+    """Return k i = omega_IA - drift with the drift that least squares fit: rate (n,), regressors X, drift y, rad/s."""
+    return np.asarray(rate - X @ np.linalg.lstsq(X, y, rcond=None)[0])
 
 
 def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:
@@ -108,12 +143,19 @@ class Hidden:
     reason: str
 
 
-def observable(X: Array, names: Sequence[str], candidates: Iterable[Candidate]) -> tuple[list[Candidate], list[Hidden]]:
-    """Return the candidates that the data can tell from the coefficients ``names`` of X and from one another."""
+def observable(
+    X: Array, names: Sequence[str], candidates: Iterable[Candidate], y: Array | None = None
+) -> tuple[list[Candidate], list[Hidden]]:
+    """Return the candidates that the data can tell from the coefficients ``names`` of X and from one another.
+
+    y (n,): without it candidates with a bound are told from the design alone.
+    """
     seen: list[Candidate] = []
     hidden: list[Hidden] = []
     model, known = X, list(names)
-    for c in sorted(candidates, key=lambda c: c.scatter):  # a scatter last: it takes what is left
+    groups: list[Candidate] = []
+    # a scatter last, it takes what is left; the one with fewer groups first: the other may be within it
+    for c in sorted(candidates, key=lambda c: (c.scatter, c.block.columns.shape[1] if c.scatter else 0)):
         columns = c.block.columns
         if not np.any(np.abs(columns).max(axis=0) > 0.0):
             continue  # it does not occur: no temperature but one
@@ -127,14 +169,43 @@ def observable(X: Array, names: Sequence[str], candidates: Iterable[Candidate]) 
             hidden.append(
                 Hidden(c, f"not observable: {text} aliased with {', '.join(_partners(columns, model, known))}; repeat")
             )
+        elif c.scatter and (same := next((g for g in groups if _own_contrasts(c, g, model) < CONTRASTS), None)):
+            hidden.append(Hidden(c, f"not observable: its groups are those of {same.name}"))
+        elif y is not None and (reason := _beyond_bound(c, model, y)):
+            hidden.append(Hidden(c, reason))
         elif not c.scatter and contrasts < columns.shape[1]:
             hidden.append(Hidden(c, f"not observable: aliased with {', '.join(_partners(columns, model, known))}"))
         else:
             seen.append(c)
-            if not c.scatter:
+            if c.scatter:
+                groups.append(c)
+            else:
                 model = np.column_stack([model, columns])
                 known += [c.name] * columns.shape[1]
     return seen, hidden
+
+
+def _beyond_bound(c: Candidate, model: Array, y: Array) -> str:
+    """Return why an effect with a bound is not weighed: by least squares its uncertainty is larger; "" where it is."""
+    if math.isinf(c.bound):
+        return ""
+    X = np.column_stack([model, c.block.columns])
+    found, _, rank, _ = np.linalg.lstsq(X, y, rcond=None)
+    if rank < X.shape[1]:
+        return ""  # aliased: said elsewhere
+    sigma = float(np.linalg.norm(y - X @ found)) / math.sqrt(X.shape[0] - X.shape[1])
+    u = sigma * math.sqrt(float(np.linalg.inv(X.T @ X)[-1, -1]))
+    if u <= c.bound or abs(found[-1]) > FLAGRANT * u:
+        return ""
+    return f"not weighed: this record determines it to {u / c.scale:.2g} {c.unit} only, more than {c.bound / c.scale:g}"
+
+
+def _own_contrasts(c: Candidate, other: Candidate, model: Array) -> int:
+    """Return how many contrasts of a scatter are neither the model's nor those of another scatter."""
+    known, columns = np.column_stack([model, other.block.columns]), c.block.columns
+    unit = columns / np.linalg.norm(columns, axis=0)
+    left = unit - known @ np.linalg.lstsq(known, unit, rcond=None)[0]
+    return int(np.sum(np.linalg.svd(left, compute_uv=False) > c.visible))
 
 
 def _partners(columns: Array, model: Array, names: Sequence[str]) -> list[str]:
