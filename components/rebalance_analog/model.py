@@ -1,10 +1,9 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
-from gyrobench.component.math import clip, floor
+from gyrobench.component.blocks.rebalance import AnalogRebalance
 
 
-class RebalanceAnalog(Component):
+class RebalanceAnalog(AnalogRebalance):
     """Analogue torque rebalance of a floated gyro: PI with current limit.  [LOOP-REBALANCE, REBAL-ANALOG]
 
         i = K_p u + K_i q limited to +-i_max,   q' = u
@@ -28,45 +27,3 @@ class RebalanceAnalog(Component):
     """
 
     version = "1.0.0"
-
-    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
-    K_p = Parameter(119.92139898087, "A/V", "proportional gain", min=0.0)
-    K_i = Parameter(1199.2139898087, "A/(V.s)", "integral gain", min=0.0)
-    i_max = Parameter(0.05, "A", "current limit", above=0.0)
-    resolution = Parameter(0.0, "A", "resolution of the measured current; 0: none", min=0.0)
-    meter = Noise(1e-7, "A/sqrt(Hz)", "noise density of the current measurement")
-
-    u = Input(0.0, "V", "pickoff voltage")
-
-    i = Output("A", "torquer current")
-    i_read = Output("A", "torquer current as measured")
-    saturated = Output("1", "1 while the current is limited")
-
-    q = State(0.0, "V.s", "integral of the pickoff voltage")
-
-    present = Discrete(0.0, "A", "current from now on")
-    flowed = Discrete(0.0, "A", "current during the last step")
-
-    def start(self) -> None:
-        self.present = clip(self.K_p * self.u + self.K_i * self.q, -self.i_max, self.i_max)
-        self.flowed = self.present
-
-    def flow(self) -> None:
-        unlimited = self.K_p * self.u + self.K_i * self.q
-        self.der.q = self.u
-        if (unlimited > self.i_max and self.u > 0.0) or (unlimited < -self.i_max and self.u < 0.0):
-            self.der.q = 0.0
-
-    @sampled(every=1)
-    def tick(self) -> None:
-        self.flowed = self.present
-        self.present = clip(self.K_p * self.u + self.K_i * self.q, -self.i_max, self.i_max)
-
-    def outputs(self) -> None:
-        unlimited = self.K_p * self.u + self.K_i * self.q
-        self.i = clip(unlimited, -self.i_max, self.i_max)
-        read = self.flowed + self.noise.meter
-        if self.resolution > 0.0:
-            read = self.resolution * floor(read / self.resolution + 0.5)
-        self.i_read = read
-        self.saturated = 1.0 if self.i != unlimited else 0.0

@@ -124,8 +124,11 @@ SOCKETS: dict[str, Socket] = {
             "torque rebalance: pickoff voltage to torquer current",
             (
                 inp("u", "V", "pickoff voltage"),
+                inp("u_cross", "V", "pickoff voltage of the other channel", optional=True),
                 out("i", "A", "torquer current"),
                 out("i_read", "A", "torquer current as measured"),
+                out("n_plus", "1", "clocks of positive current since the start", optional=True, whole=True),
+                out("n_minus", "1", "clocks of negative current since the start", optional=True, whole=True),
                 limit_flag("saturated", "1 while the current is limited"),
             ),
         ),

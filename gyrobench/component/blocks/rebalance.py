@@ -1,10 +1,65 @@
-"""Torque rebalance by pulses of constant current: amplifier, errors of the pulses, counters, ports."""
+"""Torque rebalance: analogue amplifier with its meter; pulses of constant current with errors and counters."""
 
 from __future__ import annotations
 
 from gyrobench.component.component import Component
-from gyrobench.component.declarations import Discrete, Input, Output, Parameter
+from gyrobench.component.composition import sampled
+from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
 from gyrobench.component.math import Number, clip, fabs, floor
+
+
+class AnalogRebalance(Component):
+    """Common part of analogue rebalances: PI amplifier with current limit, current as an integrating meter reads it.
+
+    i is what flows from now on, i_flowed what flowed during the step that ends now: that is what an integrating meter
+    reads, and what balanced the gyro up to now.  Read so, the exchange of u and i once a step does not shift the
+    reading against the table angle (read as i it is one step early).  [LOOP-REBALANCE, REBAL-ANALOG]
+    """
+
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
+    K_p = Parameter(119.92139898087, "A/V", "proportional gain", min=0.0)
+    K_i = Parameter(1199.2139898087, "A/(V.s)", "integral gain", min=0.0)
+    i_max = Parameter(0.05, "A", "current limit", above=0.0)
+    resolution = Parameter(0.0, "A", "resolution of the measured current; 0: none", min=0.0)
+    meter = Noise(1e-7, "A/sqrt(Hz)", "noise density of the current measurement")
+
+    u = Input(0.0, "V", "pickoff voltage")
+
+    i = Output("A", "torquer current")
+    i_read = Output("A", "torquer current as measured")
+    saturated = Output("1", "1 while the current is limited")
+
+    q = State(0.0, "V.s", "integral of the pickoff voltage")
+
+    present = Discrete(0.0, "A", "current from now on")
+    flowed = Discrete(0.0, "A", "current during the last step")
+
+    def demand(self) -> Number:
+        return self.K_p * self.u + self.K_i * self.q
+
+    def start(self) -> None:
+        self.present = clip(self.demand(), -self.i_max, self.i_max)
+        self.flowed = self.present
+
+    def flow(self) -> None:
+        unlimited = self.demand()
+        self.der.q = self.u
+        if (unlimited > self.i_max and self.u > 0.0) or (unlimited < -self.i_max and self.u < 0.0):
+            self.der.q = 0.0
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        self.flowed = self.present
+        self.present = clip(self.demand(), -self.i_max, self.i_max)
+
+    def outputs(self) -> None:
+        unlimited = self.demand()
+        self.i = clip(unlimited, -self.i_max, self.i_max)
+        read = self.flowed + self.noise.meter
+        if self.resolution > 0.0:
+            read = self.resolution * floor(read / self.resolution + 0.5)
+        self.i_read = read
+        self.saturated = 1.0 if self.i != unlimited else 0.0
 
 
 class PulseRebalance(Component):

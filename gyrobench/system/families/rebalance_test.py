@@ -91,8 +91,8 @@ class TwoChannelTest(RebalanceTest):
         TABLE
         + """
     table -> gyro: omega f
-    gyro -> rebalance_x: u_y=u
-    gyro -> rebalance_y: u_x=u
+    gyro -> rebalance_x: u_y=u u_x=u_cross
+    gyro -> rebalance_y: u_x=u u_y=u_cross
     rebalance_x -> gyro: i=i_x
     rebalance_y -> gyro: i=i_y
     rebalance_x -> sampler_x: i_read=x saturated=flag
