@@ -17,7 +17,7 @@ from gyrobench.reduction.estimation.effects import SINES
 
 OFTEN = ("once", "twice")
 #: parameters of a table whose scale is a block of its own: amplitudes of the orders 1 and 2
-SCALE = ("scale_eccentricity", "scale_tilt")
+SCALE = ("eccentricity", "tilt")
 
 
 def simulated_errors(run: RunDocument) -> dict[str, float]:
@@ -34,18 +34,19 @@ def simulated_errors(run: RunDocument) -> dict[str, float]:
 
 
 def _angles(p: Mapping[str, Any]) -> dict[str, float]:
-    amplitude, phase = (np.atleast_1d(p.get(f"table.encoder_{n}", [])) for n in ("amplitude", "phase"))
-    axes = {"outer angle error": 0, "inner angle error": 1} if amplitude.ndim == 2 else {"angle error": 0}
-    amplitude, phase = np.atleast_2d(amplitude), np.atleast_2d(phase)
-    if SCALE[0] in {n.partition(".")[2] for n in p}:
-        amplitude = np.array([[p[f"table.{n}"] for n in SCALE]])
-        phase = np.array([[p[f"table.{n}_phase"] for n in SCALE]])
     out = {}
-    for name, row in axes.items():
-        for a, f, often in zip(amplitude[row], phase[row], OFTEN, strict=False):
+    for name, row in {"": 0, "outer ": 0, "inner ": 1}.items():
+        scale = f"table.{name.strip()}{'_' if name else ''}scale_"
+        if f"{scale}{SCALE[0]}" in p:
+            amplitude, phase = ([p[f"{scale}{n}{end}"] for n in SCALE] for end in ("", "_phase"))
+        elif np.ndim(given := p.get("table.encoder_amplitude", [])) == (2 if name else 1):
+            amplitude, phase = (np.atleast_2d(x)[row] for x in (given, p.get("table.encoder_phase", [])))
+        else:
+            continue
+        for a, f, often in zip(amplitude, phase, OFTEN, strict=False):
             # a sin(n q + f) = a cos f sin n q + a sin f cos n q
             for part, x in zip(SINES, (math.cos(f), math.sin(f)), strict=True):
-                out[f"{name}, {often} a turn ({part})"] = float(a) * x
+                out[f"{name}angle error, {often} a turn ({part})"] = float(a) * x
     return out
 
 

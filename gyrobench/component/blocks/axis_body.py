@@ -129,9 +129,8 @@ class AxisBody(Block):
     def rest(self, x: Number, v: Number, e: Number) -> None:
         """Start at the angle x with the rate v against a base that turns at e."""
         self.per_motor = 1.0 / (self.share * self.J)
-        self.per_plate = 1.0 / self.J
+        self.weigh(self.J)
         if self.resonance > 0.0:
-            self.per_plate = 1.0 / ((1.0 - self.share) * self.J)
             both = self.share * (1.0 - self.share) * self.J
             self.spring = both * self.resonance * self.resonance
             self.damper = 2.0 * both * self.resonance * self.resonance_damping
@@ -143,6 +142,10 @@ class AxisBody(Block):
         self.begun = self.t
         self.w_begun = self.w
         self.w_last = self.w
+
+    def weigh(self, J: Number) -> None:
+        """Give the body the inertia J from now on; that of the motor stays."""
+        self.per_plate = 1.0 / (J - self.share * self.J) if self.resonance > 0.0 else 1.0 / J
 
     def unbalanced(self, c: Number, s: Number, g: Vector) -> Number:
         """Return the torque of the unbalance: c, s of the table angle, g specific force along the axes at angle 0."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter
-from gyrobench.component.math import Number, cos, fabs, maximum, minimum, sign, sin, sqrt, vector
+from gyrobench.component.math import Number, Vector, cos, fabs, index, maximum, minimum, sign, sin, sqrt, vector
 from gyrobench.component.rotation import IDENTITY, Rotation
 
 FIVE = [0.0, 0.0, 0.0, 0.0, 0.0]
@@ -151,3 +151,94 @@ class AxisTable(Component):
         for i in range(3):
             self.alpha[i] = (self.face[i][0] * wy - self.face[i][1] * wx) * rate + self.face[i][2] * acc
         self.f = self.face @ vector([c * g[0] + s * g[1], c * g[1] - s * g[0], g[2]])
+
+
+class TwoAxisTable(Component):
+    """Common part of the tables with two axes: attitude, rates and forces on the plate, wobble and squareness.
+
+    Attitude of the plate at the angles x, y of the outer and the inner axis, R passive rotations:
+
+        v_face = face A base v_local
+        A = Ry(y) Wy(y) Rz(squareness) Rx(x) Wx(x)                  [SERVO2-A, where there are no errors]
+
+      base    rows: the axes X (outer), Y (inner at x = 0), Z in ENU at angles 0
+      W       wobble of an axis: its two cross rotations amplitude cos(n q + phase), amplitude sin(n q + phase)
+
+    so A = [[cy, sx sy, -cx sy], [0, cx, sx], [sy, -cy sx, cx cy]] without errors; the plate turned by +x right-handed
+    about the outer axis, then by +y about the inner.  Rate and acceleration follow elementary rotation by elementary
+    rotation (angle q about axis e) from those of the base:
+
+        w <- R w + q' e        alpha <- R alpha - q' e x (R w) + q'' e        f <- R f
+
+    omega is the exact derivative of the attitude and alpha that of omega, wobble included.  The parts declare the input
+    `face` (rows: the gyro axes in plate axes).
+    """
+
+    base = Rotation("rows: outer axis X, inner axis Y at x = 0, and Z in ENU at angles 0")
+    squareness = Parameter(0.0, "rad", "inner axis turned about Z out of the right angle", min=-0.1, max=0.1)
+    wobble = Parameter([0.0, 0.0], "rad", "wobble amplitude of the outer and the inner axis", min=0.0, max=0.1)
+    wobble_order = Parameter([2, 2], int, "its cycles per turn", min=1, max=1000)
+    wobble_phase = Parameter([0.0, 0.0], "rad", "its phase at angle 0")
+
+    f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
+    omega_local = Input([0.0, 0.0, 0.0], "rad/s", "Earth rate at the site, ENU")
+
+    angle_x = Output("rad", "outer angle, cumulative")
+    angle_y = Output("rad", "inner angle, cumulative")
+    rate_x = Output("rad/s", "outer rate")
+    rate_y = Output("rad/s", "inner rate")
+    angle_x_read = Output("rad", "outer angle as its encoder reads it")
+    angle_y_read = Output("rad", "inner angle as its encoder reads it")
+    omega = Output("rad/s", "inertial rate, face axes", shape=(3,))
+    alpha = Output("rad/s2", "derivative of the inertial rate, face axes", shape=(3,))
+    f = Output("m/s2", "specific force, face axes", shape=(3,))
+
+    def place(self, x: Vector, v: Vector, a: Vector) -> None:
+        """Write angles, rates, and what the face feels; x, v, a: angle, rate, acceleration of outer and inner axis."""
+        # elementary rotations from the base to the plate: axis (0 X, 1 Y, 2 Z), angle and its derivatives
+        about = [1.0, 2.0, 0.0, 2.0, 2.0, 0.0, 1.0]
+        q = [0.0, 0.0, x[0], self.squareness, 0.0, 0.0, x[1]]
+        dq = [0.0, 0.0, v[0], 0.0, 0.0, 0.0, v[1]]
+        ddq = [0.0, 0.0, a[0], 0.0, 0.0, 0.0, a[1]]
+        for n in range(2):
+            if self.wobble[n] > 0.0:
+                order = self.wobble_order[n]
+                c = self.wobble[n] * cos(order * q[4 * n + 2] + self.wobble_phase[n])
+                s = self.wobble[n] * sin(order * q[4 * n + 2] + self.wobble_phase[n])
+                spin = order * dq[4 * n + 2]
+                turn = order * ddq[4 * n + 2]
+                q[4 * n] = c
+                q[4 * n + 1] = s
+                dq[4 * n] = -s * spin
+                dq[4 * n + 1] = c * spin
+                ddq[4 * n] = -s * turn - c * spin * spin
+                ddq[4 * n + 1] = c * turn - s * spin * spin
+        w = self.base @ self.omega_local
+        p = vector([0.0, 0.0, 0.0])  # derivative of w
+        g = self.base @ self.f_local
+        for k in range(7):
+            if q[k] != 0.0 or dq[k] != 0.0 or ddq[k] != 0.0:
+                e = about[k]
+                j = e + 1.0 if e < 2.0 else 0.0  # the two axes that turn
+                m = j + 1.0 if j < 2.0 else 0.0
+                c = cos(q[k])
+                s = sin(q[k])
+                first = c * w[index(j)] + s * w[index(m)]
+                second = c * w[index(m)] - s * w[index(j)]
+                w[index(j)] = first
+                w[index(m)] = second
+                w[index(e)] = w[index(e)] + dq[k]
+                row = c * p[index(j)] + s * p[index(m)] + dq[k] * second
+                p[index(m)] = c * p[index(m)] - s * p[index(j)] - dq[k] * first
+                p[index(j)] = row
+                p[index(e)] = p[index(e)] + ddq[k]
+                row = c * g[index(j)] + s * g[index(m)]
+                g[index(m)] = c * g[index(m)] - s * g[index(j)]
+                g[index(j)] = row
+        self.omega = self.face @ w
+        self.alpha = self.face @ p
+        self.f = self.face @ g
+        self.angle_x = x[0]
+        self.angle_y = x[1]
+        self.rate_x = v[0]
+        self.rate_y = v[1]
