@@ -81,7 +81,7 @@ class Block:
 def operating_point(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]]
 ) -> dict[str, Component]:
-    """Return the parts as plain classes with these parameters ("slot.name", SI, arrays nested), started and propagated.
+    """Return the parts as plain classes with these parameters and starts ("slot.name", SI), started and propagated.
 
     part_of: slot -> class; raises LinearizationError for a slot without a part of this bench.  Raises
     ComponentError where a part does not start.
@@ -89,7 +89,7 @@ def operating_point(
     parts = {}
     for slot in assembly.order.order:
         part = part_of(slot)(slot)
-        known = {s.name for s in part.layout if s.section == "parameter"}
+        known = {s.name for s in part.layout if s.section in ("parameter", "input")}
         for name, value in parameters.items():
             of, _, parameter = name.partition(".")
             for element, x in flatten(parameter, value).items() if of == slot else ():

@@ -19,7 +19,7 @@ from gyrobench.component import Component, ComponentError
 Array = NDArray[np.float64]
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
-MAX_DISCRETE = 60  # discrete values: more are a memory, whose step is not the same one step later
+MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the same one step later
 
 
 @dataclass

@@ -139,6 +139,7 @@ SOCKETS: dict[str, Socket] = {
             (
                 *TABLE,
                 inp("u", "V", "pickoff voltage of the gyro"),
+                inp("torque", "N.m", "disturbance torque on the table", optional=True),
                 limit_flag("saturated", "1 while the motor is at its limit"),
             ),
         ),

@@ -172,3 +172,16 @@ def test_discrete_model_is_evaluated_on_the_circle() -> None:
 def test_model_without_states() -> None:
     m = model(A=[], B=[], C=[[]], states=[])
     assert model_response(m, [1.0])[0, 0].tolist() == [0.0, 1.0, 0.0]
+
+
+def test_upper_gain_limit_is_no_part_of_the_uncertainty_of_the_lower() -> None:
+    """Two ranges in which the phase may be -180 degrees, about 7 and 128 Hz: each limit has the u of its own."""
+    s, w = control.tf("s"), 100.0 * math.pi
+    network = ((1 + 5**0.5 * s / w) / (1 + s / (5**0.5 * w))) ** 2 * (1 + 12 * s / w) / (1 + 60 * s / w)
+    loop = network / (s * s * (1 + 1e-3 * s) * (1 + 5e-4 * s))
+    loop = loop / abs(complex(loop(1j * w)))
+    points = [Point(x, complex(loop(2j * np.pi * x)), 0.02, 1.0) for x in np.geomspace(4.0, 220.0, 14)]
+    found = measured_values(points)
+    for name, f in (("lower", 7.0), ("upper", 128.4)):
+        assert found[f"f_{name}"][0] == pytest.approx(f, rel=0.01)
+        assert found[f"f_{name}"][1] < 0.1 * f and found[name][1] < 0.15 * found[name][0]

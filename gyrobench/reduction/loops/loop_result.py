@@ -144,16 +144,16 @@ class LoopFindings:
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
-        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0
+        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test"
     ) -> list[Point]:
-        """Return the open loop L = -(inside - test) / inside of the test sines on an axis, with margins.
+        """Return the open loop L = -(inside - test) / inside of the sines of a kind on an axis, with margins.
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
         test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
         the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns the points
         that count.
         """
-        sines = sorted(self.of("test", axis, "sine"), key=lambda g: g.f)
+        sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
         points, counts = map(list, zip(*(open_loop_point(g, inside, test) for g in sines), strict=True))

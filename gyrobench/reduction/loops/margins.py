@@ -213,8 +213,12 @@ def _relative_u(points: Sequence[Point], f: Array) -> Array:
 
 
 def _undecided(f: Array, value: Array, u: Array, at: float) -> tuple[float, float]:
-    """Return the range of frequencies at which a value cannot be told from 0 within U; it holds ``at``."""
-    near = f[np.abs(value) < NORMAL * u]
+    """Return the range of frequencies about ``at`` at which a value cannot be told from 0 within U.
+
+    A conditionally stable loop has two such ranges; the other one does not count.
+    """
+    far = f[np.abs(value) >= NORMAL * u]
+    near = f[(f > np.max(far[far < at], initial=0.0)) & (f < np.min(far[far > at], initial=math.inf))]
     low, high = float(np.min(near, initial=at)), float(np.max(near, initial=at))
     if low < at < high:
         return low, high
