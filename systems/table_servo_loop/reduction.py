@@ -186,7 +186,9 @@ def _compliance(found: LoopFindings, loop: ServoLoop | None) -> None:
     if not points:
         return
     worst = max(points, key=lambda q: abs(q.value))
+    model = found.excited("discrete", "torque", 1, ANGLE, [worst.f])  # with step, delays and the leads of the rings
     closed = None if loop is None else abs(loop.compliance(2j * math.pi * worst.f)) / ARCSEC
+    closed = closed if model is None else abs(complex(model[0])) / ARCSEC
     size = abs(worst.value) / ARCSEC
     found.measure("compliance", f"table angle per torque at {worst.f:.4g} Hz, the largest measured", "″/(N·m)", size,
                   size * (worst.u or 0.0), closed=closed)  # fmt: skip

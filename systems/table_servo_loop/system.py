@@ -72,7 +72,7 @@ class TableServoLoop(LoopTest):
         "latitude": Option("45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2,
                            sets="site.latitude"),
         "test": Option("0.4arcsec", "rad", "amplitude of test sines, as an angle; tenfold with an undamped gyro", 1e-9),
-        **hold(20.0),
+        **hold(60.0),
     }  # fmt: skip
     noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "table.rumble")
     step = 1e-4

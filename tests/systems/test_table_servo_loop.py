@@ -95,7 +95,6 @@ def drawn():
         "crossover": float(rng.uniform(40.0, 60.0)),
         "gyro.H": float(rng.uniform(0.1, 0.3)),
         "rings.ring_k_w": float(rng.uniform(20.0, 60.0)),
-        "hold": 10.0,
     }
     return gb.load(NAME, **values).run(seed=5, check_step=False), values
 
