@@ -43,8 +43,8 @@ class Line:
 
 @dataclass(frozen=True)
 class Total:
-    """rss: root of the squares of the effects of the sizes.  worst: their sum.  spread: standard deviation of the draws.
-    within: bound of 95 % of them, from zero.
+    """rss: root of the squares of the effects of the sizes.  worst: their sum.  spread: standard deviation of the
+    draws.  within: bound of 95 % of them, from zero.
     """
 
     rss: float
@@ -78,9 +78,13 @@ def parse(text: str, unit: str) -> list[Line]:
 def draws(lines: Sequence[Line], seed: int, n: int = DRAWS) -> Array:
     """Return errors (n, lines), drawn by their kinds."""
     rng = np.random.default_rng(seed)
-    unit = {"normal": rng.standard_normal, "uniform": lambda n: rng.uniform(-1.0, 1.0, n)}
-    unit["fixed"] = lambda n: rng.choice([-1.0, 1.0], n)
-    return np.column_stack([line.size * unit[line.kind](n) for line in lines])
+
+    def one(kind: str) -> Array:
+        if kind == "normal":
+            return rng.standard_normal(n)
+        return rng.uniform(-1.0, 1.0, n) if kind == "uniform" else rng.choice([-1.0, 1.0], n)
+
+    return np.column_stack([line.size * one(line.kind) for line in lines])
 
 
 def combine(
@@ -101,7 +105,7 @@ def misalignment_rate(angle: Array | float, n: float, sense: int, earth_rate: fl
     """Return (n +- 1) W sin(angle): the rate on an input axis that leans towards the axis of a table on the pole.
 
     n: table rate over Earth rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the
-    + 1. Raises ValueError for an angle that is not small.  [ALIGN-ERRORS; Hu 1981, eq. 5-59]
+    larger, n + 1.  Raises ValueError for an angle that is not small.  [ALIGN-ERRORS; Hu 1981, eq. 5-59]
     """
     if np.any(np.abs(angle) > SMALL):
         raise ValueError(f"an angle of {math.degrees(float(np.max(np.abs(angle)))):.3g}° is not small: 1° at most")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench import units
 from gyrobench.attitudes import parse
@@ -12,7 +12,7 @@ from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.table_test import sampled, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.system import OnRequest, Option, Slot, Windows
 
 from . import budgets
 
@@ -32,8 +32,8 @@ SENSOR = {
 
 
 class TableEnvironment(RebalanceTest):
-    """A gyro in torque rebalance stands still on a table whose ground tilts slowly, whose room warms and in whose coil a
-    field swings; the drift is resolved into what each of them does.  Beside it the budgets of surroundings, alignment
+    """A gyro in torque rebalance stands still on a table whose ground tilts slowly, whose room warms and in whose coil
+    a field swings; the drift is resolved into what each of them does.  Beside it the budgets of surroundings, alignment
     and rate mode, by root of squares, worst case and Monte Carlo.
 
     [ENV-DISTURBANCE, ALIGN-ERRORS, ERROR-BUDGET; Hu 1981, sections 5.6..5.8]
@@ -42,7 +42,7 @@ class TableEnvironment(RebalanceTest):
     title = "Surroundings of a table"
     spec = ("ENV-DISTURBANCE", "ALIGN-ERRORS", "ERROR-BUDGET")
     reduction = "reduction"
-    on_request: dict[str, Any] = {}
+    on_request: ClassVar[Mapping[str, OnRequest]] = {}  # the slot is always there
     slots = {
         **RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog"),
         "site": Slot("Site", "ground_motion"),

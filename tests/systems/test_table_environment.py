@@ -1,4 +1,4 @@
-"""Surroundings of a table: sensitivities drawn at random come back; budgets against the figures of Hu 1981 and by hand."""
+"""Surroundings of a table: sensitivities drawn at random come back; budgets against Hu 1981 and by hand."""
 
 from __future__ import annotations
 
@@ -32,9 +32,11 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     """Sensitivities of either sign, up to twice those of the test sensor; field and tilts strong enough to be seen."""
     size = lambda x: float(rng.uniform(-2.0, 2.0) * x)  # noqa: E731
     return {
-        "gyro.D_F": size(0.5 * DPH), "gyro.D_O": size(0.5 * DPH), "gyro.D_I": size(2.0 * DPH), "gyro.D_S": size(2.0 * DPH),
+        "gyro.D_F": size(0.5 * DPH), "gyro.D_O": size(0.5 * DPH),
+        "gyro.D_I": size(2.0 * DPH), "gyro.D_S": size(2.0 * DPH),
         "gyro.D_IO": size(0.1 * DPH), "gyro.D_OS": size(0.1 * DPH), "gyro.D_T": size(0.02 * DPH),
-        "gyro.D_TO": size(0.03 * DPH), "gyro.D_B[1]": size(10.0 * DPH), "latitude": math.radians(rng.uniform(-70.0, 70.0)),
+        "gyro.D_TO": size(0.03 * DPH), "gyro.D_B[1]": size(10.0 * DPH),
+        "latitude": math.radians(rng.uniform(-70.0, 70.0)),
     }  # fmt: skip
 
 
@@ -93,7 +95,7 @@ def test_rate_mode_of_the_source() -> None:
 
 
 def test_monte_carlo_has_the_kinds_of_the_lines() -> None:
-    """Normal 1, uniform of half width 3 (variance 3), fixed 2 (variance 4): spread sqrt(8), root of squares sqrt(14)."""
+    """Normal 1, uniform of half width 3 (variance 3), fixed 2 (variance 4): spread sqrt(8), rss sqrt(14)."""
     lines = [budgets.Line("a", 1.0), budgets.Line("b", 3.0, "uniform"), budgets.Line("c", 2.0, "fixed")]
     total = budgets.combine(lines, 5)
     assert total.spread == pytest.approx(math.sqrt(8.0), rel=0.02)
