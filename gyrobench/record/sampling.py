@@ -54,7 +54,7 @@ class Successive:
 
 
 def stated(comments: Mapping[str, str]) -> tuple[str, float]:
-    """Return what a record says of its samples: "means", "points" or "", and the bandwidth of the signal in Hz (0: not).
+    """Return what a record says of its samples: "means", "points" or "", and the bandwidth of the signal, Hz (0: none).
 
     Raises ValueError for something else.
     """

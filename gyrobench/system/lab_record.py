@@ -30,8 +30,8 @@ SERIES = """\
 Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
 #   `voltage` of a pickoff), one `angle` for its two, and `flag`; `phase` is 0 while moving or settling.  Without the
 #   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length.
-#   Say what the samples are: # samples = means (each since the one before) or points, and the bandwidth of the signal,
-#   # bandwidth = 14Hz; samples that may be aliased are warned of."""
+#   Samples that may be aliased are warned of: say what they are by # samples = means (each since the one before) or
+#   points, and how far the signal reaches by # bandwidth = 14Hz."""
 TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b")
 
 
