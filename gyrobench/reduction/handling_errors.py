@@ -42,6 +42,7 @@ from scipy import special
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.effects import UNSTATED
 from gyrobench.reduction.run_metadata import NO_TYPE_B
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
@@ -123,7 +124,7 @@ def with_options(record: Record, options: Mapping[str, Any]) -> Record:
 
 
 def _contradicted(result: DriftTestResult) -> bool:
-    return any(reason != NO_TYPE_B for reason in result.withheld)
+    return any(reason != NO_TYPE_B and not reason.endswith(UNSTATED) for reason in result.withheld)
 
 
 def _suspicious(result: DriftTestResult) -> bool:

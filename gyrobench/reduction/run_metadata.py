@@ -19,6 +19,7 @@ from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.effects import Remount
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, Result
 
@@ -91,6 +92,15 @@ def truth_of(run: RunDocument, names: Iterable[str], slot: str = "gyro") -> dict
 def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
     """Return the options that are sizes of uncertainties, SI; 0 where not given."""
     return {n: float(options.get(n, 0.0)) for n in names}
+
+
+def remount_of(run: RunDocument) -> Remount:
+    """Return the option u_remount, and whether drift from mount to mount is stated or declared absent.
+
+    Where nothing of type B is stated, :func:`finish` says so, of all sources together.
+    """
+    size = float(run.options.get("u_remount", 0.0))
+    return Remount(size, not run.measured or run.type_b == "none" or size > 0.0 or not run.type_b_stated)
 
 
 def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[int, PlanRow]:

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.attitudes import parse
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.run_metadata import Site, phases, sizes
+from gyrobench.reduction.estimation.effects import Remount
+from gyrobench.reduction.run_metadata import Site, phases, remount_of, sizes
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Specification
@@ -102,6 +103,7 @@ class RebalanceSetup(SiteSetup):
 
     fold: bool = False
     polarity: str = "project"
+    remount: Remount = field(default_factory=Remount)  # drift from mount to mount
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_scale_factor: float = 0.0
@@ -110,7 +112,8 @@ class RebalanceSetup(SiteSetup):
 
     @classmethod
     def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
-        options = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
+        options: dict[str, Any] = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
+        options["remount"] = remount_of(run)
         return super().of(run, specification, **{**options, **own})
 
     def problems(self, folding: bool = True) -> list[str]:

@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, fit
 from gyrobench.reduction.simulated_errors import simulated_errors
@@ -113,7 +113,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             *servo_regression.CONVENTIONS,
             "Harmonics: a cosine, b sine of θ; Hu 1981 has them the other way.",
         ),
-        effects=effects_of(found),
+        effects=[*effects_of(found), *remounts(found, run_metadata.remount_of(run))],
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

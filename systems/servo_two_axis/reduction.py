@@ -25,7 +25,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -179,7 +179,10 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=CONVENTIONS,
-        effects=_effects(j, seen, phase, site, run, names, found),
+        effects=[
+            *_effects(j, seen, phase, site, run, names, found),
+            *remounts(found, run_metadata.remount_of(run)),
+        ],
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

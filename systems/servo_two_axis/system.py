@@ -61,8 +61,8 @@ class ServoTwoAxis(TableTest):
         | TRACKING
         | CORRECTIONS
         | NUISANCES
-        | type_b("square", "angle1", "angle2", "wobble", "time", "mount", axis="standard uncertainty of each mount, "
-                 "about each of its axes")
+        | type_b("square", "angle1", "angle2", "wobble", "time", "mount", "remount",
+                 axis="standard uncertainty of each mount, about each of its axes")
     )  # fmt: skip
     assumed = ("gyro.mount", "outer.base", "inner.base", "stand.base", "stand.mounts")
     noises = (*TWO_AXIS_NOISES, "outer.rumble", "inner.rumble")

@@ -23,7 +23,7 @@ from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import composite, servo_regression
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.simulated_errors import simulated_errors
@@ -103,7 +103,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         ],
         equation=servo_regression.equation(seen.names),
         conventions=servo_regression.CONVENTIONS,
-        effects=effects_of(found),
+        effects=[*effects_of(found), *remounts(found, run_metadata.remount_of(run))],
         specification=specification,
         site=site.shown(),
         instrument=run.instrument,

@@ -27,7 +27,7 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.effects import corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -120,7 +120,7 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         ],
         equation=_equation(names),
         conventions=_conventions(setup),
-        effects=effects,
+        effects=[*effects, *remounts(found, setup.remount)],
         **setup.reported(),
         no_closed=why,
         closed_caption="From the same windows; the formulas weigh all windows alike, D_F and D_O rest on the dwells",

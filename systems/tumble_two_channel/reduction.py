@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.effects import corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Quantity, fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -123,7 +123,7 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=_conventions(s),
-        effects=evidence.effects(s, c, found, turning, current),
+        effects=[*evidence.effects(s, c, found, turning, current), *remounts(found, s.remount)],
         **s.reported(),
         no_closed=why,
         closed_caption="From the same windows; the formulas weigh all windows of a mount alike",

@@ -46,7 +46,9 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         }
         | NUISANCES
         | CORRECTIONS
-        | type_b("axis", "mount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
+        | type_b(
+            "axis", "mount", "remount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current"
+        )
         | {
             f"k_{a}": Option(0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: that of the gyro", 0.0)
             for a in "xy"

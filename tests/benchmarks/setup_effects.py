@@ -28,7 +28,8 @@ import setup_plans
 from coverage import plan
 
 from gyrobench import drift, frames
-from gyrobench.reduction.estimation import noise, noise_mixture_fit, nuisances, outliers
+from gyrobench.reduction.estimation import noise, noise_mixture_fit, nuisances, outliers, uncertainty
+from gyrobench.reduction.estimation.effects import Remount, remounts, standard_changes
 from gyrobench.reduction.estimation.linear_fit import fit
 
 SIGMA = 0.0022  # deg/h, of a window
@@ -98,7 +99,7 @@ class Bench:
         found = [
             nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, tilt),
             nuisances.trend(self.t0, self.t1),
-            nuisances.scatter("mount", "remount", mount.tolist()),
+            nuisances.scatter("mount", nuisances.MOUNTS, mount.tolist()),
         ]
         self._finish(tilt, mount, found)
 
@@ -132,10 +133,11 @@ class Bench:
         first[joint + 1] = last[joint]
         return last - first
 
-    def reduce(self, y: np.ndarray, how: bool | str = True) -> tuple[np.ndarray, ...]:
+    def reduce(self, y: np.ndarray, how: bool | str = True, remount: float = 0.0) -> tuple[np.ndarray, ...]:
         """Errors and half widths of the coefficients, and which candidates joined; D_F is that of the middle of a ramp.
 
-        how: with the nuisance model, or not; "named": with it, without the rows that are named as outliers.
+        how: with the nuisance model, or not; "named": with it, without the rows that are named as outliers; "stated":
+        with it, the scatter from mount to mount stated as u_remount and in u (effects.remounts).
         """
         p = len(self.names)
         if how == "named":
@@ -144,6 +146,15 @@ class Bench:
             best = (odd.without if odd else fitted).est
             return best.beta[:p] - self.truth, best.half_width[:p], np.array([e.joined for e in best.evidence])
         blocks = [c.block for c in self.seen] if how else []
+        if how == "stated":
+            fitted = fit(
+                self.names, self.X, y, self.t0, self.t1, [], "rate", "", 1.0,
+                candidates=[*self.seen, *(h.candidate for h in self.hidden)],
+            )  # fmt: skip
+            (source,) = remounts(fitted, Remount(remount))
+            part = np.sum(standard_changes(fitted, source) ** 2, axis=0)
+            half = np.sqrt(fitted.reported.half_width**2 + (uncertainty.NORMAL**2) * part)[:p]
+            return fitted.est.beta[:p] - self.truth, half, np.array([e.joined for e in fitted.est.evidence])
         found = noise_mixture_fit.fit(self.X, y, self.names, self.t0, self.t1, 1e3, self.readings, blocks)
         return found.beta[:p] - self.truth, found.half_width[:p], np.array([e.joined for e in found.evidence], bool)
 
@@ -159,7 +170,7 @@ def count(
     hits, width = np.zeros((2, len(bench.names)))
     joined = np.zeros((len(bench.seen) if candidates else 0) + 1)
     for _ in range(runs):
-        error, half, there = bench.reduce(bench.record(case, rng, white) - middle, candidates)
+        error, half, there = bench.reduce(bench.record(case, rng, white) - middle, candidates, case.remount)
         hits += np.abs(error) <= half
         width += half
         joined += np.append(there, there.any())
@@ -182,7 +193,8 @@ def main() -> int:
             benches[key] = bench, count(bench, Case(), given.runs // 2, 99, given.white, False)[1]
             print(f"{'case':<40}{'nuisances':<10}" + " ".join(f"{n[-5:]:>5}" for n in bench.names) + "   width / clean")
         bench, plain = benches[key]
-        for candidates in (False, True, *(["named"] if case.outliers else [])):
+        more = (["named"] if case.outliers else []) + (["stated"] if case.remount and case.order == ONCE else [])
+        for candidates in (False, True, *more):
             held, width, joined = count(bench, case, given.runs, given.seed, given.white, candidates)
             row = " ".join(f"{v:.3f}" for v in held)
             wide = " ".join(f"{v:.2f}" for v in width / plain)

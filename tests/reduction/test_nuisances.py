@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import pytest
 
 from gyrobench import units
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.effects import Remount, remounts
+from gyrobench.reduction.estimation.fit_result import linear_result
 from gyrobench.reduction.estimation.linear_fit import Findings, Quantity, fit
 
 _spec = importlib.util.spec_from_file_location(
@@ -135,6 +138,36 @@ def test_clean_records_gain_no_turn_on_and_no_asymmetry() -> None:
         names = [q.name for q in line(noisy(seed=seed), weighed).quantities]
         joined += "σ_turn_on" in names or "k_±" in names
     assert joined <= 1
+
+
+@pytest.mark.parametrize("stated", [0.0, 0.02 * DPH])
+def test_mounts_taken_once_are_in_u_or_withhold(stated: float) -> None:
+    """Mounts of 36 and 24 windows: a constant of each of 0.02 deg/h moves the constant by 0.6 and 0.4 of it, 0.721
+    together, and the cosine, of three and two periods in each, not.  Unstated, the constant has no verdict.
+    """
+    once = nuisances.scatter("σ", nuisances.MOUNTS, [0] * 36 + [1] * 24)
+    found = line(noisy(), [once])
+    limits = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
+    result = linear_result(
+        found, system="line", title="", method="", sources=[], equation="", conventions=[], specification=limits,
+        effects=remounts(found, Remount(stated, stated > 0.0)),
+    )  # fmt: skip
+    a, b = result.coefficients
+    part = math.sqrt(a.u**2 - float(found.u[0] / DPH) ** 2)
+    assert part == pytest.approx(stated / DPH * math.sqrt(0.52), rel=0.01, abs=1e-9)
+    assert (a.verdict, b.verdict) == ("pass" if stated else "inconclusive", "pass")
+    assert any("Of a: each mount is taken once" in w for w in result.warnings) == (not stated)
+
+
+def test_stated_remounts_hold() -> None:
+    """Half the windows of the benchmark, 40 records, constants from mount to mount of the size of the noise of a
+    window, each mount once: D_O, D_II and D_SS are held by less than 0.85 without, and all by 0.87 or more
+    with u_remount.
+    """
+    records, case = bench.Bench(turn=36, dwell=5), bench.CASES["remount, mounts once"]
+    at = [bench.NAMES.index(n) for n in ("D_O", "D_II", "D_SS")]
+    plain, held = (bench.count(records, case, 40, 5, candidates=how)[0] for how in (True, "stated"))
+    assert held.min() >= 0.87 and plain[at].mean() < 0.85
 
 
 def test_noise_free_records_have_no_nuisances() -> None:

@@ -56,7 +56,11 @@ def test_a_fail_needs_no_statement(command: Command, record: Record, tmp_path: P
 
 
 def test_stated_or_declared_absent(command: Command, record: Record, tmp_path: Path) -> None:
-    code, found, page = reduced(command, tmp_path, record, "--set", "u_scale_factor=1e-4")
+    code, found, page = reduced(command, tmp_path, record, "--set", "u_scale_factor=1e-4", pages=False)
+    assert code == 1 and found["verdict"] == "inconclusive"  # each mount is taken once
+    assert "State u_remount" in found["warnings"][0]
+    both = ("--set", "u_scale_factor=1e-4", "--set", "u_remount=1e-4deg/h")
+    code, found, page = reduced(command, tmp_path, record, *both)
     assert code == 0 and found["verdict"] == "pass" and not found["withheld"]
     assert "u: combined standard uncertainty" in page
     code, found, page = reduced(command, tmp_path, record, "--set", "type_b=none")

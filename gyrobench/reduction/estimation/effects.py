@@ -13,18 +13,25 @@ import difflib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Findings
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
 FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) = 12(2) arcsec'"
 _ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")
+REMOUNT = "drift from mount to mount"
+UNSTATED = (
+    "each mount is taken once, so drift from mount to mount is in the estimates and not in u. State u_remount, repeat "
+    "the mounts, or declare type_b = none."
+)
+TOUCHED = 0.1  # of what the mounts differ by: least change of a coefficient that rests on them alike
 SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
 PHASES = ("phase 0°", "phase 90°")  # of a wobble
 PREDICTED = "Predicted shifts by simulated errors"  # title of the table
@@ -39,7 +46,7 @@ class Effect:
     reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
     (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
     change of the reported values, of a source that is not in the data.  simulated: the error of each part that a
-    simulated set-up has.
+    simulated set-up has.  needed: why nothing passes without its size; "" where it may be left out.
     """
 
     source: str
@@ -50,6 +57,7 @@ class Effect:
     parts: tuple[str, ...] = ()
     values: Array | None = None
     simulated: tuple[float, ...] = ()
+    needed: str = ""
 
     def changes(self, fit: Findings) -> Array:
         """Return the change (m, q) of the reported values for one unit of each part, SI."""
@@ -115,6 +123,22 @@ def _read(text: str, unit: dict[str, str]) -> Correction:
     if not given[1] >= 0.0:
         raise ReductionError(f"corrections: {source}: its standard uncertainty {match['u']} must not be negative")
     return Correction(source, given[0], given[1], unit[source])
+
+
+class Remount(NamedTuple):
+    """Standard uncertainty (rad/s) of the drift from mount to mount; stated: given, declared absent, or simulated."""
+
+    size: float = 0.0
+    stated: bool = True
+
+
+def remounts(found: Findings, remount: Remount) -> list[Effect]:
+    """Return the drift from mount to mount as a source where the plan does not show it: each mount is taken once, and
+    what a constant of its own does to the data is what some coefficients do.  Where it is weighed there is none.
+    """
+    each = [h.candidate.block.columns.T for h in found.hidden if h.candidate.meaning == nuisances.MOUNTS]
+    needed = "" if remount.stated else UNSTATED
+    return [Effect(REMOUNT, remount.size, "rad/s", e, "of each mount by itself", needed=needed) for e in each]
 
 
 def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:

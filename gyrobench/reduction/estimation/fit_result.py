@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import outliers, regression, uncertainty
 from gyrobench.reduction.estimation.effects import (
+    TOUCHED,
     Effect,
     budget_rows,
     correction_table,
@@ -108,6 +109,11 @@ def linear_result(
         instrument=instrument,
         simulated=any(q.truth is not None for q in fit.quantities) if simulated is None else simulated,
     )
+    for e in effects:
+        if e.needed and not e.size:
+            touched = np.sqrt(np.sum(e.changes(fit) ** 2, axis=0)) > TOUCHED
+            names = [q.title for q, t in zip(fit.quantities, touched, strict=True) if t]
+            uncertainty.withhold(result, [f"Of {', '.join(names)}: {e.needed}"], ["pass"], names)
     return uncertainty.withhold(result, _contradictions(fit))
 
 

@@ -54,19 +54,23 @@ def worst_verdict(verdicts: Iterable[str]) -> str:
     return next((word for word in VERDICTS if word in given), NO_VERDICT)
 
 
-def withhold(result: R, reasons: Iterable[str], words: Collection[str] = ("pass", "fail")) -> R:
-    """Make the verdicts ``words`` of a result inconclusive for ``reasons`` (sentences), and return it.
+def withhold(
+    result: R, reasons: Iterable[str], words: Collection[str] = ("pass", "fail"), names: Collection[str] | None = None
+) -> R:
+    """Make the verdicts ``words`` of a result (of the coefficients ``names``; None: all) inconclusive for ``reasons``
+    (sentences), and return it.
 
     A warning says so where there was such a verdict.  Without reasons nothing changes.
     """
+    reasons = list(reasons)
     new = [r for r in reasons if r not in result.withheld]
     result.withheld += new
-    judged = [c for c in result.coefficients if c.verdict in words]
-    if not result.withheld or not judged:
+    judged = [c for c in result.coefficients if c.verdict in words and (names is None or c.name in names)]
+    if not reasons or not judged:
         return result
     for c in judged:
         c.verdict = "inconclusive"
     result.verdict = worst_verdict(c.verdict for c in result.coefficients)
-    names, why = ", ".join(c.name for c in judged), " ".join(new or result.withheld)
-    result.warnings.insert(0, f"Inconclusive instead of {' or '.join(words)}: {names}. {why}")
+    which, why = ", ".join(c.name for c in judged), " ".join(new or reasons)
+    result.warnings.insert(0, f"Inconclusive instead of {' or '.join(words)}: {which}. {why}")
     return result

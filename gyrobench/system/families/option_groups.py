@@ -37,6 +37,7 @@ _TYPE_B = {
     "axis": ("rad", "standard uncertainty of the table axis against the pole"),
     "square": ("rad", "standard uncertainty of the right angle between the table axes"),
     "mount": ("rad", "standard uncertainty of the gyro axes against the fixture"),
+    "remount": ("rad/s", "std. unc. of the drift from mount to mount, where the plan does not show it"),
     "wobble": ("rad", "wobble of a table axis twice a turn, std. unc. of its amplitude"),
     "angle1": ("rad", "error of the angle readings once a turn, std. unc. of its amplitude"),
     "angle2": ("rad", "error of the angle readings twice a turn, std. unc. of its amplitude"),

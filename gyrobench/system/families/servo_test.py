@@ -102,6 +102,7 @@ class ServoTest(TableTest):
         | TRACKING
         | type_b(
             "unbalance",
+            "remount",
             "time",
             "wobble",
             "angle1",
