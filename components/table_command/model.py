@@ -69,4 +69,5 @@ class TableCommand(Component):
         self.angle = self.reference.angle_after(f)
         self.rate = self.reference.rate_after(f)
         self.acc = self.reference.acc()
-        self.arrived = self.reference_arrived
+        taken = self.mode == self.reference_mode_last and self.target == self.reference_target_last
+        self.arrived = self.reference_arrived if taken else 0.0  # a command that is still to be read is not reached

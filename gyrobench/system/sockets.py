@@ -204,6 +204,8 @@ SOCKETS: dict[str, Socket] = {
                 out("mode", "1", "table mode of the phase", whole=True),
                 out("target", "", "table target of the phase"),
                 out("target_y", "", "target of a second axis of the table", optional=True),
+                out("way", "1", "way of an index move: 1 shorter, 2 upwards, 3 downwards", optional=True, whole=True),
+                out("move_rate", "rad/s", "largest rate of an index move; 0: that of the table", optional=True),
                 out("face", "1", "mount of the phase", 3, 3),
                 out("gate", "1", "0 closed, 1 windows by time, 2 windows by angle", whole=True),
                 out("window", "", "window length, s or rad by gate"),

@@ -59,6 +59,16 @@ class Readings:
         return out % self.faces
 
     @property
+    def seen(self) -> NDArray[np.int64]:
+        """Return the faces that are seen at all, rising."""
+        return np.unique(self.face)
+
+    @property
+    def both_senses(self) -> bool:
+        """Return whether a place was reached from both sides: lost motion looks like a face's error otherwise."""
+        return any(np.ptp(self.sense[self.place == x]) > 0.0 for x in np.unique(self.place))
+
+    @property
     def place(self) -> NDArray[np.int64]:
         """Return the number of the position, 0 .. faces - 1."""
         out: NDArray[np.int64] = np.round(self.faces * self.theta / (2 * math.pi)).astype(np.int64)
@@ -95,6 +105,11 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     return run_metadata.finish(_result(readings(w, run), run, specification or {}), record)
 
 
+def within_turn(x: Array) -> Array:
+    """Return angles less the nearest whole number of turns."""
+    return np.asarray(x - 2 * math.pi * np.round(x / (2 * math.pi)))
+
+
 def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
     """Return the rows of a record.  Raises ReductionError."""
     o = run.options
@@ -105,13 +120,14 @@ def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
     rows = [plan[int(p)] for p in phase]
     theta = np.array([row.target for row in rows])
     mount = np.array([names.index(row.face) for row in rows])
-    sense = np.ones(phase.size)
-    for m in range(len(names)):
-        of = np.flatnonzero(mount == m)
-        sense[of[int(np.argmax(theta[of])) :]] = -1.0 if bool(o["both_ways"]) else 1.0
+    sense = np.ones(phase.size)  # of the last move, by the cumulative reading
+    moved = np.diff(w["angle_start"])
+    for k in range(1, phase.size):
+        sense[k] = np.sign(moved[k - 1]) if abs(moved[k - 1]) > 1e-3 else sense[k - 1]
+    true = within_turn(w["true"] - theta) if "true" in w else None
     return Readings(
         theta, np.array(mounts)[mount], mount, sense, w["mean"], w["level_x"] + 1j * w["level_y"], w["tracking"],
-        w["second"] - theta, w["true"] - theta if "true" in w else None, int(o["positions"]), float(o["head"]),
+        within_turn(w["second"] - theta), true, int(o["positions"]), float(o["head"]),
         int(o["orders"]),
     )  # fmt: skip
 
@@ -164,9 +180,9 @@ def position_fit(r: Readings) -> tuple[Fit, list[int]]:
         return np.column_stack([f(n * angle) for n in orders for f in (np.cos, np.sin)] or [np.zeros((angle.size, 0))])
 
     n, mounts = r.theta.size, int(r.mount.max()) + 1
-    both = bool(np.any(r.sense < 0.0))
+    both = r.both_senses
     zeros = (r.mount[:, None] == np.arange(mounts)).astype(float)
-    seen = (r.face[:, None] == np.arange(r.faces)).astype(float)
+    seen = (r.face[:, None] == r.seen).astype(float)
     seen = seen[:, :-1] - seen[:, -1:]  # the sum of p is 0
     own = harmonics(r.theta)
     first = np.column_stack([own, *([0.5 * r.sense] if both else []), zeros, np.zeros(n), -seen])
@@ -176,8 +192,14 @@ def position_fit(r: Readings) -> tuple[Fit, list[int]]:
     second[:, own.shape[1] + both + mounts] = 1.0
     y = np.concatenate([r.deviation + r.tracking, r.second + r.tracking])
     place = np.tile(r.place, 2)
-    dof = max(2.0 * r.faces - own.shape[1] - 2.0, 3.0)  # of the places: an error that returns there counts once
-    return least_squares(np.vstack([first, second]), y, [slice(0, n), slice(n, 2 * n)], place, dof), orders
+    X = np.vstack([first, second])
+    if np.linalg.matrix_rank(X) < X.shape[1]:
+        raise ReductionError(
+            f"{np.unique(place).size} positions do not determine {len(orders)} harmonics and the errors of "
+            f"{r.seen.size} faces: take more positions or mounts, or fewer orders"
+        )
+    dof = max(2.0 * np.unique(place).size - own.shape[1] - 2.0, 3.0)  # an error that returns at a place counts once
+    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, dof), orders
 
 
 def level_fit(r: Readings) -> tuple[Fit, list[str]]:
@@ -223,18 +245,20 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         )  # fmt: skip
 
     # position error of each position: the fit without its harmonics, and what it leaves
-    zeros = 2 * len(orders) + bool(np.any(r.sense < 0.0))
+    zeros = 2 * len(orders) + r.both_senses
     mounts = int(r.mount.max()) + 1
-    polygon = np.append(fit.value[zeros + mounts + 1 :], -float(np.sum(fit.value[zeros + mounts + 1 :])))
+    polygon = np.full(r.faces, np.nan)
+    polygon[r.seen] = np.append(fit.value[zeros + mounts + 1 :], -float(np.sum(fit.value[zeros + mounts + 1 :])))
     error = r.deviation + polygon[r.face] - fit.value[zeros + r.mount]
-    at = np.array([float(np.mean(error[r.place == x])) for x in range(r.faces)])
+    visited = np.unique(r.place)
+    at = np.array([float(np.mean(error[r.place == x])) for x in visited])
     at -= np.mean(at)
     spread = float(np.std(fit.residual[: r.theta.size], ddof=1))
     worst = int(np.argmax(np.abs(at)))
-    where = 360.0 * worst / r.faces
+    where = 360.0 * visited[worst] / r.faces
     true = None
     if r.true is not None:
-        mean = np.array([float(np.mean(r.true[r.place == x])) for x in range(r.faces)])
+        mean = np.array([float(np.mean(r.true[r.place == x])) for x in visited])
         true = mean - np.mean(mean)
     add("accuracy", f"position error of the largest magnitude, at {where:g}°", at[worst],
         _u_place(r, fit, worst, zeros), fit.k, None if true is None else true[worst])  # fmt: skip
@@ -302,14 +326,14 @@ def _u_place(r: Readings, fit: Fit, place: int, zeros: int) -> float:
         value = np.zeros(p)
         for i in of:
             value[zeros + r.mount[i]] -= 1.0 / of.size
-            faces = np.arange(zeros + mounts + 1, p)
-            if r.face[i] < r.faces - 1:
-                value[faces[r.face[i]]] += 1.0 / of.size
+            faces, k = np.arange(zeros + mounts + 1, p), int(np.searchsorted(r.seen, r.face[i]))
+            if k < faces.size:
+                value[faces[k]] += 1.0 / of.size
             else:
                 value[faces] -= 1.0 / of.size
         return np.asarray(out + fit.gain.T @ value)
 
-    rows = np.array([row(x) for x in range(r.faces)])
+    rows = np.array([row(x) for x in np.unique(r.place)])
     g = rows[place] - rows.mean(axis=0)
     return math.sqrt(float(g @ fit.V @ g))
 
@@ -339,12 +363,13 @@ def _level_terms(level: Fit, terms: Sequence[str], p: Mapping[str, Any], add: An
 
 
 def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> dict[str, Any]:
-    known = None if true is None else true[: errors.size] - np.mean(true[: errors.size])
-    last = math.sqrt(float(np.sum(fit.u[first:] ** 2)) / max(errors.size - 1, 1))
+    seen = np.flatnonzero(np.isfinite(errors))
+    known = None if true is None else true - np.mean(true[seen])
+    last = math.sqrt(float(np.sum(fit.u[first:] ** 2)) / max(seen.size - 1, 1))
     rows = [
-        [k + 1, errors[k] / ARCSEC, (fit.u[first + k] if k < errors.size - 1 else last) / ARCSEC,
+        [int(k) + 1, errors[k] / ARCSEC, (fit.u[first + i] if i < seen.size - 1 else last) / ARCSEC,
          None if known is None else known[k] / ARCSEC]
-        for k in range(errors.size)
+        for i, k in enumerate(seen)
     ]  # fmt: skip
     return {
         "title": "Errors of the polygon",

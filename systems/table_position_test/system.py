@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.table_program import Program, read_program
 from gyrobench.system.values import InvalidValueError
 
 REFERENCE = Socket(
@@ -78,7 +80,7 @@ class TablePositionTest(System):
         site -> wobble: f=f_base omega=omega_base
         wobble -> body: f=f_local omega=omega_local
         body.angle -> wobble.angle
-        sequencer -> command: mode target
+        sequencer -> command: mode target way move_rate
         command -> controller: count=count_command angle=angle_command rate=rate_command acc=acc_command
         body -> reader: angle rate
         body -> reader_2: angle rate
@@ -105,6 +107,7 @@ class TablePositionTest(System):
         "move_rate": Option("1deg/s", "rad/s", "rate between positions", sets="command.reference_index_rate"),
         "head": Option(math.pi, "rad", "angle between the two reading heads", sets="reader_2.head"),
         "pole": Option(0.5, "1", "closed-loop poles of a sampled controller", 0.0, 0.99),
+        "program": Option("", str, "CSV or JSON file with a program of positions, for --part sequencer=table_program"),
         "settle": Option(2.0, "s", "wait after each move", 0.0),
         "dwell": Option(2.0, "s", "time averaged at each position", 0.01),
     }
@@ -123,7 +126,22 @@ class TablePositionTest(System):
             text = f"mounts = {self['mounts']!r}: angles in deg with spaces between are expected, as in '0 30 180'"
             raise InvalidValueError(text) from None
 
+    def program(self) -> Program | None:
+        """Return the program of the file, if one is given."""
+        return read_program(Path(self["program"])) if self["program"] else None
+
     def plan(self) -> Plan:
+        """The positions in each mount, or those of the program in the first one."""
+        program = self.program()
+        if program is not None:
+            name = f"mount {math.degrees(self.azimuths()[0]):g}°"
+            rows = [
+                Phase(
+                    f"{math.degrees(e.target):g}°", e.mode, name, e.target, self["settle"], e.time, window=self["dwell"]
+                )
+                for e in program.entries
+            ]
+            return Plan(rows, {name: mount(self.azimuths()[0])})
         n, phases, faces = int(self["positions"]), [], {}
         there = list(range(n))
         for b in self.azimuths():
@@ -139,8 +157,17 @@ class TablePositionTest(System):
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         quantum = parts["reader.quantum"]
         errors = {n: parts[f"reader.encoder_{n}"] for n in SCALE}
+        program = self.program()
+        planned = self.plan().parameters()
+        if program is not None:
+            planned = program.parameters() | {
+                "sequencer.settle": self["settle"],
+                "sequencer.window_time": self["dwell"],
+                "sequencer.face_mount": mount(self.azimuths()[0]),
+                "sequencer.move_rate_most": self["move_rate"],
+            }
         return {
-            **self.plan().parameters(),
+            **planned,
             **self.owned(),
             # one scale, two heads
             **{f"reader_2.encoder_{n}?": x for n, x in errors.items()},
@@ -167,7 +194,18 @@ class TablePositionTest(System):
             found.append(f"mounts = {', '.join(odd)} deg: must be whole faces of {360.0 / n:g} deg")
         if 2 * int(self["orders"]) >= n:
             found.append(f"orders = {self['orders']}: at most {(n - 1) // 2} harmonics follow from {n} positions")
-        if self["positions"] * len(azimuths) * (1 + bool(self["both_ways"])) + len(azimuths) > 99:
+        program = self.program()
+        if program is not None:
+            off = [
+                e
+                for e in program.entries
+                if e.mode != "index" or abs(e.target / pitch - round(e.target / pitch)) > 1e-9
+            ]
+            if program.kind != "positions" or off:
+                found.append(
+                    f"program: index moves to whole faces of {360.0 / n:g} deg are expected, of kind positions"
+                )
+        elif self["positions"] * len(azimuths) * (1 + bool(self["both_ways"])) + len(azimuths) > 99:
             found.append(
                 f"{len(self.plan().phases)} positions: at most 99 are possible; take fewer positions or mounts, or "
                 "both_ways = false"

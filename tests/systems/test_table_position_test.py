@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 import gyrobench as gb
@@ -91,3 +92,20 @@ def test_friction_loses_motion() -> None:
 def test_refusals(values: dict[str, Any], text: str) -> None:
     with pytest.raises(gb.GyrobenchError, match=text):
         position_run(**values)
+
+
+def test_program_from_a_file(tmp_path: Any) -> None:
+    """Every third face by a program, forced upwards and the shorter way back."""
+    rows = [f"index,{a}deg,8deg/s,{way},1min" for a, way in ((60, "up"), (120, "up"), (0, "shorter"), (240, "shorter"))]
+    path = tmp_path / "places.csv"
+    path.write_text("kind,positions\nmode,target,rate,way,time\n" + "\n".join(rows) + "\n")
+    test = gb.load("table_position_test", parts={"sequencer": "table_program"}, **QUICK)
+    for name, value in {"program": str(path), "positions": 6, "mounts": "0", "orders": 1, "dwell": "10s"}.items():
+        test.set(name, value)
+    record = test.run(seed=1).record
+    assert record.windows["phase"].tolist() == [p for p in (1, 2, 3, 4) for _ in range(5)]  # 59.5 s of windows of 10 s
+    places = np.degrees(record.windows["angle_end"][4::5])
+    assert places == pytest.approx([60.0, 120.0, 0.0, -120.0], abs=2e-4)  # 240 deg the shorter way is -120 deg
+    path.write_text("kind,positions\ntarget,time\n50deg,1min\n")
+    with pytest.raises(gb.GyrobenchError, match="index moves to whole faces of 60 deg"):
+        test.run(seed=1)
