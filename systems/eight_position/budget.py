@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.reduction.drift.pulses import Windows, sources
 from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.linear_fit import Findings
 
@@ -45,16 +46,18 @@ def attitude_error(
     return found.error(D @ lin.start - dw)
 
 
-def own_sources(channel: str) -> tuple[str, str, str]:
-    """Zero, resolution and nonlinearity of the current about ``channel``, which the other channel does not have."""
+def own_sources(channel: str) -> tuple[str, ...]:
+    """Zero, resolution, nonlinearity and pulses of the current about ``channel``, which the other channel lacks."""
     meter = f"of the {channel} current meter"
-    return f"zero {meter}", f"resolution {meter}", f"nonlinearity of the torquer about {channel}"
+    own = (f"zero {meter}", f"resolution {meter}", f"nonlinearity of the torquer about {channel}")
+    return (*own, *sources(channel))
 
 
 def effects(
-    channel: str, setup: model.Setup, found: Findings, lin: model.Linear, current: Array, position: NDArray[np.int_]
+    channel: str, setup: model.Setup, found: Findings, lin: model.Linear, readings: Windows, position: NDArray[np.int_]
 ) -> list[Effect]:
     """All sources with their sensitivities for one current (A); sizes come from ``setup`` and may be 0."""
+    current, pulses = readings.mean, setup.pulses.get(channel)
 
     every = tuple(positions.ATTITUDES)
     turns = {a: attitude_error(channel, setup, found, lin, position, turned(a, SMALL, every)) / SMALL for a in AXES}
@@ -65,7 +68,7 @@ def effects(
     full = float(np.max(np.abs(current))) or 1.0
     offset = found.error(-lin.k0)
     quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
-    zero, resolution, nonlinearity = own_sources(channel)
+    zero, resolution, nonlinearity, *_ = own_sources(channel)
     return [
         Effect(
             "attitude of each position", setup.u_attitude, "rad", alone,
@@ -84,4 +87,5 @@ def effects(
             found.error(-lin.k0 * current * np.abs(current) / full),
             f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
+        *(pulses.effects(found, lin.k0, readings, setup.u_pulse, setup.u_switching, channel) if pulses else ()),
     ]  # fmt: skip

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.linear_fit import Estimates, Findings, Quantity
 from gyrobench.reduction.setups import SiteSetup
@@ -68,6 +69,9 @@ class Setup(SiteSetup):
     u_current: float = 0.0
     u_nonlinearity: float = 0.0
     quantum: Mapping[str, float] = field(default_factory=dict)
+    pulses: Mapping[str, Pulses | None] = field(default_factory=dict)  # of pulse-width rebalances, by channel
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
 
 
 def directions(position: NDArray[np.int_], latitude: float, turned: Mapping[int, Array] | None = None) -> Array:

@@ -21,6 +21,7 @@ from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, repeatability, residual_series
 from gyrobench.reduction.estimation.effects import corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -107,7 +108,7 @@ def averaged(windows: Mapping[str, Array]) -> dict[str, Array]:
     keys = np.stack([np.asarray(windows[n]).astype(int) for n in ("cycle", "position")], axis=1)
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    means = ["mean_x", "mean_y", *(n for n in windows if n.startswith(("temperature", "turn_on")))]
+    means = ["mean_x", "mean_y", *(n for n in windows if n.startswith(("std_", "temperature", "turn_on")))]
     found: dict[str, list[float]] = {n: [] for n in ("cycle", "position", "t_start", "t_end", *means)}
     for k in np.argsort(first):
         mine = np.flatnonzero(group.ravel() == k)
@@ -139,6 +140,7 @@ def _short_term(
 def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapping[str, float]) -> DriftTestResult:
     current, position = np.asarray(data[f"mean_{channel}"], dtype=float), np.asarray(data["position"]).astype(int)
     t0, t1 = (np.asarray(data[n], dtype=float) for n in ("t_start", "t_end"))
+    readings = Windows(current, np.asarray(data.get(f"std_{channel}", np.zeros_like(current)), dtype=float), t1 - t0)
     d = model.directions(position, setup.latitude)
     lin = model.linear(channel, current, d, setup)
     wanted = model.quantities(channel, setup, closed)
@@ -150,7 +152,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH, candidates=weighed)
     other = budget.own_sources("y" if channel == "x" else "x")
     found = corrected(
-        found, lambda f: budget.effects(channel, setup, f, lin, current, position), setup.corrections, other
+        found, lambda f: budget.effects(channel, setup, f, lin, readings, position), setup.corrections, other
     )
     each = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
     found.f_test(
@@ -165,7 +167,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
             f"I_{channel}{a} = I_{channel}{b} within the noise: no scale factor k_{channel} (relative uncertainty "
             f"{found.u[0] / abs(found.value[0]):.2g}); longer readings or a lower latitude are needed"
         )
-    effects = budget.effects(channel, setup, found, lin, current, position)
+    effects = budget.effects(channel, setup, found, lin, readings, position)
     return linear_result(
         found,
         system="eight_position",
@@ -251,6 +253,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
         sigma=bool(run.options.get("sigma", True)),
         truth=run_metadata.truth_of(run, model.TRUE) if known else None,
         quantum={c: float(run.parameters.get(f"rebalance_{c}.resolution", 0.0)) for c in "xy"},
+        pulses={c: Pulses.of(run, f"rebalance_{c}") for c in "xy"},
     )
 
 

@@ -44,8 +44,9 @@ class EightPosition(TwoChannelTest):
         }
         | CORRECTIONS
         | NUISANCES
-        | type_b("latitude", "current", "nonlinearity", attitude="standard uncertainty of each position, about each "
-                 "axis, independent", mount="standard uncertainty of the gyro in its fixture, about each axis")
+        | type_b("latitude", "current", "nonlinearity", "pulse", "switching",
+                 attitude="standard uncertainty of each position, about each axis, independent",
+                 mount="standard uncertainty of the gyro in its fixture, about each axis")
     )  # fmt: skip
     measured_data = MEASURED
     windows = Windows(

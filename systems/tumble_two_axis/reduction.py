@@ -23,6 +23,7 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -47,7 +48,7 @@ FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D
 @dataclass(frozen=True, kw_only=True)
 class TwoAxisSetup(RebalanceSetup):
     """k: torquer scale factor, rad/s/A.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
-    quantum: resolution of the current reading.
+    quantum: resolution of the current reading.  pulses: those of a pulse-width rebalance, where it was counted.
     """
 
     k: float
@@ -55,6 +56,9 @@ class TwoAxisSetup(RebalanceSetup):
     n: int = 1
     harmonic: bool = False
     quantum: float = 0.0
+    pulses: Pulses | None = None
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
     u_square: float = 0.0
     u_angle1: float = 0.0
     u_angle2: float = 0.0
@@ -84,6 +88,8 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
     w = {c: np.asarray(windows[c], dtype=float) for c in COLUMNS}
     outer, inner = ((w[f"{a}_start"] + w[f"{a}_end"]) / 2.0 for a in ("outer", "inner"))
     current = w["mean"] if s.polarity == "project" else -w["mean"]
+    spread = np.asarray(windows.get("std", np.zeros_like(current)), dtype=float)
+    readings = Windows(current, spread, w["t_end"] - w["t_start"])
     C = geometry.attitude(s.latitude, outer, inner)
     rate = C[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate)
     y = rate - s.k * current
@@ -96,7 +102,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
         "drift rate", "°/h", DPH, candidates=weighed,
     )  # fmt: skip
-    found = corrected(found, lambda f: _effects(s, f, outer, inner, C, current), s.corrections)
+    found = corrected(found, lambda f: _effects(s, f, outer, inner, C, readings), s.corrections)
     _model_test(found, theta)
     _cycle_test(found, theta)
     warnings = []
@@ -119,7 +125,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         equation='omega_"IA" - k i = omega_d = D_F + D_I X + D_O Y + D_S Z + D_"II" X^2 + D_"SS" Z^2 + D_"IO" X Y + '
         'D_"OS" Y Z + D_"IS" X Z',
         conventions=_conventions(s),
-        effects=_effects(s, found, outer, inner, C, current),
+        effects=_effects(s, found, outer, inner, C, readings),
         **s.reported(),
         no_closed="; ".join(why),
         closed_caption="From the means of the positions; the harmonic route fits 25 amplitudes where nine would do",
@@ -258,7 +264,8 @@ def _cycle_test(found: Findings, theta: Array) -> None:
         )  # fmt: skip
 
 
-def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Array, current: Array) -> list[Effect]:
+def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Array, readings: Windows) -> list[Effect]:
+    current = readings.mean
     earth = frames.earth_rate_local(s.latitude, s.earth_rate)
 
     def believed(other: Array) -> Array:  # the gyro axes are C, and are taken for these
@@ -315,6 +322,7 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
             "resolution of the current reading", s.quantum / 12.0**0.5, "A", found.error(-s.k * one),
             "as if never dithered",
         ),
+        *(s.pulses.effects(found, s.k, readings, s.u_pulse, s.u_switching) if s.pulses else ()),
     ]  # fmt: skip
 
 
@@ -338,6 +346,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Tw
         harmonic=bool(run.options.get("harmonic", False)),
         truth=run_metadata.truth_of(run, drift.NAMES),
         quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
+        pulses=Pulses.of(run),
     )
 
 

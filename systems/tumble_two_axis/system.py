@@ -61,8 +61,8 @@ class TumbleTwoAxis(RebalanceTest):
         | FOLD
         | NUISANCES
         | CORRECTIONS
-        | type_b("square", "mount", "angle1", "angle2", "wobble", "scale_factor", "nonlinearity", "current",
-                 axis="standard uncertainty of the outer axis against the pole")
+        | type_b("square", "mount", "angle1", "angle2", "wobble", "scale_factor", "nonlinearity", "current", "pulse",
+                 "switching", axis="standard uncertainty of the outer axis against the pole")
         | TORQUER
     )  # fmt: skip
     measured_data = MEASURED

@@ -102,3 +102,35 @@ def test_refuses_a_loop_too_fast_for_the_saw(session: Session) -> None:
     # K_v = K_sg H k K_p / C = 10 x 0.0834 x 1000 = 834 1/s = 133 Hz
     with pytest.raises(GyrobenchError, match="crosses over at 133 Hz, the saw must be at least ten times faster"):
         session.run({**PULSES, "rebalance.K_p": 1000.0}, seed=1)
+
+
+def shifts(name: str, parts: dict[str, str], values: dict[str, Any], errors: dict[str, Any]) -> tuple[Any, Any, Any]:
+    """Shifts measured with one seed, predicted (all tables together), and u; in the units of the report."""
+    system = load_system(name)
+    with Session(name, parts) as session:
+        before, after = (system.reduce(session.run({**values, **e}, seed=4)) for e in ({}, errors))
+    tables = [t for t in after.tables if t["title"].startswith("Predicted shifts")]
+    said = {row[0]: row[t["columns"].index("sum")] for t in tables for row in t["rows"]}
+    names = [c.name for c in before.coefficients if c.name in said and c.truth is not None]
+    moved = [after[n].estimate - before[n].estimate for n in names]
+    return np.array(moved), np.array([said[n] for n in names]), np.array([before[n].u for n in names])
+
+
+def test_two_axis_tumble() -> None:
+    """A current of 1 A lets the inner axis turn quickly; a clock of 10 MHz keeps the counts fine."""
+    plan = {"positions": 25, "dwell": 4.0, "settle": 3.0, "inner_rate": 0.05, "table.index_rate[1]": 1.0}
+    values = {**plan, "table.acceleration": [1.0, 1.0], "rebalance.I": 1.0, "rebalance.f_q": 1e7}
+    errors = {"rebalance.dI_plus": 2e-2, "rebalance.dI_minus": 1.99e-2, "rebalance.dT": [-2e-8, 3e-5, 0.0]}
+    moved, said, u = shifts("tumble_two_axis", {"rebalance": "rebalance_pwm"}, values, errors)
+    assert moved.size == 9 and np.abs(said[0]) > 0.1 * u[0]
+    assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)
+
+
+def test_eight_positions() -> None:
+    """Each loop has errors of its own; the mean of the currents is found as a scale factor."""
+    values = {"cycles": 2, "readings": 6, "dwell": 6.0, "settle": 3.0, **{f"rebalance_{c}.f_q": 1e7 for c in "xy"}}
+    parts = {"rebalance_x": "rebalance_pwm", "rebalance_y": "rebalance_pwm"}
+    errors = {"rebalance_x.dI_plus": 1e-4, "rebalance_y.dI_minus": 3e-4, "rebalance_y.dT": [2e-7, 0.0, 0.0]}
+    moved, said, u = shifts("eight_position", parts, values, errors)
+    assert moved.size >= 10 and np.sum(np.abs(said) > u) >= 2
+    assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)

@@ -23,6 +23,21 @@ from gyrobench.reduction.estimation.linear_fit import Findings
 Array = NDArray[np.float64]
 
 
+SOURCES = (
+    "asymmetry of the pulse currents",
+    "mean of the pulse currents",
+    "switching time of the pulses",
+    "switching time, proportional to the current",
+    "switching time, by the square of the current",
+    "resolution of the counts",
+)
+
+
+def sources(loop: str = "") -> tuple[str, ...]:
+    """Return the names of the sources; loop: "x", "y" where there are several loops."""
+    return tuple(f"{name}, {loop} loop" if loop else name for name in SOURCES)
+
+
 @dataclass(frozen=True)
 class Windows:
     """Readings (n,): mean and standard deviation of the current of each step (A), length of the window (s)."""
@@ -59,11 +74,15 @@ class Pulses:
             (late[0], late[1], late[2]),
         )
 
-    def effects(self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float) -> list[Effect]:
+    def effects(
+        self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float, loop: str = ""
+    ) -> list[Effect]:
         """Return the sources with their sensitivities.
 
-        k: torquer scale factor, rad/s/A.  u_pulse (A), u_switching (s): standard uncertainties, see the options.
+        k: torquer scale factor, rad/s/A.  u_pulse (A), u_switching (s): standard uncertainties, see the options.  loop:
+        name of the loop where there are several.
         """
+        asymmetric, average, late, growing, curved, resolution = sources(loop)
         d = read.mean / self.current
         one = np.ones_like(d)
         edge = k * (2.0 * self.current + self.d_plus + self.d_minus) * self.f_s
@@ -71,16 +90,16 @@ class Pulses:
         asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
         counts = np.sqrt(np.sum((fit.gain * (2.0 * k * self.current / self.f_q / read.length)) ** 2, axis=1))
         return [
-            Effect("asymmetry of the pulse currents", u_pulse, "A", 0.5 * k * one, "positive less negative current",
+            Effect(asymmetric, u_pulse, "A", 0.5 * k * one, "positive less negative current",
                    simulated=(asymmetry,)),
-            Effect("mean of the pulse currents", 0.0, "A", k * d, "part of the torquer scale factor",
+            Effect(average, 0.0, "A", k * d, "part of the torquer scale factor",
                    simulated=(mean,)),
-            Effect("switching time of the pulses", u_switching, "s", edge * one, "edges too late",
+            Effect(late, u_switching, "s", edge * one, "edges too late",
                    simulated=(self.late[0],)),
-            Effect("switching time, proportional to the current", u_switching, "s", edge * d, "at full current",
+            Effect(growing, u_switching, "s", edge * d, "at full current",
                    simulated=(self.late[1],)),
-            Effect("switching time, by the square of the current", u_switching, "s", edge * square, "at full current",
+            Effect(curved, u_switching, "s", edge * square, "at full current",
                    simulated=(self.late[2],)),
-            Effect("resolution of the counts", 12.0**-0.5, "1", None, "two clocks, independent from window to window",
+            Effect(resolution, 12.0**-0.5, "1", None, "two clocks, independent from window to window",
                    values=counts),
         ]  # fmt: skip
