@@ -1,0 +1,42 @@
+"""Processor time of a tumble on the table as it is built with pulse-width rebalance, against the kinematic one.
+
+    python tests/benchmarks/built_table.py [--rounds 3] [--turns 1]
+
+Both run the default tumble (5.5 hours at 1 ms) in turn; the servo inside the table at 0.1 ms, the saw at 1 kHz.
+Budget: 6 times the kinematic run.  The least of the rounds counts; other work on the machine lengthens both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+from gyrobench.engine.session import Session
+
+BUDGET = 6.0
+BUILT = {"table": "table_dynamic", "rebalance": "rebalance_pwm"}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--turns", type=int, default=1)
+    given = parser.parse_args()
+    values = {"turns": given.turns}
+    least: dict[str, float] = {}
+    with Session("tumble_single_axis") as kinematic, Session("tumble_single_axis", BUILT) as built:
+        for k in range(given.rounds):
+            for name, session in (("kinematic", kinematic), ("as built", built)):
+                start = time.process_time()
+                session.run(values, seed=k)
+                least[name] = min(least.get(name, 1e9), time.process_time() - start)
+    ratio = least["as built"] / least["kinematic"]
+    for name, seconds in least.items():
+        print(f"{name:<10} {seconds:.2f} s of processor time")
+    print(f"ratio      {ratio:.2f} (budget {BUDGET:g})")
+    return 0 if ratio <= BUDGET else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
