@@ -244,11 +244,11 @@ def test_intervals_cover_the_population(design: str, readings: bool) -> None:
     """
     if design == "tumble":
         t0, t1, X = mc.plan(36, 5)
-        runs = 300
+        runs = 190
     else:
         t0 = 10.0 * np.arange(30)
         t1, X = t0 + 10.0, np.ones((30, 1))
-        runs = 800
+        runs = 500
     rng, names = np.random.default_rng(12), drift.terms(9)[: X.shape[1]]
     ratio = []
     for _ in range(runs):

@@ -120,3 +120,12 @@ def test_a_break_that_is_no_wired_input() -> None:
         parts = operating_point(s.assembly, parameters, lambda slot: load_part(s.names[slot]))
         with pytest.raises(LinearizationError, match=r"break point stabilizer\.nothing: not a connected input"):
             Linear(s.assembly, parts, 1e-4).continuous("stabilizer.nothing")
+
+
+def test_states_that_are_not_between_input_and_output_have_no_effect() -> None:
+    """u -> x1 -> y with x1' = u - 2 x1: y/u = 1/(s + 2), 1/2 at rest.  x2' = 0 is moved by nothing, x3' = x1 seen by
+    nothing; both would be divided by s = 0.
+    """
+    a, b, c = [[-2.0, 5.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[1.0], [0.0], [0.0]], [[1.0, 3.0, 0.0]]
+    m = LinearModel(A=a, B=b, C=c, D=[[0.0]], inputs=["u"], outputs=["y"], states=["x1", "x2", "x3"], step=0.0)
+    assert model_response(m, [0.0, 1.0])[:, 0, 0] == pytest.approx([0.5, 1.0 / (2j * math.pi + 2.0)], rel=1e-14)

@@ -197,6 +197,7 @@ def test_time_left_is_that_of_this_process() -> None:
 # ------------------------------------------------------------------------------- the command, killed processes
 NAME = "tumble_single_axis"
 WORDS = ["run", NAME, "--set", "rate=2deg/s", "--set", "dwell=20", "--set", "windows=36", "--json"]
+PLAIN = ["--no-report", "--no-check-step"]  # of the runs whose record alone is of interest
 CODE = """
 import sys
 from gyrobench.commands import cli
@@ -235,7 +236,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert not Record.load(tmp_path / "r").complete
     code, out, err = command([*WORDS, "--seed", "2", "--out", "r", "--resume"], capsys, monkeypatch)
     assert code == 2 and "the interrupted run in r is another one; what differs:\n  - seed: 1 there, 2 here\n" in err
-    code, whole, err = command([*WORDS, "--out", "whole"], capsys, monkeypatch)
+    code, whole, err = command([*WORDS, *PLAIN, "--out", "whole"], capsys, monkeypatch)
     assert code == 0
     code, out, err = command([*WORDS, "--out", "r", "--resume"], capsys, monkeypatch)
     assert code == 0, err
@@ -250,7 +251,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
         patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         assert command([*WORDS, "--out", "r"], capsys, monkeypatch)[0] == 130
     assert (tmp_path / "r-incomplete" / FILE).is_file() and Record.load(tmp_path / "r").complete
-    assert command([*WORDS, "--out", "r", "--resume"], capsys, monkeypatch)[0] == 0
+    assert command([*WORDS, *PLAIN, "--out", "r", "--resume"], capsys, monkeypatch)[0] == 0
     assert not (tmp_path / "r-incomplete" / FILE).exists()
     assert Record.load(tmp_path / "r").run.resumed_at
 
@@ -276,10 +277,10 @@ def test_a_killed_process_is_resumed(
     assert not (tmp_path / "k" / "run.json").exists()
     code, _, err = command([*WORDS, "--out", "k", "--seed", "2"], capsys, monkeypatch)
     assert code == 2 and "k: holds another run (its parameters, seed differ)" in err
-    code, _, err = command([*WORDS, "--out", "k", "--resume"], capsys, monkeypatch)  # the native engine goes on
+    code, _, err = command([*WORDS, *PLAIN, "--out", "k", "--resume"], capsys, monkeypatch)  # the native engine goes on
     assert code == 0, err
     found = Record.load(tmp_path / "k")
     assert 0.0 < found.run.resumed_at[0] < found.run.stopped_at
-    assert command([*WORDS, "--out", "whole"], capsys, monkeypatch)[0] == 0
+    assert command([*WORDS, *PLAIN, "--out", "whole"], capsys, monkeypatch)[0] == 0
     assert found.same_data(Record.load(tmp_path / "whole"))
     assert not file.exists()

@@ -100,21 +100,21 @@ def voltage(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n:
 
 
 READ: dict[str, tuple[Any, int]] = {  # what is read, runs
-    "tumble_single_axis": (current, 120),
-    "tumble_two_channel, nine": (currents, 90),
-    "tumble_two_channel, simple": (currents, 130),
-    "tumble_two_axis": (current, 120),
-    "eight_position": (currents, 100),
-    "fixed_position": (current, 450),
-    "open_loop_drift": (voltage, 450),
-    "accelerometer_multipoint": (acceleration, 120),
-    "accelerometer_multipoint, 12": (acceleration, 200),
-    "servo_vertical_level": (angle, 140),
-    "servo_polar": (angle, 120),
-    "servo_two_axis": (angles, 70),
-    "pickoff_scale_factor": (voltage, 350),
-    "torquer_scale_factor": (angle, 330),
-    "rebalance_loop_test": (current, 220),
+    "tumble_single_axis": (current, 75),
+    "tumble_two_channel, nine": (currents, 56),
+    "tumble_two_channel, simple": (currents, 80),
+    "tumble_two_axis": (current, 75),
+    "eight_position": (currents, 62),
+    "fixed_position": (current, 280),
+    "open_loop_drift": (voltage, 280),
+    "accelerometer_multipoint": (acceleration, 75),
+    "accelerometer_multipoint, 12": (acceleration, 125),
+    "servo_vertical_level": (angle, 87),
+    "servo_polar": (angle, 75),
+    "servo_two_axis": (angles, 44),
+    "pickoff_scale_factor": (voltage, 217),
+    "torquer_scale_factor": (angle, 205),
+    "rebalance_loop_test": (current, 136),
 }
 
 
