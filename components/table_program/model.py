@@ -61,7 +61,7 @@ class TableProgram(Component):
     move_rate = Output("rad/s", "rate of the move")
     face = Output("1", "mount: rows are the axes of the instrument in table axes", shape=(3, 3))
     gate = Output("1", "0 closed, 1 windows by time")
-    window = Output("1", "window length, s")
+    window = Output("1", "window length, s; 0 while the gate is closed")
     done = Output("1", "1 when the program is finished or stopped")
     state = Output("1", "0 move, 1 settle, 2 measure, 3 close, 4 done, 5 stopped")
     left = Output("s", "time left of the dwell or the step")
@@ -189,7 +189,7 @@ class TableProgram(Component):
             self.target = 0.0
         self.face = self.face_mount
         self.gate = 1.0 if self.stage == MEASURE or self.stage == CLOSE else 0.0
-        self.window = self.window_time
+        self.window = self.gate * self.window_time
         self.done = 1.0 if self.stage >= DONE else 0.0
         self.state = self.stage
         begun = self.t_start if self.kind == COMMANDS or self.stage == MOVE else self.t_arrived
