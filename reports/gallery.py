@@ -24,6 +24,7 @@ SHOWN = {
     "platform_three_axis": "open loop",
     "stabilizer_floated_2dof": "open loop",
     "stabilizer_power_2dof": "open loop",
+    "table_environment": "Recorded channels",
     "table_rate_test": "largest change of rate",
 }
 

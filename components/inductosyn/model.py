@@ -181,8 +181,9 @@ class Inductosyn(Component):
         else:
             most = self.slew * (periods - self.periods)
             way = self.scale_count(0.0, 0.0) - self.encoder.count
-            if fabs(way) > 0.5 * self.N:
+            if fabs(way) > 0.5 * self.N:  # the null that it follows is that of another cycle
                 self.gone = 1.0
+                way = way - self.N * nearest(way / self.N)
             self.encoder.count = self.encoder.count + clip(way, -most, most)
         self.periods = periods
 

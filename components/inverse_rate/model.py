@@ -14,10 +14,11 @@ class InverseRate(RateReadout):
         time = t_k - t_(k-1)        rate = +- interval / time
 
     Several marks between two readings give their mean interval.  A reversal starts anew at the mark that is passed
-    again.  An interval longer than the display is an overflow: no rate is shown, that of the last interval neither.
+    again.  Downwards a mark stands lower by `hysteresis`, so that noise of the counts at a mark is not a reversal.  An
+    interval longer than the display is an overflow: no rate is shown, that of the last interval neither.
     At less than a count for a reading the instant is known to a reading step.
 
-    Not modelled: errors of the marks other than those of the counts, hysteresis at a mark.
+    Not modelled: errors of the marks other than those of the counts.
     Source: Hu 1981, section 5.4 (three-3).
     """
 
@@ -26,6 +27,8 @@ class InverseRate(RateReadout):
     interval = Parameter(pi / 180.0, "rad", "angle between two marks (1 deg)", above=0.0)
     lsb = Parameter(1e-4, "s", "resolution of the time", above=0.0)
     time_max = Parameter(999.9999, "s", "longest time that the display shows", above=0.0)
+
+    hysteresis = Parameter(10.0, "1", "counts by which a mark stands lower downwards", min=0.0)
 
     duration = Output("s", "time of the last interval; 0: none")
 
@@ -41,24 +44,30 @@ class InverseRate(RateReadout):
             fabs(self.interval / self.quantum - self.N) > 1e-6 or self.N < 1.0,
             "interval = {interval} rad must be a whole number of counts of quantum = {quantum} rad",
         )
+        self.refuse(self.hysteresis >= self.N, "hysteresis = {hysteresis} counts must be below those of an interval")
 
-    def passed(self, mark: Number) -> Number:
-        """Return when the counts passed a mark between the last two readings, by the clock."""
-        part = (mark * self.N - self.count_last) / (self.count - self.count_last)
+    def passed(self, mark: Number, up: Number) -> Number:
+        """Return when the counts passed a mark, upwards (1) or downwards (-1), between the last two readings."""
+        level = mark * self.N if up > 0.0 else mark * self.N - self.hysteresis
+        part = (level - self.count_last) / (self.count - self.count_last)
         t = (self.t_last + part * (self.t_read - self.t_last)) * (1.0 + self.clock)
         return self.lsb * floor(t / self.lsb + 1e-9)
 
     @sampled(every=1)
     def tick(self) -> None:
-        here = floor(self.count / self.N)
-        if self.started == 1.0 and here != self.place:
-            up = 1.0 if here > self.place else -1.0
+        above = floor(self.count / self.N)
+        below = floor((self.count + self.hysteresis) / self.N)
+        if self.started == 0.0:
+            self.place = above
+        if above > self.place or below < self.place:
+            up = 1.0 if above > self.place else -1.0
             first = self.place + 1.0 if up > 0.0 else self.place  # marks passed: from first to last
-            last = here if up > 0.0 else here + 1.0
-            t = self.passed(last)
+            last = above if up > 0.0 else below + 1.0
+            self.place = above if up > 0.0 else below
+            t = self.passed(last, up)
             known = self.sense == up and first == self.mark + up
             before = self.mark if known else first
-            t_before = self.t_mark if known else self.passed(first)
+            t_before = self.t_mark if known else self.passed(first, up)
             if last != before and t > t_before:
                 intervals = (last - before) * up
                 self.r_time = (t - t_before) / intervals
@@ -72,7 +81,6 @@ class InverseRate(RateReadout):
             self.t_mark = t
         if self.sense != 0.0 and self.t_read * (1.0 + self.clock) - self.t_mark > self.time_max:
             self.over = 1.0
-        self.place = here
         self.note()
 
     def outputs(self) -> None:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.record.csv_reader import Column, DataError, Head, header_places
+from gyrobench.record.sampling import Successive
 
 Array = NDArray[np.float64]
 Block = Mapping[str, Array]
@@ -136,6 +137,7 @@ class Averager:
     opened: tuple[float, float, int] | None = None  # time and angle at which its phase began, windows done
     done: list[dict[str, Array]] = field(default_factory=list)
     counted: dict[tuple[int, ...], int] = field(default_factory=dict)
+    successive: dict[str, Successive] = field(default_factory=dict)  # of each signal, in the windows
 
     def add(self, block: Block) -> None:
         """Take further rows.  Raises ValueError where time does not increase."""
@@ -214,6 +216,11 @@ class Averager:
         start, end = start[whole], end[whole]
         if not start.size:
             return
+        span = slice(start[0], end[-1] + 1)
+        breaks = np.flatnonzero(rows["after gap"][span])
+        for s in self.signals:
+            for stretch in np.split(rows[s][span], breaks):
+                self.successive.setdefault(s, Successive()).add(stretch)
         n = (end - start).astype(float)
         out: dict[str, Array] = {k: np.full(start.size, v) for k, v in zip(self.keys, key, strict=False)}
         suspect = np.cumsum(np.nan_to_num(rows["flag"]) != 0.0) if "flag" in rows else np.zeros(t.size)

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 SERIES = """\
 Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
 #   `voltage` of a pickoff), one `angle` for its two, and `flag`; `phase` is 0 while moving or settling.  Without the
-#   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length."""
+#   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length.
+#   Samples that may be aliased are warned of: say what they are by # samples = means (each since the one before) or
+#   points, and how far the signal reaches by # bandwidth = 14Hz."""
 TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b")
 
 
@@ -68,7 +70,7 @@ def read_record(
     """
     head = read_head(data)
     windows: dict[str, np.ndarray[Any, Any]] = {}
-    series, left_out = is_time_series(head, columns), ""
+    series, notes = is_time_series(head, columns), list[str]()
     comments = head.comments
     if not series:
         windows, comments = read_measured(data, columns, time)
@@ -89,7 +91,7 @@ def read_record(
     problems += _type_b_problems(system, said.get("type_b", ""))
     if series and not problems:
         named = attitudes(system) if attitudes else None
-        windows, said, left_out = windows_of_series(system, data, head, columns, said, named)
+        windows, said, notes = windows_of_series(system, data, head, columns, said, named)
     plan: list[PlanRow] = []
     if attitudes is not None:
         plan, unclear = _plan(windows.get("phase", np.empty(0)), said, attitudes(system))
@@ -103,7 +105,7 @@ def read_record(
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
     run = measured_run(system, plan, {n: said[n] for n in texts if n in said})
     run.window_units = {c.name: c.unit for c in columns if c.name in windows}
-    run.notes = [left_out] if left_out else []
+    run.notes = notes
     return Record(windows, {}, run)
 
 

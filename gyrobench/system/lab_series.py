@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench import units
+from gyrobench.record import sampling
 from gyrobench.record.csv_reader import Column, DataError, Head, conditions
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
 from gyrobench.system import table_motion
@@ -73,8 +74,9 @@ class _Names:
 def windows_of_series(
     system: System, file: Path, head: Head, columns: Sequence[Column], said: Mapping[str, str],
     attitudes: Mapping[str, str] | None,
-) -> tuple[dict[str, Array], dict[str, str], str]:  # fmt: skip
-    """Return the windows, the comments ``phase N`` (those found by the motion too), and what was left out, in words.
+) -> tuple[dict[str, Array], dict[str, str], list[str]]:  # fmt: skip
+    """Return the windows, the comments ``phase N`` (those found by the motion too), and warnings: what was left out,
+    samples that may be aliased.
 
     attitudes: what a phase may be called.  Raises DataError.
     """
@@ -86,6 +88,7 @@ def windows_of_series(
     phases = [p for p in system.plan().phases if isinstance(p, Phase)]
     by_motion = "phase" in names.keys and not keys
     try:
+        kind, bandwidth = sampling.stated(said)
         if by_motion:
             phases = _expected(phases, said, attitudes or {})
             step, stretches = _recognise(file, head, asked, names, phases)
@@ -109,7 +112,12 @@ def windows_of_series(
     problems = _short(averager, phases) if by_motion else []
     if problems:
         raise DataError(file, problems)
-    return _as_windows(series, names, keys, columns), dict(said), averager.sentence()
+    units_of = {c.name: c.unit for c in names.columns}
+    aliased = [
+        sampling.warning(s, {"A": "mA"}.get(units_of[s], units_of[s]), averager.step, seen,
+                         kind, bandwidth) for s, seen in averager.successive.items()
+    ]  # fmt: skip
+    return _as_windows(series, names, keys, columns), dict(said), [t for t in (averager.sentence(), *aliased) if t]
 
 
 def _as_windows(

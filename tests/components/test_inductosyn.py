@@ -400,6 +400,9 @@ def test_the_pulse_width_counter_follows_one_clock_a_period():
     rows = follow(part, lambda t: 4000 * ARCSEC * t, lambda t: 4000 * ARCSEC, 1.2)
     assert rows[499, 1] == pytest.approx(-1000 * ARCSEC, abs=10 * ARCSEC)  # half the rate is left behind
     assert rows[890, 3] == 0.0 and rows[910, 3] == 1.0  # half a cycle, 1800 arcsec, after 0.9 s
+    end = part.angle
+    rows = follow(part, lambda t: end, lambda t: 0.0, 3.0, start=1.2)
+    assert rows[-1, 1] == pytest.approx(-DEG, abs=0.51 * ARCSEC)  # at rest it stands in the cycle before
 
 
 # ------------------------------------------------------------------------------------ targets and refusals

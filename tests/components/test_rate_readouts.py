@@ -150,6 +150,21 @@ def test_a_reversal_gives_no_interval():
     assert np.abs(rows[:, 0]) == pytest.approx(2 * DEG, rel=1e-3)
 
 
+def test_noise_at_a_mark_is_not_a_reversal():
+    """Counts that jump by +-3 between readings, at 1.7 counts a reading: each degree is read once, none backwards."""
+    jump = [0.0, 3.0, -2.0, 1.0, -3.0, 2.0, -1.0]
+    rate = 20 * ERU
+
+    def angle(t):
+        return rate * t + COUNT * jump[round(t * 1e3) % 7]
+
+    rows = read(InverseRate(), angle, 60.0, 1e-3)
+    assert len(rows) == 4 and (rows[:, 0] > 0).all()  # 5.01 deg: marks 1 to 5
+    assert abs(rows[:, 0].mean() / rate - 1) < 2 * COUNT / DEG
+    flickering = read(InverseRate(hysteresis=0.0), angle, 60.0, 1e-3)  # starts anew at the last flicker: too short
+    assert (flickering[:, 0] / rate - 1 > COUNT / DEG).all()
+
+
 def test_errors_of_the_scale_dominate():
     """+-0.2 arcsec over a degree: 5.6e-5 of the time.  An error of order 180 alternates from degree to degree."""
     assert pytest.approx(5.56e-5, rel=1e-3) == 0.2 / 3600
@@ -182,6 +197,7 @@ def test_stamps_must_not_go_back(cls):
         (InverseRate, {"interval": 1.00001 * DEG}, "whole number of counts"),
         (InverseRate, {"interval": 0.0}, "interval"),
         (InverseRate, {"lsb": -1e-4}, "lsb"),
+        (InverseRate, {"hysteresis": 20000.0}, "hysteresis = 20000 counts"),
     ],
 )
 def test_refusals(cls, parameters, said):

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from gyrobench.engine.session import Session
-from gyrobench.record import time_series
+from gyrobench.record import csv_reader, time_series
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import Record
+from gyrobench.system import lab_record
 from gyrobench.system.system import System, load_system
 
 TUMBLE = "tumble_single_axis"
@@ -173,3 +175,47 @@ def test_servo_phases_want_their_column(tmp_path: Path) -> None:
     file.write_text("# latitude = 45deg\ntime [s],angle [deg]\n0,0\n1,0.1\n2,0.2\n", encoding="utf-8")
     with pytest.raises(DataError, match="not recognised by the motion of the table: add a column 'phase'"):
         load("servo_vertical_level").read_measured(file, {})
+
+
+# ------------------------------------------------------------------------------------------------ aliased samples
+def logged(run: Record, file: Path, every: int, means: bool, **comments: str) -> Path:
+    """The run at 1 kHz as a file with a sample in ``every``, or with the mean since the one before; the noise of the
+    current is limited to 14 Hz, the bandwidth of the loop, by a second-order filter."""
+    c = run.channels
+    a = 2.0 * math.pi * 14.0 * 1e-3
+    y = c["rebalance.i_read"]
+    for _ in range(2):
+        y = lfilter([a], [1.0, a - 1.0], y, zi=[(1.0 - a) * y[0]])[0]
+    averaged = lfilter(np.full(every, 1.0 / every), [1.0], y) if means else y
+    thin = slice(every, None, every)
+    said = {n: v[thin] for n, v in (run.channels | {"rebalance.i_read": averaged}).items()}
+    return exported(Record(run.windows, said, run.run), file, True, **comments)
+
+
+def test_point_samples_of_a_fast_loop_are_named(run: Record, tmp_path: Path) -> None:
+    """Points at 5 Hz of a loop of 14 Hz; means at the same 5 Hz scatter a quarter as much.  Stated means, a stated
+    bandwidth of 2 Hz, and samples at 200 Hz, which fall off before 100 Hz, have no warning."""
+
+    def notes(every: int, means: bool = False, **comments: str) -> list[str]:
+        return load(TUMBLE).read_measured(logged(run, tmp_path / "log.csv", every, means, **comments), {}).run.notes
+
+    (said,) = notes(200)
+    assert "current may be aliased: their spectrum is flat to half the sampling rate of 5 Hz" in said
+    assert "'# samples = means'" in said and "low-pass" not in said
+    (said,) = notes(200, bandwidth="14Hz")
+    assert "Point samples of current at 5 Hz alias: the signal reaches to 14 Hz, and what is above 2.5 Hz folds" in said
+    assert "take 28 Hz or more, or put a low-pass filter below 2.5 Hz before the meter" in said
+    assert notes(200, means=True, samples="means") == notes(200, bandwidth="2Hz") == notes(5) == []
+    meta: dict[str, str] = {}
+    for line in lab_record.SERIES.splitlines():
+        csv_reader._comment(line, meta)
+    assert not {"samples", "bandwidth", "window"} & set(meta)  # the words of the template state nothing
+    with pytest.raises(DataError, match="samples = integrated: must be 'means'"):
+        notes(200, samples="integrated")
+    scatter = [
+        float(np.median(load(TUMBLE).read_measured(logged(run, tmp_path / "log.csv", 200, m), {}).windows["std"]))
+        for m in (False, True)
+    ]
+    assert scatter[0] > 2.0 * scatter[1]
+    result = load(TUMBLE).reduce(load(TUMBLE).read_measured(logged(run, tmp_path / "log.csv", 200, False), {}))
+    assert any("may be aliased" in w for w in result.warnings)

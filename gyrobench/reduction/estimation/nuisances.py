@@ -107,8 +107,8 @@ def torquer(rate: Array, axis: str = "") -> list[Candidate]:
     """Return what a torquer may do to a rebalance test: rate = k i (n,), as the model has it, rad/s.
 
     A torquer whose scale factor is k (1 + a) for positive and k (1 - a) for negative currents leaves a |k i| in the
-    drift omega_IA - k i, one whose scale factor is k (1 + d) leaves d k i.  Of k i the fitted one is taken: the noise of
-    the measured one is in the drift too.  A window in which the current changes its sign counts with its mean.
+    drift omega_IA - k i, one whose scale factor is k (1 + d) leaves d k i.  Of k i the fitted one is taken: the noise
+    of the measured one is in the drift too.  A window in which the current changes its sign counts with its mean.
     Small currents determine them less well than torquers are sound; weighed all the same, they would only widen the
     intervals.  Then u_nonlinearity and u_scale_factor state them.
     axis: about which the torquer acts, where there are two.

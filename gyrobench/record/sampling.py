@@ -1,0 +1,93 @@
+"""Samples of a current that a fast loop moves: whether noise beyond half the sampling rate may have folded into them.
+
+Point samples of such a current are independent of one another: their spectrum is flat to half the sampling rate.  Means
+between two samples, or samples behind a low-pass filter, fall off before it or are of opposite sign in turn.  The ratio
+
+    E (x[k+2] - x[k])^2 / E (x[k+1] - x[k])^2      1: independent;  4: a slope;  2/3: differences of independent readings
+
+hardly depends on a slow change of the signal.  Means of white noise are independent too: what the samples are must be
+stated, this says only that they may be the wrong ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+
+Array = NDArray[np.float64]
+LEAST = 200  # samples, below which nothing is said
+FLAT = 0.1  # from 1, of the ratio
+
+
+@dataclass
+class Successive:
+    """Sums over successive samples."""
+
+    count: int = 0
+    first: float = 0.0  # of squares of differences of neighbours
+    second: float = 0.0  # of those one apart
+
+    def add(self, x: Array) -> None:
+        """Take the samples of a stretch without gaps."""
+        if x.size > 2:
+            self.count += x.size - 2
+            self.first += float(np.sum(np.diff(x[:-1]) ** 2))
+            self.second += float(np.sum((x[2:] - x[:-2]) ** 2))
+
+    @property
+    def scatter(self) -> float:
+        """Return the standard deviation of independent samples."""
+        return math.sqrt(self.first / (2.0 * self.count)) if self.count else 0.0
+
+    @property
+    def independent(self) -> bool:
+        """Return whether the spectrum is flat to half the sampling rate; the ratio scatters by 1.6/sqrt(count)."""
+        if self.count < LEAST or not self.first:
+            return False
+        return abs(self.second / self.first - 1.0) < max(FLAT, 5.0 / math.sqrt(self.count))
+
+
+def stated(comments: Mapping[str, str]) -> tuple[str, float]:
+    """Return what a record says of its samples: "means", "points" or "", and the bandwidth of the signal, Hz (0: none).
+
+    Raises ValueError for something else.
+    """
+    kind = comments.get("samples", "")
+    if kind not in ("", "means", "points"):
+        raise ValueError(f"samples = {kind}: must be 'means' (between two samples) or 'points'")
+    try:
+        bandwidth = units.parse_quantity(comments["bandwidth"], "Hz") if "bandwidth" in comments else 0.0
+    except units.UnitError as error:
+        raise ValueError(f"bandwidth = {comments['bandwidth']}: {error}") from None
+    return kind, bandwidth
+
+
+def warning(signal: str, unit: str, step: float, seen: Successive, kind: str, bandwidth: float) -> str:
+    """Return the warning of samples at this step (s) that may be aliased; "" where they are not."""
+    if kind == "means" or not step:
+        return ""
+    rate, scatter = 1.0 / step, seen.scatter / units.factor(unit)
+    size = f"The samples scatter by {scatter:.2g} {units.display(unit)}, independent of one another."
+    consequence = "a window is then noisier than a mean would be, and what is periodic may fold to a constant error."
+    remedy = "Log the mean between two samples (an integrating meter; '# samples = means')"
+    if bandwidth:
+        if rate >= 2.0 * bandwidth:
+            return ""
+        return (
+            f"Point samples of {signal} at {rate:.3g} Hz alias: the signal reaches to {bandwidth:.3g} Hz, and what is "
+            f"above {rate / 2.0:.3g} Hz folds into the windows; {consequence} {remedy}, take {2.0 * bandwidth:.3g} Hz "
+            f"or more, or put a low-pass filter below {rate / 2.0:.3g} Hz before the meter."
+        )
+    if not seen.independent:
+        return ""
+    return (
+        f"Samples of {signal} may be aliased: their spectrum is flat to half the sampling rate of {rate:.3g} Hz, as "
+        f"that of point samples of a faster loop. {size} If they are points, {consequence} {remedy}, or state the "
+        "bandwidth of the loop or filter ('# bandwidth = 14Hz'): twice that is enough as a sampling rate."
+    )

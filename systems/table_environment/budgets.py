@@ -1,0 +1,132 @@
+"""Budgets of a table and its surroundings: root of squares, worst case and Monte Carlo side by side.  [ERROR-BUDGET]
+
+    lines = parse("zero 0.5arcsec uniform; tracking 1arcsec", "rad")
+    total = combine([line.size for line in lines], [line.kind for line in lines], seed)
+
+A line is a name, a size and a kind: normal (the size is the standard deviation), uniform (half width) or fixed (that
+size with either sign).  Root of squares, as in the source: of the sizes themselves, so that it overstates a uniform
+line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames, units
+
+Array = NDArray[np.float64]
+KINDS = ("normal", "uniform", "fixed")
+DRAWS = 20_000
+SMALL = math.radians(1.0)
+#: Hu 1981, section 5.8: misalignments at ten times Earth rate
+ALIGN = (
+    "table pointing 5arcsec; sensor mount 2arcsec; clamping 5arcsec; plate squareness 1arcsec; axis wobble 1arcsec; "
+    "axis squareness 1.5arcsec"
+)
+#: Hu 1981, eq. 5-61: errors of an angle that a rate is made of
+RATE_MODE = "zero 0.5arcsec; electrical 0.5arcsec; tracking 1arcsec; electronics 0.72arcsec; quantization 0.36arcsec"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a budget; size in SI."""
+
+    name: str
+    size: float
+    kind: str = "normal"
+
+
+@dataclass(frozen=True)
+class Total:
+    """rss: root of the squares of the effects of the sizes.  worst: their sum.  spread: standard deviation of the
+    draws.  within: bound of 95 % of them, from zero.
+    """
+
+    rss: float
+    worst: float
+    spread: float
+    within: float
+
+
+def parse(text: str, unit: str) -> list[Line]:
+    """Return the lines of an option value: "name 5arcsec uniform; ...".  Raises ValueError with what is wrong."""
+    lines = []
+    for entry in filter(None, (e.strip() for e in text.split(";"))):
+        words = entry.split()
+        kind = words.pop() if words[-1] in KINDS else "normal"
+        if len(words) < 2:
+            raise ValueError(f"'{entry}': name, size with unit and kind are expected, as in 'tracking 1arcsec normal'")
+        try:
+            size = units.parse_quantity(words[-1], unit)
+        except units.UnitError as error:
+            raise ValueError(f"'{entry}': {error}") from None
+        if not words[-1][-1:].isalpha():
+            raise ValueError(f"'{entry}': the size needs its unit, all lines in units of one kind")
+        if size < 0.0:
+            raise ValueError(f"'{entry}': a size is not negative")
+        lines.append(Line(" ".join(words[:-1]), size, kind))
+    if not lines:
+        raise ValueError("no lines: at least one is needed, as in 'tracking 1arcsec'")
+    return lines
+
+
+def draws(lines: Sequence[Line], seed: int, n: int = DRAWS) -> Array:
+    """Return errors (n, lines), drawn by their kinds."""
+    rng = np.random.default_rng(seed)
+
+    def one(kind: str) -> Array:
+        if kind == "normal":
+            return rng.standard_normal(n)
+        return rng.uniform(-1.0, 1.0, n) if kind == "uniform" else rng.choice([-1.0, 1.0], n)
+
+    return np.column_stack([line.size * one(line.kind) for line in lines])
+
+
+def combine(
+    lines: Sequence[Line], seed: int, effect: Callable[[Array], Array] = lambda e: np.asarray(e.sum(axis=1))
+) -> Total:
+    """Return the totals of a budget.
+
+    effect: errors (n, lines) -> error of the result (n,); without it they add up.
+    """
+    sizes = np.array([line.size for line in lines])
+    scale = np.abs(effect(np.diag(sizes)))  # each alone
+    found = effect(draws(lines, seed))
+    within = float(np.quantile(np.abs(found), 0.95))
+    return Total(float(np.sqrt(np.sum(scale**2))), float(np.sum(scale)), float(np.std(found)), within)
+
+
+def misalignment_rate(angle: Array | float, n: float, sense: int, earth_rate: float) -> Array:
+    """Return (n +- 1) W sin(angle): the rate on an input axis that leans towards the axis of a table on the pole.
+
+    n: table rate over Earth rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the
+    larger, n + 1.  Raises ValueError for an angle that is not small.  [ALIGN-ERRORS; Hu 1981, eq. 5-59]
+    """
+    if np.any(np.abs(angle) > SMALL):
+        raise ValueError(f"an angle of {math.degrees(float(np.max(np.abs(angle)))):.3g}° is not small: 1° at most")
+    return np.asarray((n + (sense or 1)) * earth_rate * np.sin(angle))
+
+
+def rotated_rate(angles: Array, n: float, sense: int, earth_rate: float) -> Array:
+    """Return the rate (draws,) on an input axis that each line leans on towards the table axis, by rotations.
+
+    angles (draws, lines).  All lean about the same axis, the worst that a stack of parts can do.
+    """
+    axis = np.tile([1.0, 0.0, 0.0], (len(angles), 1))
+    for j in range(angles.shape[1]):
+        turn = angles[:, j]
+        c, s = np.cos(turn), np.sin(turn)
+        axis = np.column_stack([c * axis[:, 0] - s * axis[:, 2], axis[:, 1], s * axis[:, 0] + c * axis[:, 2]])
+    return np.asarray((n + (sense or 1)) * earth_rate * axis[:, 2])
+
+
+def latitude_problems(latitude: float) -> list[str]:
+    """Return why a meridian cannot be found there."""
+    if abs(latitude) > math.radians(89.9):
+        return ["latitude: at the pole there is no meridian to align the table axis to"]
+    return frames.latitude_problems(latitude)
