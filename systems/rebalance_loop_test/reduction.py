@@ -40,11 +40,11 @@ from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 from gyrobench.system.families.table_test import FACE, ON_TABLE
 
+from .measured import REST, TURNING
 from .truth import NAMES, true_values
 
 Array = NDArray[np.float64]
 DPH, ARCSEC, MA = units.factor("deg/h"), units.factor("arcsec"), 1e-3
-REST = "hold"
 NO_QUANTUM = 1e-10  # A, below this readings are not quantized but rounded
 MEANINGS = {
     "I_0": ("bias: mean current at the reading 0", "uA"),
@@ -257,7 +257,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     """Return the setup that a run.json describes."""
     k = run_metadata.number(run, "k", "gyro.k", "torquer scale factor")
     site = run_metadata.Site.of(run)
-    plan = run_metadata.phases(run, [FACE])
+    plan = run_metadata.phases(run, [FACE, REST, TURNING])
     largest = float(run.options["range"])
     p = run.parameters
     return Setup.of(
@@ -266,8 +266,8 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
         k=k,
         largest=largest,
         gate=float(run.options["gate"]),
-        labels={n: row.label for n, row in plan.items()},
-        rest=frozenset(n for n, row in plan.items() if row.mode == REST),
+        labels={n: row.label if row.face == FACE else f"{row.label}, phase {n}" for n, row in plan.items()},
+        rest=frozenset(n for n, row in plan.items() if row.mode == "hold"),
         full=float(p.get("rebalance.I") or p.get("rebalance.i_max") or 0.0),
         pulses=Pulses.of(run),
         truth=true_values(p, k, site.g, largest / k),

@@ -14,6 +14,8 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
+from .measured import MEASURED
+
 FLOAT = "float"  # the sampler of the float angle
 
 
@@ -50,6 +52,7 @@ class RebalanceLoopTest(RebalanceTest):
         | {"u_drift": Option(0.0, "rad/s", "standard uncertainty of the drift rate of the gyro", 0.0)}
         | type_b("scale_factor", "current", "time")
     )
+    measured_data = MEASURED
     assumed = TableTest.assumed  # errors of the pulses are what the test finds
     windows = Windows.of(ripple=f"{FLOAT}.std")
     channels = ("table.angle", *RebalanceTest.channels)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import math
 from typing import Any
 
@@ -146,3 +147,28 @@ def test_three_loops() -> None:
 def test_refuses(pwm: Session, values: dict[str, Any], message: str) -> None:
     with pytest.raises(GyrobenchError, match=message):
         pwm.run({**QUICK, **values}, 1)
+
+
+def test_measured_record(pwm: Session, command: Any, tmp_path: Any) -> None:
+    """The windows of a run as a laboratory writes them, mA and degrees: the same values and no truth."""
+    errors = {"rebalance.dI_plus": 2e-4, "rebalance.dT": [0.0, 2e-7, 1e-7]}
+    record = pwm.run({**QUICK, **errors}, 3)
+    ours = load_system(NAME).reduce(record)
+    w, plan = record.windows, {row.phase: row for row in record.run.plan}
+    lines = ["# latitude = 45.75deg", "# k = 17.2deg/h/mA", "# range = 0.95deg/s", "# gate = 0.2s", "# type_b = none"]
+    lines += [f"# phase {p} = {'rest' if row.mode == 'hold' else 'turning'}" for p, row in plan.items()]
+    lines.append("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],flagged")
+    for k in range(w["mean"].size):
+        angles = [math.degrees(w[f"angle_{e}"][k]) for e in ("start", "end")]
+        row = [int(w["phase"][k]), w["t_start"][k], w["t_end"][k], *angles, w["mean"][k] * 1e3, w["std"][k] * 1e3, 0]
+        lines.append(",".join(repr(x) if isinstance(x, int) else repr(float(x)) for x in row))
+    file = tmp_path / "loop.csv"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")
+    assert code == 0, err
+    theirs = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    found = {c["name"]: c for c in theirs["coefficients"]}
+    for name in ("I_0", "κ", "κ_2", "resolution", "noise"):
+        assert found[name]["estimate"] == pytest.approx(ours[name].estimate, rel=1e-6), name
+        assert found[name]["truth"] is None
+    assert "ripple" not in found and "dynamic range" not in found
