@@ -12,7 +12,7 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import ARCSEC, NAMES, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.result import LoopResult, Specification
@@ -22,6 +22,7 @@ from .closed import ServoLoop, loop_of, sense_torque
 ANGLE, TORQUE, COMMAND, RATE = "table.angle", "exciter.torque[1]", "exciter.command[1]", "table.omega[1]"
 ERROR = "gyro.rate_error"  # rate that the float integrates: command less table rate
 GCM = 9.80665e-5  # N.m
+WIDE = 1e-4  # m: a gap above it is rather one given in another unit
 BLOCKS = 20  # of a phase, for the uncertainty of a mean
 
 
@@ -50,6 +51,12 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     if shaper:
         _limits(found, found.open_loop("stabilizer", ERROR, COMMAND, kind="command"), loop)
     _compliance(found, loop if shaper else None)
+    wide = [n for n in ("gap", "thrust_gap") if float(p.get(f"bearing.air_{n}", 0.0)) > WIDE]
+    if wide:
+        found.warnings.append(
+            f"bearing.air_{wide[0]} = {float(p[f'bearing.air_{wide[0]}']) * 1e6:g} µm is wide for an air bearing (10 "
+            "to 25 µm). Check its unit."
+        )
     _rings(found, loop, p, shaper)
     result = found.result(
         title="Servo loop of a turntable",
@@ -153,20 +160,23 @@ def _limits(found: LoopFindings, points: list[Point], loop: ServoLoop | None) ->
     if loop is None:
         return
     limits = loop.limits()
-    lower = max((x for x in limits if x[1] < 1.0), key=lambda x: x[1], default=None)
+    rows = [r for t in found.tables if t["title"].startswith("Stability margins") for r in t["rows"]]
+    model = next((r for r in rows if r[0] == NAMES["discrete"] and r[5] is not None), None)
     values = margins.measured_values(points, found.excluded.get("stabilizer", [])) if points else {}
-    if "lower" in values and lower is not None:
+    if "lower" in values and model is not None:
         found.measure("lower limit", "share of the gain at which the loop becomes unstable", "1", *values["lower"],
-                      closed=lower[1])  # fmt: skip
-        found.measure("f_lower", "frequency at that limit", "Hz", *values["f_lower"], closed=lower[0])
-    rows = [[f, g, 20.0 * math.log10(g), float(loop.poles(1.05 * g).real.max()) > 0.0] for f, g in limits]
+                      closed=10.0 ** (model[5] / 20.0))  # fmt: skip
+        found.measure("f_lower", "frequency at that limit", "Hz", *values["f_lower"], closed=model[6])
+    rows = [
+        [f, g, 20.0 * math.log10(g), "yes" if float(loop.poles(1.05 * g).real.max()) > 0.0 else "no"] for f, g in limits
+    ]
     found.tables.append(
         {
             "title": "Gain limits of the closed form",
             "caption": f"All phase crossovers of L (python-control); phase margin {loop.phase_margin():.3g}° at "
             f"{loop.w_c / (2.0 * math.pi):.4g} Hz. A loop with a factor below 1 is conditionally stable.",
             "columns": ["phase crossover / Hz", "factor on the gain", "factor / dB", "unstable 5 % above it"],
-            "rows": [[f, g, db, "yes" if growing else "no"] for f, g, db, growing in rows],
+            "rows": rows,
         }
     )
     if loop.network in (3, 4) and loop.w_c < 2.0 * loop.H / math.sqrt(loop.J * loop.J_g):
@@ -199,6 +209,12 @@ def _rings(found: LoopFindings, loop: ServoLoop | None, p: Mapping[str, Any], sh
     turns = found.of("command", 1, "step")
     if len(turns) != 2 or loop is None or not shaper:
         return
+    K_s, k_w = float(p.get("rings.ring_K_s", math.inf)), float(p.get("rings.ring_k_w", 0.0))
+    if p.get("rings.ring_follower") and K_s < 9.0 * k_w:
+        found.warnings.append(
+            f"The follower is soft: K_s = {K_s:g} N·m/rad is below 9 k_w = {9.0 * k_w:g}, so more than a tenth of the "
+            "friction of the slip rings reaches the table. Raise rings.ring_K_s or take softer leads."
+        )
     torques = [_motor(g, loop) for g in turns]
     value = 0.5 * (torques[1][0] - torques[0][0])
     u = 0.5 * math.hypot(torques[0][1], torques[1][1])

@@ -23,7 +23,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200, help="runs of the stabilizer")
     parser.add_argument("--draws", type=int, default=1000, help="draws of measured margins")
+    parser.add_argument("--table", type=int, default=0, help="runs of the servo loop of a table, these alone")
     given = parser.parse_args()
+    if given.table:
+        import test_table_servo_loop
+
+        for name, (inside, n) in test_table_servo_loop.covered(given.table).items():
+            print(f"{'table_servo_loop':24s} {name:12s} {inside / n:.3f} of {n}")
+        return
     for title, counted, n in (
         ("stabilizer_power_2dof", test_stabilizer_power_2dof.covered, given.runs),
         ("measured margins, 2 u", test_margins.covered, given.draws),

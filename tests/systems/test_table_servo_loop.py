@@ -1,5 +1,6 @@
 """Servo loop of a table: closed forms and their figures, and what a run measures of a loop drawn at random."""
 
+import copy
 import importlib
 import math
 
@@ -86,16 +87,37 @@ def test_static_angle():
 
 
 # -------------------------------------------------------------------------------------------------- runs
-@pytest.fixture(scope="module")
-def drawn():
-    """A loop drawn at random, with the noise of the standard gyro."""
-    rng = np.random.default_rng(11)
-    values = {
+def draw(seed):
+    """Return options of a loop drawn at random: inertia, crossover, gyro, leads of the rings."""
+    rng = np.random.default_rng(seed)
+    return {
         "J": float(rng.uniform(1.5, 4.0)),
         "crossover": float(rng.uniform(40.0, 60.0)),
         "gyro.H": float(rng.uniform(0.1, 0.3)),
         "rings.ring_k_w": float(rng.uniform(20.0, 60.0)),
     }
+
+
+def covered(runs: int) -> dict[str, tuple[int, int]]:
+    """Return how many of the 95 % intervals hold the true value, and how many values there are, by name.
+
+    Loops drawn at random, with the noise of the standard gyro.  Without the effect of the communication step: the
+    truth of crossover, margin, limits and compliance is that of the model with step and delays or, for limits, moves
+    by less than their u.
+    """
+    counts: dict[str, tuple[int, int]] = {}
+    for k in range(runs):
+        for c in gb.load(NAME, **draw(1000 + k)).run(seed=k + 1, check_step=False).result.coefficients:
+            if c.closed is not None and not c.no_value:
+                inside, n = counts.get(c.name, (0, 0))
+                counts[c.name] = inside + (c.interval[0] <= c.closed <= c.interval[1]), n + 1
+    return counts
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """A loop drawn at random, with the noise of the standard gyro."""
+    values = draw(11)
     return gb.load(NAME, **values).run(seed=5, check_step=False), values
 
 
@@ -108,6 +130,19 @@ def test_run_recovers_the_loop(drawn):
         assert abs(c.estimate - c.closed) < 3.0 * c.u + 1e-3 * abs(c.closed), name
     assert by_name["K_T"].u < 0.03 * by_name["K_T"].estimate
     assert any("conditionally stable" in w for w in run.result.warnings)
+
+
+def test_warnings_of_loads_and_of_a_low_crossover(drawn):
+    """K_s below 9 k_w; a gap of 0.2 mm; an undamped gyro whose crossover is below 2 w_gr: said in the report."""
+    run, values = drawn
+    record = copy.deepcopy(run.record)
+    soft = [w for w in run.result.warnings if "follower is soft" in w]
+    assert bool(soft) == (9.0 * values["rings.ring_k_w"] > 300.0)
+    p = record.run.parameters
+    p |= {"rings.ring_K_s": 100.0, "bearing.air_gap": 2e-4, "table.network": 3, "table.crossover": 10.0, "gyro.J": 2e-5}
+    warnings = load_system(NAME).reduce(record).warnings
+    for text in ("follower is soft: K_s = 100", "bearing.air_gap = 200 µm is wide", "below twice the resonance"):
+        assert any(text in w for w in warnings), text
 
 
 def test_linear_model_of_the_run(drawn):
