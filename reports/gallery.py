@@ -25,6 +25,7 @@ SHOWN = {
     "stabilizer_floated_2dof": "open loop",
     "stabilizer_power_2dof": "open loop",
     "table_environment": "Recorded channels",
+    "table_supervision": "Recorded channels",
     "table_rate_test": "largest change of rate",
 }
 
