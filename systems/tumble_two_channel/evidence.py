@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
-from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.linear_fit import Findings, Group
@@ -73,15 +73,19 @@ def left_out(
     ]
 
 
-def own_sources(c: str) -> tuple[str, str, str, str]:
-    """Scale factor and nonlinearity of the torquer that measures a channel, zero and resolution of its current."""
+def own_sources(c: str) -> tuple[str, ...]:
+    """Scale factor and nonlinearity of the torquer that measures a channel, zero and resolution of its current, pulses
+    of its loop.
+    """
     torquer, meter = f"of the torquer about {OTHER[c]}", f"of the {OTHER[c]} current meter"
-    return f"scale factor {torquer}", f"nonlinearity {torquer}", f"zero {meter}", f"resolution {meter}"
+    own = (f"scale factor {torquer}", f"nonlinearity {torquer}", f"zero {meter}", f"resolution {meter}")
+    return (*own, *pulses.sources(OTHER[c]))
 
 
 def effects(
-    s: TwoChannelSetup, c: str, found: Findings, turning: window_regressors.Turning, current: Array
+    s: TwoChannelSetup, c: str, found: Findings, turning: window_regressors.Turning, readings: pulses.Windows
 ) -> list[Effect]:
+    current, counted = readings.mean, s.pulses.get(OTHER[c])
     axis = geometry.AXIS[c]
     X, rate = found.X, window_regressors.axis_rate(turning, s.base, s.latitude, s.earth_rate, axis)
 
@@ -111,7 +115,7 @@ def effects(
     k, full = s.k[OTHER[c]], float(np.max(np.abs(current))) or 1.0
     quantum = s.quantum.get(OTHER[c], 0.0)
     one = np.ones_like(current)
-    scale_factor, nonlinearity, zero, resolution = own_sources(c)
+    scale_factor, nonlinearity, zero, resolution, *_ = own_sources(c)
     return [
         Effect("table axis off the pole, about east", s.u_axis, "rad", tilted(s.base[0])),
         Effect("table axis off the pole, about p × east", s.u_axis, "rad", tilted(s.base[1])),
@@ -135,4 +139,5 @@ def effects(
             resolution, quantum / 12.0**0.5, "A", found.error(-k * one),
             "as if never dithered",
         ),
+        *(counted.effects(found, k, readings, s.u_pulse, s.u_switching, OTHER[c]) if counted else ()),
     ]  # fmt: skip

@@ -23,6 +23,7 @@ from gyrobench import drift, frames, units
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift.pulses import Windows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
@@ -96,8 +97,10 @@ def _channel(
         evidence.groups(s, c, phase, turning, X), "drift rate", "°/h", DPH,
         candidates=_candidates(s, c, phase, turning, windows, nuisances.fitted(y + s.k[OTHER[c]] * current, X, y)),
     )  # fmt: skip
+    spread = np.asarray(windows.get(f"std_{OTHER[c]}", np.zeros_like(current)), dtype=float)
+    readings = Windows(current, spread, turning.t_end - turning.t_start)
     other = evidence.own_sources(OTHER[c])
-    found = corrected(found, lambda f: evidence.effects(s, c, f, turning, current), s.corrections, other)
+    found = corrected(found, lambda f: evidence.effects(s, c, f, turning, readings), s.corrections, other)
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
     if s.model == "nine" and s.fold:
@@ -123,7 +126,7 @@ def _channel(
         ],
         equation=_equation(c, names),
         conventions=_conventions(s),
-        effects=[*evidence.effects(s, c, found, turning, current), *remounts(found, s.remount)],
+        effects=[*evidence.effects(s, c, found, turning, readings), *remounts(found, s.remount)],
         **s.reported(),
         no_closed=why,
         closed_caption="From the same windows; the formulas weigh all windows of a mount alike",

@@ -12,6 +12,7 @@ from gyrobench import drift
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata, setups
 from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.result import Specification
 
 from . import geometry
@@ -24,12 +25,15 @@ OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about
 class TwoChannelSetup(setups.TumbleSetup):
     """k: scale factors of the torquers about x and y, rad/s/A.  model: simple or nine.  fold: Dx_yy and Dy_xx may be
     there and are folded into others.  tilt: those of the measuring axes towards the spin axis.
-    quantum: resolution of each current reading.
+    quantum: resolution of each current reading.  pulses: of pulse-width rebalances, by the torquer's axis.
     """
 
     k: Mapping[str, float]
     model: str = "nine"
     quantum: Mapping[str, float] = field(default_factory=dict)
+    pulses: Mapping[str, Pulses | None] = field(default_factory=dict)
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
 
     def names(self, channel: str) -> tuple[str, ...]:
         """The unknowns of a channel."""
@@ -61,4 +65,5 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Tw
         model=model,
         truth=run_metadata.truth_of(run, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
         quantum={a: float(run.parameters.get(f"rebalance_{a}.resolution", 0.0)) for a in "xy"},
+        pulses={a: Pulses.of(run, f"rebalance_{a}") for a in "xy"},
     )

@@ -134,3 +134,15 @@ def test_eight_positions() -> None:
     moved, said, u = shifts("eight_position", parts, values, errors)
     assert moved.size >= 10 and np.sum(np.abs(said) > u) >= 2
     assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)
+
+
+def test_two_channels() -> None:
+    """The loop of the torquer about x shifts the y channel, that about y the x channel.  Without nuisances, whose
+    weights change with the data.
+    """
+    values = {**SHORT, "nuisances": "none", **{f"rebalance_{c}.f_q": 1e7 for c in "xy"}}
+    parts = {"rebalance_x": "rebalance_pwm", "rebalance_y": "rebalance_pwm"}
+    errors = {"rebalance_x.dI_plus": 1e-4, "rebalance_y.dT": [-1e-7, 2e-5, 0.0]}
+    moved, said, u = shifts("tumble_two_channel", parts, values, errors)
+    assert moved.size == 18 and np.sum(np.abs(said) > u) >= 4
+    assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)
