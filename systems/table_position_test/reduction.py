@@ -32,6 +32,7 @@ from gyrobench.result import Coefficient, LoopResult, Series, Specification
 Array = NDArray[np.float64]
 ARCSEC = math.pi / 648000.0
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
+HEADS = ("reader", "reader_2")
 NEEDED = ("level_x", "level_y", "tracking", "second")
 
 
@@ -51,6 +52,7 @@ class Readings:
     faces: int
     head: float
     orders: int
+    rounding: float  # variance of the difference of two counted readings, rad2
 
     @property
     def face(self) -> NDArray[np.int64]:
@@ -128,16 +130,19 @@ def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
     return Readings(
         theta, np.array(mounts)[mount], mount, sense, w["mean"], w["level_x"] + 1j * w["level_y"], w["tracking"],
         within_turn(w["second"] - theta), true, int(o["positions"]), float(o["head"]),
-        int(o["orders"]),
+        int(o["orders"]), sum(float(run.parameters.get(f"{n}.quantum", 0.0)) ** 2 for n in HEADS) / 12.0,
     )  # fmt: skip
 
 
-def least_squares(X: Array, y: Array, groups: Sequence[slice], place: NDArray[np.int64], dof: float) -> Fit:
+def least_squares(
+    X: Array, y: Array, groups: Sequence[slice], place: NDArray[np.int64], dof: float, floors: Sequence[float] = ()
+) -> Fit:
     """Return the generalized least squares solution with two variances for each group of rows.
 
     Readings differ from visit to visit, and by an error that returns at each place (rounding of the counts, what the
     harmonics leave): V = s2 I + t2 (same place).  Both follow from the residuals r: their squares within and between
-    the places have expectations linear in the variances.
+    the places have expectations linear in the variances.  floors: least t2 of each group; rounding of counts distorts a
+    wave of a few counts in its own harmonics too, which the residuals do not show.
     """
     n = y.size
     parts = []  # of V, and what is squared in r to estimate them: within the places, between them
@@ -163,6 +168,9 @@ def least_squares(X: Array, y: Array, groups: Sequence[slice], place: NDArray[np
         system = np.array([[np.sum((q @ M @ p) * M) for p, _ in parts] for _, q in parts])
         squares = np.array([r @ q @ r for _, q in parts])
         least = np.where(own, 1e-9, 0.0)
+        if floors:  # of what returns at a place, or of all, where no place is visited twice
+            chosen = ~own if np.any(~own) else own
+            least[chosen] = np.maximum(least[chosen], np.array(floors) / scale)
         variances = np.maximum(np.linalg.lstsq(system, squares, rcond=None)[0] / scale, least)
     V = sum((v * p for v, (p, _) in zip(variances, parts, strict=True)), 1e-12 * np.eye(n)) * scale
     W = np.linalg.inv(V)
@@ -199,7 +207,7 @@ def position_fit(r: Readings) -> tuple[Fit, list[int]]:
             f"{r.seen.size} faces: take more positions or mounts, or fewer orders"
         )
     dof = max(2.0 * np.unique(place).size - own.shape[1] - 2.0, 3.0)  # an error that returns at a place counts once
-    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, dof), orders
+    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, dof, (0.0, r.rounding)), orders
 
 
 def level_fit(r: Readings) -> tuple[Fit, list[str]]:
@@ -260,8 +268,9 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
     if r.true is not None:
         mean = np.array([float(np.mean(r.true[r.place == x])) for x in visited])
         true = mean - np.mean(mean)
+    at_once = float(stats.t.ppf(1.0 - 0.025 / visited.size, fit.dof))  # for all positions
     add("accuracy", f"position error of the largest magnitude, at {where:g}°", at[worst],
-        _u_place(r, fit, worst, zeros), fit.k, None if true is None else true[worst])  # fmt: skip
+        _u_place(r, fit, worst, zeros), at_once, None if true is None else true[worst])  # fmt: skip
     for n in range(1, r.orders + 1):
         truth = scale_truth(p, n)
         none = "" if n in orders else f"order {n} is the same in all mounts and at both heads: take another mount"
@@ -291,6 +300,7 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         "quad L = (P_0 + T e^(-j theta) + W e^(j theta)) e^(-j b) + Z",
         conventions=[
             "Position error E: true position less commanded one, without its mean; E = Σ a_n cos nθ + b_n sin nθ.",
+            "The interval of the largest error holds for all positions at once (Bonferroni).",
             "The scale errs by −E, the same for both heads; y is corrected for the tracking error e of the counts.",
             "Wobble: tilt A cos(2θ + φ), A sin(2θ + φ) about the first and second axis of the base.",
             "Squareness: tilt of the plate against the axis, x and y as the level reads it.",
