@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 SERVO = 2.0  # phase of the plan
 LATE = 0.2  # share of the servo phase that must be at null
 SHOWN = 600  # points of a figure
+NEAR = 60.0 * ARCSEC  # from here on the angle is drawn in arcsec
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
@@ -47,10 +48,14 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     found.measure(
         "w_max", "largest rate of the table", "°/s", math.degrees(float(np.max(np.abs(rate)))), unsettled=reason
     )
+    shown = t <= (2.0 * reached if reached is not None else t[-1])
     found.responses += [
-        _figure("capture, table angle", t, np.degrees(angle), "angle from null", "°"),
-        _figure("capture, table rate", t, np.degrees(rate), "table rate", "°/s"),
+        _figure("capture, table angle", t[shown], np.degrees(angle[shown]), "angle from null", "°"),
+        _figure("capture, table rate", t[shown], np.degrees(rate[shown]), "table rate", "°/s"),
     ]
+    near = shown & (t >= t[np.argmax(np.abs(angle) < NEAR)])
+    if reached is not None and np.count_nonzero(near) > 1:
+        found.responses.append(_figure("capture, near null", t[near], angle[near] / ARCSEC, "angle near null", "″"))
     result = found.result(
         title="Capture of a servo table",
         method="Servo mode from an offset of the float, capture law and fine loop",
