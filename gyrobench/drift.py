@@ -19,6 +19,7 @@ part).
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Mapping
 
@@ -134,19 +135,23 @@ def fold_problems(true: Mapping[str, float], prefix: str = "") -> list[str]:
     ]
 
 
+@functools.cache
+def _factors(names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Return the first and the second factor of each coefficient: 0 to 2 the axes, 3 for none."""
+    axes = [[_AXES[axis] for axis in _axes(name)] + [3, 3] for name in names]
+    return [a[0] for a in axes], [a[1] for a in axes]
+
+
 def regressors(xyz: ArrayLike, names: tuple[str, ...] = NAMES) -> NDArray[np.float64]:
     """Return the rows of the design: ``xyz`` (..., 3) in multiples of g0, sign of Hu 1981 -> (..., len(names)).
 
     ``names`` of a two-degree-of-freedom gyro stand over its axes x, y, z, in both channels.
     """
     v = np.asarray(xyz, dtype=float)
-    columns = []
-    for name in names:
-        product = np.ones(v.shape[:-1])
-        for axis in _axes(name):
-            product = product * v[..., _AXES[axis]]
-        columns.append(product)
-    return np.stack(columns, axis=-1)
+    factors = np.concatenate([v, np.ones((*v.shape[:-1], 1))], axis=-1)
+    first, second = _factors(tuple(names))
+    out: NDArray[np.float64] = factors.take(first, axis=-1) * factors.take(second, axis=-1)
+    return out
 
 
 def drift(xyz: ArrayLike, coefficients: Mapping[str, float]) -> NDArray[np.float64]:

@@ -109,6 +109,12 @@ def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[An
     return np.array(sum(p.sum(axis=0) if row is None else p[row] for p in parts))
 
 
+@pytest.fixture(scope="module")
+def brief(table: Session) -> Any:
+    """The same, five hundred times as fast."""
+    return table.run({**day(500.0), **QUIET})
+
+
 @pytest.mark.parametrize(
     ("setting", "option", "source", "row"),
     [
@@ -129,30 +135,30 @@ def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[An
     ],
 )
 def test_table_effects_as_predicted(
-    table: Session, quiet: Any, setting: dict[str, float], option: str, source: str, row: Any
+    table: Session, brief: Any, setting: dict[str, float], option: str, source: str, row: Any
 ) -> None:
     """An error of 20 arcsec shifts the coefficients as the budget says before the run, with sign, to 3 % of the largest
-    shift (two hundred Earth rates make the shifts large)."""
+    shift (five hundred Earth rates make the shifts large)."""
     size = 20.0 * ARCSEC
-    plain = np.array([c.estimate for c in load_system(NAME).reduce(quiet).coefficients])
-    budget = reduced(quiet, **{option: size})
+    plain = np.array([c.estimate for c in load_system(NAME).reduce(brief).coefficients])
+    budget = reduced(brief, **{option: size})
     expected = predicted(budget, source, row)
     values = {n: v * (size if "phase" not in n else 1.0) for n, v in setting.items()}
-    shifted = load_system(NAME).reduce(table.run({**day(200.0), **QUIET, **values}))
+    shifted = load_system(NAME).reduce(table.run({**day(500.0), **QUIET, **values}))
     shift = np.array([c.estimate for c in shifted.coefficients]) - plain
     assert np.max(np.abs(expected)) > 1e-3
     assert np.max(np.abs(shift - expected)) < 0.03 * np.max(np.abs(expected))
 
 
-def test_gyro_askew_on_the_plate_as_predicted(table: Session, quiet: Any) -> None:
+def test_gyro_askew_on_the_plate_as_predicted(table: Session, brief: Any) -> None:
     """The gyro turned by 20 arcsec about each axis of the plate; about z it mixes the channels of the loops."""
     size = 20.0 * ARCSEC
-    plain = np.array([c.estimate for c in load_system(NAME).reduce(quiet).coefficients])
-    budget = reduced(quiet, u_mount=size)
+    plain = np.array([c.estimate for c in load_system(NAME).reduce(brief).coefficients])
+    budget = reduced(brief, u_mount=size)
     for k, axis in enumerate("xyz"):
         M = frames.rotation(np.eye(3)[k], size).T  # rows: the gyro's axes
         values = {f"gyro.mount[{i + 1},{j + 1}]": float(M[i, j]) for i in range(3) for j in range(3)}
-        shifted = load_system(NAME).reduce(table.run({**day(200.0), **QUIET, **values}))
+        shifted = load_system(NAME).reduce(table.run({**day(500.0), **QUIET, **values}))
         shift = np.array([c.estimate for c in shifted.coefficients]) - plain
         expected = predicted(budget, f"gyro on the plate, about {axis}")
         assert np.max(np.abs(shift - expected)) < 0.03 * np.max(np.abs(expected)), axis
