@@ -144,3 +144,8 @@ def test_every_symbol_reads_its_own_printed_form() -> None:
         assert unit(display(name)).factor == unit(name).factor, name
     for name in ("deg/h/g2", "rad/s/sqrt(Hz)", "N.m.s/rad"):
         assert unit(display(name)).exponents == unit(name).exponents
+
+
+def test_times_and_frequencies_of_electronics() -> None:
+    assert units.parse_quantity("20ns", "s") == pytest.approx(2e-8, rel=1e-15)
+    assert units.parse_quantity("10MHz", "Hz") == 1e7 and units.parse_quantity("10mHz", "Hz") == 0.01
