@@ -48,14 +48,14 @@ class Presliding(Block):
             level = level + (self.static - self.coulomb) * exp(-q * q)
         return level / self.spring
 
-    def after(self, dx: Number, v: Number) -> Number:
-        """Return z after a turn by dx at the mean rate v."""
-        end = sign(dx) * self.limit(v)
-        return end + (self.z - end) * exp(-fabs(dx) / self.limit(v))
+    def after(self, dx: Number, limit: Number) -> Number:
+        """Return z after a turn by dx, towards the limit of its mean rate."""
+        end = sign(dx) * limit
+        return end + (self.z - end) * exp(-fabs(dx) / limit)
 
-    def torque(self, z: Number, v: Number) -> Number:
-        """Return the torque on what turns at the rate v with the deflection z."""
-        slip = v - fabs(v) * z / self.limit(v)
+    def torque(self, z: Number, v: Number, limit: Number) -> Number:
+        """Return the torque on what turns at the rate v, which has that limit, with the deflection z."""
+        slip = v - fabs(v) * z / limit
         return -(self.spring * z + self.damping * slip)
 
     def rest(self, x: Number, v: Number) -> None:
@@ -64,8 +64,9 @@ class Presliding(Block):
         self.z = 0.0
         self.ahead = 0.0
         if self.coulomb > 0.0 and v != 0.0:
-            self.z = sign(v) * self.limit(v)
-            self.ahead = self.torque(self.z, v)
+            limit = self.limit(v)
+            self.z = sign(v) * limit
+            self.ahead = self.torque(self.z, v, limit)
 
     def slide(self, x: Number, v: Number, acc: Number, per_J: Number) -> None:
         """Take the contact to the angle x and the rate v; acc without friction and 1 / inertia tell the next step."""
@@ -76,10 +77,11 @@ class Presliding(Block):
                 "0.5 sqrt(J presliding / Coulomb torque): shorten the step",
             )
             dx = x - self.x_last
-            self.z = self.after(dx, dx / self.h)
-            self.now = self.torque(self.z, v)
+            self.z = self.after(dx, self.limit(dx / self.h))
+            self.now = self.torque(self.z, v, self.limit(v))
             middle = v + 0.5 * self.h * (acc + self.now * per_J)
-            self.ahead = self.torque(self.after(0.25 * self.h * (v + middle), middle), middle)
+            limit = self.limit(middle)
+            self.ahead = self.torque(self.after(0.25 * self.h * (v + middle), limit), middle, limit)
         self.x_last = x
 
 
