@@ -37,7 +37,7 @@ class FaultMonitor(Component):
     n = Parameter(8, int, "scalars in use", min=0, max=8)
     low = Parameter([0.0] * SCALARS, "1", "lower limits of the scalars, each in its own SI unit")
     high = Parameter([1.0] * SCALARS, "1", "upper limits")
-    pulses = Parameter(True, bool, "1: there is a pulse train")
+    pulses = Parameter(False, bool, "1: there is a pulse train")
     burst = Parameter(0.06, "s", "time over which the train is sampled", above=0.0)
     frequency_low = Parameter(45.0, "Hz", "lower limit of its frequency", above=0.0)
     frequency_high = Parameter(55.0, "Hz", "upper limit", above=0.0)

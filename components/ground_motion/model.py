@@ -1,8 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Discrete, Output, Parameter, sampled
-from gyrobench.component.blocks.ground import NoisePeak
-from gyrobench.component.blocks.place import Place
+from gyrobench.component.blocks.place import NoisePeak, Place
 from gyrobench.component.math import cos, cross, fabs, pi, sin, vector
 
 LINES = 8

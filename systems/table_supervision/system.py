@@ -168,6 +168,7 @@ class TableSupervision(System):
             "faults.second": [*(float(b) for _, b in turns), *rest],
             "faults.at": [*(0.8 + 0.1 * x for x in self.instants()), *(1.0 for _ in rest)],
             "monitor.n": 4,
+            "monitor.pulses?": True,
             "monitor.low": [22.0, 273.15, 4.5e5, -1.0, 0.0, 0.0, 0.0, 0.0],
             "monitor.high": [26.0, 343.15, 7.5e5, 2.0, 1.0, 1.0, 1.0, 1.0],
             "monitor.reading": self["reading"],

@@ -14,7 +14,7 @@ from gyrobench.packaging.loading import load_part
 FaultMonitor = load_part("fault_monitor", BENCH)
 ModeSupervisor = load_part("mode_supervisor", BENCH)
 H = 5e-4
-PULSES = {"n": 0, "wave": 0.05}  # 1 % of 5 V
+PULSES = {"n": 0, "pulses": True, "wave": 0.05}  # 1 % of 5 V
 
 
 def train(t: float, frequency: float = 50.0, duty: float = 0.5, amplitude: float = 5.0) -> float:
@@ -58,7 +58,7 @@ def test_eight_cases_of_a_pulse_train_with_noise_of_one_percent(fault: dict[str,
 
 
 def test_features_of_the_train() -> None:
-    made = watched(0.5, lambda t: {"pulse": train(t, 49.0, 0.48, 4.8)}, n=0)
+    made = watched(0.5, lambda t: {"pulse": train(t, 49.0, 0.48, 4.8)}, n=0, pulses=True)
     frequency, duty, amplitude = made.get(["frequency", "duty", "amplitude"])
     assert frequency == pytest.approx(49.0, rel=H / 0.02)  # one whole period, both ends to half a sample
     assert duty == pytest.approx(0.48, abs=2 * H * 49.0)  # whole samples
@@ -67,7 +67,7 @@ def test_features_of_the_train() -> None:
 
 def test_all_scalars_within_and_the_first_of_two_outside() -> None:
     """Limits 0 to 1.  Items 7 and 3 leave at 0.25 s: 3 is named, both are counted; the excess is that of 1.3: 0.6."""
-    limits = {"pulses": False, "hold_off": 2}
+    limits = {"hold_off": 2}
 
     def signals(t: float) -> dict[str, float]:
         return {f"x[{j}]": 0.5 for j in range(1, 9)} | ({"x[7]": 1.3, "x[3]": -0.1} if t > 0.25 else {})
@@ -82,18 +82,18 @@ def test_all_scalars_within_and_the_first_of_two_outside() -> None:
 
 def test_the_alarm_stays_until_the_reset_and_a_short_fault_is_none() -> None:
     inside = {f"x[{j}]": 0.5 for j in range(1, 9)}
-    short = watched(1.0, lambda t: {**inside, "x[2]": 2.0 if 0.25 < t < 0.31 else 0.5}, pulses=False)  # one look
+    short = watched(1.0, lambda t: {**inside, "x[2]": 2.0 if 0.25 < t < 0.31 else 0.5})  # one look
     assert short.get(["alarm"]) == [0.0]
 
     def signals(t: float) -> dict[str, float]:
         return {**inside, "x[2]": 2.0 if 0.25 < t < 0.55 else 0.5, "clear": float(0.8 < t < 0.81)}
 
-    assert watched(0.78, signals, pulses=False).get(["alarm", "first", "outside"]) == [1.0, 2.0, 0.0]
-    assert watched(0.9, signals, pulses=False).get(["alarm", "first", "t_alarm"]) == [0.0, 0.0, -1.0]
+    assert watched(0.78, signals).get(["alarm", "first", "outside"]) == [1.0, 2.0, 0.0]
+    assert watched(0.9, signals).get(["alarm", "first", "t_alarm"]) == [0.0, 0.0, -1.0]
 
 
 def test_a_value_that_is_not_a_number_is_not_in_range() -> None:
-    made = watched(0.1, lambda t: {f"x[{j}]": 0.5 for j in range(1, 9)}, pulses=False)
+    made = watched(0.1, lambda t: {f"x[{j}]": 0.5 for j in range(1, 9)})
     with pytest.raises(InstanceError, match=r"x\[4\]"):
         made.set({"x[4]": math.nan})
         made.step(0.1, H)
@@ -104,9 +104,9 @@ def test_a_value_that_is_not_a_number_is_not_in_range() -> None:
     [
         ({"low[2]": 1.0}, "range 2 is inverted or empty"),
         ({"duty_low": 0.6}, "duty_low must be below duty_high"),
-        ({"burst": 0.01}, "fewer than three edges"),
-        ({"frequency_high": 200.0}, "20 samples a period are needed"),
-        ({"period": 0.04}, "too few steps for 8 scalars and a burst"),
+        ({"pulses": True, "burst": 0.01}, "fewer than three edges"),
+        ({"pulses": True, "frequency_high": 200.0}, "20 samples a period are needed"),
+        ({"pulses": True, "period": 0.04}, "too few steps for 8 scalars and a burst"),
     ],
 )
 def test_refusals(values: dict[str, float], words: str) -> None:
