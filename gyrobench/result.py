@@ -205,8 +205,9 @@ class Result(Displayed):
         return np.array([np.nan if v is None else v for v in map(NUMBERS[column], self.coefficients)], dtype=float)
 
     def covariance(self) -> np.ndarray[Any, Any]:
-        """Return the covariance of the estimates, u_i u_j r_ij, in the units of the coefficients.
+        """Return the covariance of the estimates in the units of the coefficients; its diagonal is u squared.
 
+        Type A, u_i u_j r_ij, and of each source of type B the product of what it does to both estimates.
         Raises UsageError for a result without correlations: the estimates of a loop are made one by one.
         """
         import numpy as np
@@ -215,7 +216,14 @@ class Result(Displayed):
         if not correlation:
             raise UsageError(f"{self.system}: its estimates have no correlation, each is made by itself")
         u = self.array("u")
-        return np.asarray(correlation, dtype=float) * np.outer(u, u)
+        changes = [np.asarray(b["changes"], dtype=float) for b in getattr(self, "type_b", [])]
+        if not changes or any(c.shape[1] != u.size for c in changes):
+            return np.asarray(correlation, dtype=float) * np.outer(u, u)
+        u_a = np.array([c.u if c.u_a is None else c.u_a for c in self.coefficients])
+        total = np.asarray(correlation, dtype=float) * np.outer(u_a, u_a) + sum(c.T @ c for c in changes)
+        size = np.sqrt(np.diag(total))
+        scale = np.divide(u, size, out=np.zeros_like(u), where=size > 0.0)
+        return np.asarray(total * np.outer(scale, scale))
 
     def frame(self, table: str = "coefficients") -> pandas.DataFrame:
         """Return the coefficients, or the points of all series ("series"), as a data frame.

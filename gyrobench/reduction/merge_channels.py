@@ -18,7 +18,8 @@ def merge(
     """One result of ``results`` (channel -> result, printed as "x channel: ..."), in this order.
 
     Coefficients, series, tests, budget and tables follow one another, named by channel where channels could have the
-    same name.  The estimates of different channels are taken as uncorrelated: the correlation is block-diagonal.
+    same name.  The noise of different channels is taken as uncorrelated: the correlation, of type A, is block-diagonal.
+    A type B source that channels share (an axis of the table, the mount of the gyro) is one error in all of them.
     condition: the worst; rank and dof: sums; residual_std: pooled.  Autocorrelation, Allan deviation and spectrum
     are those of the channel with the largest residuals (of those in the unit of the first); ``noise`` says which.  A
     warning or convention that all share is said once.  Title, method, site, instrument, provenance: of the first.
@@ -87,15 +88,20 @@ def _shared(labels: list[str], lists: list[list[str]]) -> list[str]:
 
 
 def _side_by_side(parts: list[DriftTestResult]) -> list[dict[str, Any]]:
-    """Type B of each channel, with zeros for the others: taken as independent from channel to channel."""
-    size, out, at = sum(len(r.coefficients) for r in parts), [], 0
+    """Type B of all channels.  A source that several channels name is one error, the same for all of them: its
+    independent parts (rows) go through all estimates; what is a channel's own has zeros for the others.
+    """
+    size, at = sum(len(r.coefficients) for r in parts), 0
+    rows: dict[str, list[list[float]]] = {}
     for r in parts:
-        n = len(r.coefficients)
         for b in r.type_b:
-            changes = [[0.0] * at + list(c) + [0.0] * (size - at - n) for c in b["changes"]]
-            out.append({"source": b["source"], "changes": changes})
-        at += n
-    return out
+            shared = rows.setdefault(b["source"], [])
+            for k, own in enumerate(b["changes"]):
+                if k == len(shared):
+                    shared.append([0.0] * size)
+                shared[k][at : at + len(own)] = own
+        at += len(r.coefficients)
+    return [{"source": source, "changes": changes} for source, changes in rows.items()]
 
 
 def _block(blocks: list[list[list[float]]]) -> list[list[float]]:

@@ -131,6 +131,28 @@ def test_merge_of_two_channels() -> None:
         merge({"x": parts["x channel"], "z": replace(parts["x channel"])})
 
 
+def test_an_error_that_channels_share_is_one() -> None:
+    """The axis moves a_x by 0.3 and a_y by -0.4 together; each meter its own channel.  By hand: cov(a_x, a_y) = -0.12,
+    so that u(0.8 a_x + 0.6 a_y) has nothing of the axis in it."""
+    x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
+
+    def effects(found: Findings, size: float, own: str) -> list[Effect]:
+        return [Effect("axis", 1.0, "1", size * found.error(DPH)), Effect(own, 0.1, "1", found.error(DPH))]
+
+    parts = {"x channel": result(x, effects=effects(x, 0.3, "meter x")),
+             "y channel": result(y, effects=effects(y, -0.4, "meter y"))}  # fmt: skip
+    r = merge(parts)
+    assert [b["source"] for b in r.type_b] == ["axis", "meter x", "meter y"]
+    (axis,) = r.type_b[0]["changes"]
+    assert axis == pytest.approx([0.3, 0.0, -0.4, 0.0], abs=1e-12)
+    covariance = r.covariance()
+    assert covariance[0, 2] == pytest.approx(-0.12, rel=1e-9) and covariance[1, 3] == pytest.approx(0.0, abs=1e-15)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(r.array("u"))
+    c = np.array([0.8, 0.0, 0.6, 0.0])
+    own = 0.64 * ((r["a_x"].u_a or 0.0) ** 2 + 0.01) + 0.36 * ((r["a_y"].u_a or 0.0) ** 2 + 0.01)
+    assert c @ covariance @ c == pytest.approx(own, rel=1e-6)
+
+
 def test_derived_quantities() -> None:
     """c = b/a of a = 2, b = 6 uncorrelated: u(c)^2 = u(b)^2/a^2 + (b/a^2)^2 u(a)^2, by hand; t interval kept."""
     x = np.linspace(-1.0, 1.0, 21)
