@@ -176,11 +176,12 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
 USUAL = ("deg/h", "deg/s", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/h/K")
 
 
-def fitting(name: str) -> list[str]:
+@lru_cache(maxsize=1024)
+def fitting(name: str) -> tuple[str, ...]:
     """Units of the same dimension as ``name``: its SI spelling, usual compounds of this trade, single symbols."""
     u = unit(name)
     compounds = [s for s in USUAL if unit(s).exponents == u.exponents]
-    return [u.dimension, *compounds, *(s for s, (_, p) in _TABLE.items() if p == u.exponents and s != u.dimension)]
+    return (u.dimension, *compounds, *(s for s, (_, p) in _TABLE.items() if p == u.exponents and s != u.dimension))
 
 
 def same_dimension(a: str, b: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.metadata
 import os
@@ -31,8 +32,9 @@ def _guid(digest: str) -> str:
     return "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]))
 
 
+@functools.cache
 def _tool_text() -> str:
-    """Return all files whose text determines what a build writes."""
+    """Return all files whose text determines what a build writes; they stay as they are while the process runs."""
     here = Path(__file__).parent
     after = ("__init__", "instance", "reference", "validate")  # these run what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
