@@ -127,6 +127,8 @@ class System(Configurable):
     shown: ClassVar[Iterable[str]] = ()
     channel_period: float = 1.0  # s
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
+    #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
+    closed_loop: ClassVar[bool] = False
     reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read

@@ -101,7 +101,8 @@ def execute_run(
             if not system.has_reduction:
                 return RunOutcome(record, folder=folder)
             check: dict[str, Any] = {}
-            wanted = bool(system.loops) if request.check_step is None else request.check_step
+            by_default = bool(system.loops) or system.closed_loop
+            wanted = by_default if request.check_step is None else request.check_step
             if wanted and record.complete:
                 try:
                     check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)

@@ -43,11 +43,12 @@ def from_record(record: Record, specification: Specification | None = None) -> L
                   no_value="" if switched is not None else "the fine loop is not closed")  # fmt: skip
     found.measure("t_null", f"time to null, within {null / ARCSEC:.3g}″", "s", reached, u,
                   limits={"t_null": (None, limit)}, unsettled=reason)  # fmt: skip
-    past = float(np.max(-angle * np.sign(angle[0])))
-    found.measure("overshoot", "largest table angle beyond null", "″", max(0.0, past) / ARCSEC, unsettled=reason)
-    found.measure(
-        "w_max", "largest rate of the table", "°/s", math.degrees(float(np.max(np.abs(rate)))), unsettled=reason
-    )
+    past, u_past = _peak(-angle * np.sign(angle[0]))
+    found.measure("overshoot", "largest table angle beyond null", "″", max(0.0, past) / ARCSEC, u_past / ARCSEC,
+                  unsettled=reason)  # fmt: skip
+    fastest, u_fastest = _peak(np.abs(rate))
+    found.measure("w_max", "largest rate of the table", "°/s", math.degrees(fastest), math.degrees(u_fastest),
+                  unsettled=reason)  # fmt: skip
     shown = t <= (2.0 * reached if reached is not None else t[-1])
     found.responses += [
         _figure("capture, table angle", t[shown], np.degrees(angle[shown]), "angle from null", "°"),
@@ -63,7 +64,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         equation='M = "clip"(-k_p u, plus.minus k_d v_"lim") - k_d w',
         conventions=[
             "Angles are those of the table against the gyro, the float angle times C/H. Time counts from servo mode "
-            "on. The figures are of this run; u: sampling of the record.",
+            "on. The figures are of this run; u: sampling of the record and communication step.",
             f"Requirement: null within {limit:g} s, and there to stay.",
         ],
         specification=specification,
@@ -74,6 +75,15 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         "On the way the rate reaches {w_max}; it overshoots by {overshoot}.",
     )  # fmt: skip
     return result
+
+
+def _peak(y: Array) -> tuple[float, float]:
+    """Return the largest sample and its u: between samples near it, a plateau and its ends included, a parabola through
+    three neighbours is higher by at most an eighth of their second difference.
+    """
+    top = float(np.max(y))
+    bend = np.abs(np.diff(y, 2))[y[1:-1] > 0.99 * top]
+    return top, float(np.max(bend, initial=0.0)) / 8.0 / math.sqrt(3.0)
 
 
 def _unsettled(t: Array, angle: Array, fine: NDArray[np.bool_], limited: NDArray[np.bool_], null: float) -> str:

@@ -57,7 +57,8 @@ class TableCapture(System):
     }  # fmt: skip
     noises = (*SDF_NOISES, "table.rumble")
     done = "sequencer.done"
-    step = 5e-4
+    closed_loop = True
+    step = 1e-4
     channel_period = 1e-3
     channels = (
         "sequencer.phase", "sequencer.gate", "table.angle", "table.omega[1]", "table.in_position", "table.saturated",

@@ -89,3 +89,13 @@ def test_limit_of_the_requirement_is_judged():
 def test_what_is_refused(values, text):
     with pytest.raises(gb.GyrobenchError, match=text):
         gb.load(NAME, **values).run()
+
+
+def test_the_step_is_in_u(tmp_path):
+    """At 0.5 ms the fine loop is closed 0.04 s late, by far more than the sampling of the record: u says so."""
+    runs = [gb.load(NAME).run(seed=1, step=h, out=tmp_path / str(k)).result for k, h in enumerate((5e-4, 1e-4))]
+    coarse, fine = ({c.name: c for c in r.coefficients} for r in runs)
+    for name in ("t_fine", "overshoot"):
+        off = abs(coarse[name].estimate - fine[name].estimate)
+        assert off > 10.0 * fine[name].u and off < 2.5 * coarse[name].u, name
+    assert any("communication step of 0.5 ms" in w for w in runs[0].warnings)
