@@ -132,6 +132,12 @@ def pulses(rng: Rng) -> Values:
             "rebalance.dT": late.tolist()}  # fmt: skip
 
 
+def exposed(rng: Rng) -> Values:
+    """A gyro with sensitivities of either sign, up to twice those of the test sensor of Hu 1981."""
+    sizes = {"D_T": 0.02, "D_TO": 0.05, "D_B[1]": 12.0}
+    return {**floated(rng), **{f"gyro.{n}": rng.uniform(-1.0, 1.0) * v * DPH for n, v in sizes.items()}}
+
+
 # ---------------------------------------------------------------------------------------------- noise of the parts
 def of_gyro(n: Noise, _: Values, size: float = 0.02 * DPH) -> Values:
     return {"gyro.white": n.white(size), "gyro.markov": n.markov(size), "gyro.markov_tau": n.tau, "gyro.pickoff": 5e-9}
@@ -205,6 +211,10 @@ CASES = {
     "eight_position": Case(
         "eight_position", {"dwell": 1.5, "settle": 1.5, "readings": 2}, lambda rng: two_channels(rng, 10),
         latitude(0.0, 70.0), of_two_channels,
+    ),
+    "table_environment": Case(
+        "table_environment", {"dwell": 225.0, "readings": 90, "tilting": 100.0 * ARCSEC, "settle": 2.0}, exposed,
+        latitude(0.0, 70.0),
     ),
     "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
     "open_loop_drift": Case(

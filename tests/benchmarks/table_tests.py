@@ -57,21 +57,7 @@ def position_test(seed: int) -> gb.Run:
     return test.run(seed=seed)
 
 
-def environment(seed: int) -> gb.Run:
-    """One hour on a table of random latitude, with a gyro of random sensitivities."""
-    rng = np.random.default_rng(seed)
-    dph = math.pi / 648000
-    test = gb.load("table_environment", dwell="1h", readings=90, latitude=math.radians(rng.uniform(-70.0, 70.0)))
-    sizes = {"D_F": 0.5, "D_O": 0.5, "D_I": 2.0, "D_S": 2.0, "D_T": 0.02, "D_TO": 0.03, "B": 10.0}
-    for name, size in sizes.items():
-        test.set("gyro.D_B[1]" if name == "B" else f"gyro.{name}", rng.uniform(-2.0, 2.0) * size * dph)
-    test.set("gyro.markov_tau", 10 ** rng.uniform(1.8, 3.0))
-    test.set("gyro.markov", 0.002 * dph * 10 ** rng.uniform(-0.5, 0.3))
-    return test.run(seed=seed, step=5e-3)
-
-
 TESTS = {
-    "table_environment": environment,
     "table_rate_test": rate_test,
     "table_position_test": position_test,
 }

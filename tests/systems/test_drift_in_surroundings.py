@@ -16,6 +16,7 @@ from gyrobench.packaging import build
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult
 from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import load_system
 
 PER_KELVIN = 0.2 * DPH  # rad/s/K
@@ -123,3 +124,15 @@ def test_a_gyro_on_tilting_ground_reads_the_rate_of_the_tilt() -> None:
     with Session(system, {"site": build("ground_motion")}) as session:
         found = [system.reduce(session.run({**options, **v}, seed=1)).coefficients[0] for v in ({}, tilting)]
     assert found[1].estimate - found[0].estimate == pytest.approx(-100.0 / 3600.0, abs=1e-4)
+
+
+def test_a_suite_hands_the_surroundings_to_its_tests() -> None:
+    suite = load_test("drift_test_suite")
+    assert isinstance(suite, Suite)
+    suite.set("tests", "tumble_single_axis fixed_position")
+    suite.set("surroundings.ramp", "1K/h")
+    suite.set("fixed_position.surroundings.tau", "600s")
+    members = suite.members()
+    assert all("surroundings" in member.slots for member in members.values())
+    assert "surroundings.tau" not in members["tumble_single_axis"].overrides
+    assert list(suite.swaps(members, {"surroundings": "vendor.fmu"})["fixed_position"]) == ["surroundings"]
