@@ -32,6 +32,7 @@ from gyrobench.result import Coefficient, LoopResult, Series, Specification
 Array = NDArray[np.float64]
 ARCSEC = math.pi / 648000.0
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
+JITTER = 0.04  # of the variance of a rounding is left where the loop moves the table by a count while it is read
 HEADS = ("reader", "reader_2")
 NEEDED = ("level_x", "level_y", "tracking", "second")
 
@@ -130,7 +131,8 @@ def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
     return Readings(
         theta, np.array(mounts)[mount], mount, sense, w["mean"], w["level_x"] + 1j * w["level_y"], w["tracking"],
         within_turn(w["second"] - theta), true, int(o["positions"]), float(o["head"]),
-        int(o["orders"]), sum(float(run.parameters.get(f"{n}.quantum", 0.0)) ** 2 for n in HEADS) / 12.0,
+        int(o["orders"]), sum(float(run.parameters.get(f"{n}.quantum", 0.0)) ** 2 for n in HEADS)
+        * JITTER / 12.0,
     )  # fmt: skip
 
 

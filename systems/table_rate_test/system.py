@@ -147,7 +147,20 @@ class TableRateTest(System):
         return found
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """Unstable loops, and rates below the range of a tachometer loop."""
+        """Unstable loops, rates that the command cannot set, rates below the range of a tachometer loop."""
+        step = float(parameters.get("command.reference_rate_step", 0.0))
+        latitude = float(parameters.get("command.reference_latitude", 0.0))
+        exact = (abs(ERU * math.sin(latitude)), ERU * math.cos(latitude))
+        odd = [
+            f"{r / ERU:g}"
+            for r in self.rates()[::2]
+            if step > 0.0 and abs(r / step - round(r / step)) > 1e-6 and min(abs(r - x) for x in exact) > 1e-9 * ERU
+        ]
+        if odd:
+            return [
+                f"rates = {', '.join(odd)}: the command sets steps of {step / ERU:.4g} ERU and would round them; give "
+                "multiples of it, or command.reference_rate_step = 0"
+            ]
         loop = SampledLoop.of(parameters, self.step)
         if loop is not None and loop.radius() >= 1.0:
             return [

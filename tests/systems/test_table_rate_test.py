@@ -136,6 +136,7 @@ def test_scale_error_between_two_readings() -> None:
         ({"rates": "2000"}, "0.01 to 1999.9 ERU"),
         ({"rates": "1, fast"}, "numbers in ERU"),
         ({"rates": " ".join(["1"] * 50)}, "1 to 49 rates"),
+        ({"rates": "1 15.041"}, "15.041: the command sets steps of 0.01 ERU"),
         ({"pole": "0"}, "the loop is unstable"),
         ({"command.reference_acceleration": "1.6"}, "saturates the motor at a change of rate"),
     ],
