@@ -2,7 +2,8 @@
 
 The tests count the same on fewer runs: tests/systems/test_stabilizer_power_2dof.py (stiffness, platform angle and drift
 of a power gyro stabilizer), tests/reduction/test_margins.py (measured margins under noise) and
-tests/systems/test_angle_system.py (harmonics, lags and clocks of an angle reading system).
+tests/systems/test_angle_system.py (harmonics, lags and clocks of an angle reading system).  With ``--table 60`` the
+measures of tests/systems/test_table_servo_loop.py are counted instead, 4 s a run.
 """
 
 from __future__ import annotations
