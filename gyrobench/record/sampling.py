@@ -3,7 +3,7 @@
 Point samples of such a current are independent of one another: their spectrum is flat to half the sampling rate.  Means
 between two samples, or samples behind a low-pass filter, fall off before it or are of opposite sign in turn.  The ratio
 
-    E (x[k+2] - x[k])^2 / E (x[k+1] - x[k])^2      1: independent;  4: a slope;  2/3: differences of independent readings
+    E (x[k+2] - x[k])^2 / E (x[k+1] - x[k])^2    1: independent;  4: a slope;  2/3: differences of independent readings
 
 hardly depends on a slow change of the signal.  Means of white noise are independent too: what the samples are must be
 stated, this says only that they may be the wrong ones.
