@@ -155,7 +155,7 @@ def _ride(found: LoopFindings, shares: Shares) -> str:
     if not math.isfinite(taken.value):
         return ""
     by = _by(shares, gate.label)
-    cause = f"; the largest part comes {by}" if by else ""
+    cause = f", carried over {by}" if by else ""
     return f"In the ride the base's motion reaches the platform smaller by {{-ride}}{cause}."
 
 

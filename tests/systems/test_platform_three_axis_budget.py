@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gyrobench.engine.session import run
@@ -95,3 +97,23 @@ def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float
         squares.append(rows["drift", "measured"][0] ** 2)
     assert rows["drift", source][0] == pytest.approx((sum(squares) / seeds) ** 0.5, rel=scatter)
     assert rows["drift", source][1] == pytest.approx(100.0)
+
+
+def test_budget_of_a_recorded_ride(tmp_path: Path) -> None:
+    """Three sines an axis that do not close, with dry friction: computed for Hann's window, as measured."""
+    t = np.arange(0.0, 31.0, 0.25)
+    rng = np.random.default_rng(3)
+
+    def wave(f: float) -> np.ndarray:
+        parts = [1.5 / k * np.sin(2.0 * np.pi * f * k * t + rng.uniform(0.0, 6.0)) for k in (1.0, 1.7, 2.3)]
+        return np.asarray(np.sum(parts, axis=0) * np.clip(t / 5.0, 0.0, 1.0))
+
+    file = tmp_path / "ride.csv"
+    columns = np.column_stack([t, wave(0.13), 2.0 * wave(0.11), wave(0.07)])
+    np.savetxt(file, columns, delimiter=",", header="time [s],pitch [deg],roll [deg],heading [deg]", comments="")
+    system = load_system("platform_three_axis")
+    result = system.reduce(run(system, values={**IDEAL, **DRY, "profile": str(file), "hold": "25s"}, seed=1))
+    rows = next(t for t in result.tables if t["title"].startswith("Error budget"))["rows"]
+    angle = {r[1]: r[2] for r in rows if r[0] == "ride"}
+    assert angle["together"] == pytest.approx(angle["measured"], rel=0.02)
+    assert rows[0][1] == "dry friction" and any("carried over by dry friction (" in s for s in result.summary)

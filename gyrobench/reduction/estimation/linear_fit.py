@@ -447,7 +447,7 @@ class Findings:
         self.tests.append(Test(name, float(f[0]), probability, what, bad if probability < 0.05 else good))
         back = turned[there].T / s[there] / size[:, None]
         covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
-        return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.diag(covariance))
+        return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def _whitened_moments(self, columns: Array) -> tuple[Array, Array, Array]:
         """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
