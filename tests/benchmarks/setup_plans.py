@@ -1,4 +1,4 @@
-"""Default plans of the polar servo test, of the eight positions and of tests in one attitude for setup_effects.py.
+"""Default plans of the servo tests, of the eight positions and of tests in one attitude for setup_effects.py.
 
 Windows in deg/h, from the equations, with what a misalignment of the input axis does to them, and the candidates of
 their reductions.
@@ -68,6 +68,60 @@ def servo_polar() -> Plan:
     return Plan(start, start + 600.0, np.array(rows), drift.terms(9), column, number, found, True)
 
 
+def servo_vertical_level() -> Plan:
+    """Twice six attitudes of 10 windows of 60 s: input axis down, up, and east with y up, y down, z up, z down."""
+    E, N, U = frames.E, frames.N, frames.U
+    attitudes = [(-U, E), (U, E), (E, U), (E, -U), (E, -N), (E, N)] * 2
+    gyro = np.repeat([[x, y, np.cross(x, y)] for x, y in attitudes], 10, axis=0)
+    phase = np.repeat(np.arange(12), 10)
+    start = 70.0 * phase + 60.0 * np.arange(120.0)
+    names = ("D_F", "D_I", "D_S", "D_O", "D_II", "D_SS")
+    X = np.array([drift.regressors(g @ -U, names) for g in gyro])
+    tilt = -EARTH * (gyro[:, 1] @ POLE) * ARCSEC
+    found = [
+        Candidate("tilt", "misalignment", "arcsec", 1.0, tilt, visible=0.1),
+        Candidate("tilt z", "misalignment", "arcsec", 1.0, -EARTH * (gyro[:, 2] @ POLE) * ARCSEC, visible=0.1),
+        nuisances.trend(start, start + 60.0),
+        nuisances.scatter("mount", nuisances.MOUNTS, phase.tolist()),
+    ]
+    return Plan(start, start + 60.0, X, names, tilt, phase, found, True)
+
+
+def servo_two_axis() -> Plan:
+    """A day in each of mounts 2 (x east, y up) and 4 (x north, y up), 144 windows of 600 s; channel x.  A gyro without
+    drift keeps x and y free of rotation by the angles x and y of the axes (Hu 1981, eq. 3-97 without drift) and rolls
+    about z.
+    """
+    E, N, U = frames.E, frames.N, frames.U
+    rows, t0, t = [], [], 0.0
+    for first in (E, N):
+        base = np.array([first, U, np.cross(first, U)])
+        e, up = base @ POLE * frames.EARTH_RATE, base @ U
+
+        def rates(a: np.ndarray, e: np.ndarray = e) -> np.ndarray:
+            x, y = a
+            across = e[1] * math.sin(x) - e[2] * math.cos(x)
+            return np.array([-e[0] - across * math.tan(y), -e[1] * math.cos(x) - e[2] * math.sin(x)])
+
+        t, a, h = t + 60.0, np.zeros(2), 30.0
+        for k in range(2880):  # RK4; rows at the middle of 600 s
+            if k % 20 == 10:
+                (sx, sy), (cx, cy) = np.sin(a), np.cos(a)
+                A = np.array([[cy, sx * sy, -cx * sy], [0.0, cx, sx], [sy, -cy * sx, cx * cy]])
+                gx, gy, gz = -A @ up
+                rows.append([1.0, gx, gy, gz, gx * gx, gz * gz, gx * gy, gy * gz, gx * gz])
+                t0.append(t + 600.0 * (k // 20))
+            k1 = rates(a)
+            k2 = rates(a + h / 2.0 * k1)
+            k3 = rates(a + h / 2.0 * k2)
+            a = a + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rates(a + h * k3))
+        t += 86400.0
+    start, mount = np.array(t0), np.repeat([0, 1], 144)
+    found = [nuisances.trend(start, start + 600.0), nuisances.scatter("mount", nuisances.MOUNTS, mount.tolist())]
+    names = ("0", "x", "y", "z", "xx", "zz", "xy", "yz", "xz")
+    return Plan(start, start + 600.0, np.array(rows), names, np.zeros(288), mount, found, True)
+
+
 def eight_position() -> Plan:
     """Ten cycles of the eight positions, the ten readings of each averaged: 60 s every 70 s.  The current about x
     measures k I = w_y - R - ... ; the k of the first column is the scale factor less the assumed one over 1000.
@@ -94,8 +148,10 @@ def fixed_position(readings: bool = False) -> Plan:
 
 PLANS = {
     "servo_polar": servo_polar,
+    "servo_vertical_level": servo_vertical_level,
+    "servo_two_axis": servo_two_axis,
     "eight_position": eight_position,
     "fixed_position": fixed_position,
     "open_loop_drift": lambda: fixed_position(True),
 }
-STILL = ("fixed_position", "open_loop_drift")
+STILL = ("fixed_position", "open_loop_drift", "servo_vertical_level", "servo_two_axis")  # of a tilt nothing is seen

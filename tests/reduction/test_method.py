@@ -215,6 +215,33 @@ def test_extra_columns_under_all_noise_models() -> None:
     assert found.f_test("held", x[:, None] - 3.0, "", "", "") is None and len(found.tests) == before
 
 
+def test_verdicts_hold_for_slow_drift_too() -> None:
+    """Sixty windows with drift correlated over fifteen, under white noise of the same size, which takes the most of it
+    for white: the interval given slow drift, whose half width draws from its candidates confirm, is wider, and limits
+    between the two are inconclusive.
+    """
+    n = 60
+    t = 10.0 * np.arange(n)
+    C = noise_model.process_covariance(t, t + 10.0, 150.0)
+    x = np.linspace(-1.0, 1.0, n)
+    y = 0.3 * DPH + 0.01 * DPH * np.linalg.cholesky(C + np.eye(n)) @ np.random.default_rng(2).normal(size=n)
+    X = np.column_stack([np.ones(n), x])
+    wanted = [Quantity.of("a", "constant", "deg/h"), Quantity.of("b", "slope", "deg/h")]
+    found = fit(wanted, X, y, t, t + 10.0, [], "rate", "°/h", DPH)
+    probability, widening = found.if_slow()
+    m, rng = found.est.mixture, np.random.default_rng(1)
+    rows = rng.choice(np.flatnonzero(m.slow), 100_000, p=m.weight[m.slow] / probability)
+    draws = m.off[rows, 0] + np.sqrt(m.covariance[rows, 0, 0]) * rng.standard_t(m.dof, rows.size)
+    half = float(found.reported.half_width[0])
+    assert 0.05 < probability < 0.95 and widening[0] > 1.1
+    assert np.quantile(np.abs(draws), 0.95) == pytest.approx(half * widening[0], rel=0.02)
+    middle, estimate = half * (1.0 + widening[0]) / 2.0 / DPH, found.value[0] / DPH
+    for limit, verdict in ((middle, "inconclusive"), (1.01 * half * widening[0] / DPH, "pass")):
+        r = result(found, specification={"a": (estimate - limit, estimate + limit)})
+        assert r.verdict == verdict
+        assert any("slow drift" in w for w in r.warnings) == (verdict == "inconclusive")
+
+
 def test_ideal_data_claim_nothing() -> None:
     for noise in ("white", "estimated"):
         r = result(line(60, 0.0, noise=noise))

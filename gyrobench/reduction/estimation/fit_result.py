@@ -58,6 +58,7 @@ def linear_result(
     by_source = [standard_changes(fit, e) for e in effects]
     rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])
     coefficients = [_coefficient(fit, j, rows[:, j].tolist(), specification or {}) for j in range(rows.shape[1])]
+    slow_warnings = _judge_slow_drift(fit, coefficients, rows)
     design = fit.est.design
     odd = outliers.find(fit)
     beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust else [])]
@@ -101,9 +102,9 @@ def linear_result(
             *fit.nuisance_tables(),
             *beside,
         ],
-        warnings=[*fit_warnings, *warnings],
+        warnings=[*slow_warnings, *fit_warnings, *warnings],
         summary=[*summary, *fit.nuisance_sentences()],
-        decision_rule=uncertainty.DECISION_RULE,
+        decision_rule=f"{uncertainty.DECISION_RULE} {uncertainty.SLOW_RULE}",
         verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         site=dict(site or {}),
         instrument=instrument,
@@ -159,6 +160,25 @@ def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: 
         combination=dict(q.combination or {q.name: 1.0}),
     )
     return replace(c, z=None) if fit.ideal else c  # u is rounding: nothing to compare with
+
+
+def _judge_slow_drift(fit: Findings, coefficients: list[Coefficient], contributions: Array) -> list[str]:
+    """Make verdicts inconclusive that slow drift, which the record does not exclude, would take back; say so."""
+    probability, widening = fit.if_slow()
+    turned = []
+    for j, c in enumerate(coefficients):
+        half = float(fit.reported.half_width[j] * widening[j])
+        _, U = uncertainty.combine_uncertainties(0.0, half, contributions[:, j].tolist())
+        U /= fit.quantities[j].scale
+        if c.verdict in ("pass", "fail") and uncertainty.assess_conformity(c.estimate, U, c.limit) != c.verdict:
+            coefficients[j] = replace(c, verdict="inconclusive")
+            turned.append(f"{c.name} (U = {U:.2g} {c.unit})")
+    if not turned:
+        return []
+    return [
+        f"Inconclusive: {', '.join(turned)}. The noise may be slow drift, which this record does not tell from white "
+        f"noise (probability {probability:.2g}), and then U is as given here. A longer record tells."
+    ]
 
 
 def _budget(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:

@@ -286,6 +286,17 @@ class Findings:
             J[:, j] = (high - low) / (2.0 * step[j])
         return value, J
 
+    def if_slow(self) -> tuple[float, Array]:
+        """Return the probability of slow drift in the noise, and by how much it would widen the interval of each value
+        (q,); 1 where it hardly is there.
+        """
+        beta, p = self.est.beta, self.X.shape[1]
+        own = np.eye(p) if self.function is None else self.linearized(self.function, beta[:p])[1]
+        J = np.column_stack([own, np.zeros((len(own), beta.size - p))])
+        probability, half = self.est.mixture.if_slow(J)
+        ratio = np.maximum(half / np.maximum(self.est.mixture.spread(J)[1], 1e-300), 1.0)
+        return probability, np.concatenate([ratio, np.ones(max(self.value.size - ratio.size, 0))])
+
     def nuisance_tables(self) -> list[dict[str, Any]]:
         """Return the table of the nuisance model (none without candidates)."""
         names = [q.title for q in self.quantities]

@@ -35,6 +35,8 @@ from gyrobench.reduction.estimation.regression import Design, RegressionError, c
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
 JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
+SLOW = 0.125  # of the record: longer correlation times are slow drift, which a record tells from white noise badly
+DOUBT = 0.05  # probability from which on a verdict must hold if the noise is slow drift, too
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -46,6 +48,7 @@ class Mixture:
     off: Array
     covariance: Array
     dof: int
+    slow: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, bool))  # (g,): with drift slower than SLOW
 
     def spread(self, J: Array) -> tuple[Array, Array]:
         """Standard deviation and 95 % half width of the combinations J (q, p) of the coefficients."""
@@ -54,6 +57,17 @@ class Mixture:
         sd = np.sqrt(np.maximum(variance, 0.0))
         half = _half_width(self.weight, off, sd, self.dof)
         return np.sqrt(self.weight @ (sd**2 + off**2)), half
+
+    def if_slow(self, J: Array) -> tuple[float, Array]:
+        """Return the probability of slow drift, and the 95 % half widths of the combinations, about the mean of all
+        candidates, if that is the noise; zeros where it is less probable than DOUBT.
+        """
+        probability = float(self.weight[self.slow].sum())
+        if probability < DOUBT:
+            return probability, np.zeros(len(J))
+        variance = np.einsum("qi,gij,qj->gq", J, self.covariance[self.slow], J)
+        sd = np.sqrt(np.maximum(variance, 0.0))
+        return probability, _half_width(self.weight[self.slow] / probability, self.off[self.slow] @ J.T, sd, self.dof)
 
     def outside(self, J: Array, distance: Array) -> Array:
         """Return the probability that a combination lies farther than ``distance`` (q,) from its mean."""
@@ -169,7 +183,9 @@ def fit(
     cov_each = T @ np.concatenate(covariances) @ T.T
     best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
     dof = n - p - each[best].flat
-    mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof)
+    slow_drift = (grid.share > 0.0) & (grid.tau > SLOW * (t1[-1] - t0[0]))
+    slow_drift = np.tile(slow_drift, len(each))[counts]
+    mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof, slow_drift)
     evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
     keep = np.concatenate([np.ones(p, bool), *(np.full(e.block.columns.shape[1], e.joined) for e in evidence)])
     mixture = replace(mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep])

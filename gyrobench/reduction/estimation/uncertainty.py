@@ -17,6 +17,11 @@ DECISION_RULE = (
     "in place of a pass of measured data without a statement of type B."
 )
 
+SLOW_RULE = (
+    "A pass or a fail holds, too, if the noise is slow drift (correlation time above an eighth of the record) that the "
+    "record does not exclude (probability of 5 % or more); otherwise inconclusive."
+)
+
 
 def combine_uncertainties(u_a: float, half_a: float, contributions: Iterable[float]) -> tuple[float, float]:
     """Return the standard uncertainty u and 95 % half width U of a type A part and independent type B contributions.
