@@ -34,7 +34,8 @@ def test_vendor_gyro_fits_through_its_mapping(make: Make) -> None:
     assert binding.outputs["u"].gain == 1e-3
     assert binding.parameters["k"].gain == pytest.approx(DPH / 1e-3, rel=1e-14)  # rad/s per A
     assert binding.parameters["T_FLOAT"].gain == 1e-3  # unmapped: own name, SI by its unit
-    assert binding.absent == ["alpha", "dT", "v_float", "drift", "b", "M_react", "h_I", "M_I", "saturated"]
+    inputs = ["alpha", "dT", "v_float", "temperature", "B", "dB"]
+    assert binding.absent == [*inputs, "drift", "b", "M_react", "h_I", "M_I", "saturated"]
 
 
 def test_misfit_names_everything(make: Make) -> None:
