@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -216,12 +217,18 @@ def test_the_standard_bench_is_found_from_a_part_without_its_checkout(bench: Pat
 
 
 def test_equations_stand_in_two_files_at_most(part: str) -> None:
-    """The part's own and one of the blocks (the check of a rotation matrix apart)."""
+    """The part's own and one of the blocks (the check of a rotation matrix apart); a part that is put together of more
+    names each block in its README, where the reader finds what it does.
+    """
     source = Source(load_part(part, standard_folder()))
     files = {
         Path(c.path).name for pieces in source.equations.values() for _, code in pieces for c in reached(code, source)
     }
-    assert len(files - {"rotation.py"}) <= 2, files
+    if len(files - {"rotation.py"}) <= 2:
+        return
+    readme = (standard_folder() / "components" / part / "README.md").read_text(encoding="utf-8")
+    blocks = {type(b).__name__ for c in source.cls.__mro__ for b in vars(c).values() if isinstance(b, Block)}
+    assert blocks - {"Rotation"} <= set(re.findall(r"\w+", readme)), (files, blocks)
 
 
 # ----------------------------------------------------------------------------------------------- refused
