@@ -179,7 +179,7 @@ class System(Configurable):
 
     def all_slots(self) -> dict[str, Slot]:
         """Return the slots, and those that can be asked for."""
-        return {**{name: r.slots[name] for name, r in self.on_request.items()}, **self.slots}
+        return {**self.slots, **{n: r.slots[n] for n, r in self.on_request.items() if n not in self.slots}}
 
     @classmethod
     def with_parts(cls, **parts: str) -> dict[str, Slot]:
