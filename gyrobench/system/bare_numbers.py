@@ -17,7 +17,7 @@ NEAR = 100.0  # and from here on, from LEAST on, where an everyday unit makes it
 LEAST = 0.01  # nobody writes 1e-5 and means degrees
 USUAL = 10.0
 PER_G = {n: ("", "/g", "/g2")[drift.order(n)] for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
-ODD = ("us", "ms", "min", "h", "day", "rev", "km", "degC")  # nobody leaves these out
+ODD = ("us", "ns", "ms", "min", "h", "day", "rev", "km", "degC")  # nobody leaves these out
 
 
 def usual_size(*sizes: Iterable[float | None]) -> float:

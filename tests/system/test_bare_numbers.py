@@ -25,9 +25,10 @@ ROOT = Path(__file__).parents[2]
 
 
 def resolved(system: System, values: Mapping[str, Any], parts: Any = None, maps: Any = None) -> dict[str, Any]:
+    system = system.with_values(values)  # with the slots that the values ask for
     paths, _ = resolve_parts(system, parts or {}, "native", None, [])
     assembly = assemble(system, paths, maps)
-    return resolve(assembly, system.with_values(values), 1, defaults(assembly))[1]
+    return resolve(assembly, system, 1, defaults(assembly))[1]
 
 
 @pytest.mark.parametrize("value", ["0.9", " +0.9 ", "9e-1"])
