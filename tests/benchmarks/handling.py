@@ -181,6 +181,9 @@ MISTAKES: list[tuple[str, Callable[[Sheet, Rng], str]]] = [
 ]
 
 
+MEASURED = [name for name in CASES if name in dict(MISTAKES)]  # others have no file of laboratory.py
+
+
 # ---------------------------------------------------------------------------------------------- counting
 @dataclass(frozen=True)
 class Outcome:
@@ -216,8 +219,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="cases whose name begins so")
     given = parser.parse_args()
-    cases = [n for n in CASES if n.startswith(given.only)]
-    rooms = {name: Laboratory(name, given.seed * 1000 + k) for k, name in enumerate(CASES) if name in cases}
+    cases = [n for n in MEASURED if n.startswith(given.only)]
+    rooms = {name: Laboratory(name, given.seed * 1000 + k) for k, name in enumerate(MEASURED) if name in cases}
     rng = np.random.default_rng(given.seed)
     counts: Counter[str] = Counter()
     for k in range(given.errors):
