@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
-from handling import CASES, HARMLESS, Laboratory, Rng, Sheet, wide
+from handling import HARMLESS, MEASURED, Laboratory, Rng, Sheet, wide
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.result import Result
@@ -126,7 +126,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
-    names = list(CASES)
+    names = MEASURED
     rooms: dict[str, Laboratory] = {}
     counts: Counter[str] = Counter()
     for k in range(given.records):

@@ -3,7 +3,7 @@
 The tests count the same on fewer runs: tests/systems/test_stabilizer_power_2dof.py (stiffness, platform angle and drift
 of a power gyro stabilizer), tests/reduction/test_margins.py (measured margins under noise) and
 tests/systems/test_angle_system.py (harmonics, lags and clocks of an angle reading system).  With ``--table 60`` the
-measures of tests/systems/test_table_servo_loop.py are counted instead, 4 s a run.
+measures of tests/systems/test_servo_loop_of_a_table.py are counted instead, 4 s a run.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def main() -> None:
     parser.add_argument("--table", type=int, default=0, help="runs of the servo loop of a table, these alone")
     given = parser.parse_args()
     if given.table:
-        import test_table_servo_loop
+        import test_servo_loop_of_a_table
 
-        for name, (inside, n) in test_table_servo_loop.covered(given.table).items():
+        for name, (inside, n) in test_servo_loop_of_a_table.covered(given.table).items():
             print(f"{'table_servo_loop':24s} {name:12s} {inside / n:.3f} of {n}")
         return
     for title, counted, n in (

@@ -77,7 +77,8 @@ def test_another_run_than_the_reference(tmp_path: Path, fmu: Callable) -> None:
     write_reference("site", folder / "reference.csv", bench=tmp_path, rows=5)
     assert validate("site", tmp_path) == []
     text = (folder / "model.py").read_text()
-    (folder / "model.py").write_text(text.replace("self.g = self.local_g", "self.g = 2.0 * self.local_g"))
+    other = "\n    def outputs(self) -> None:\n        self.g = 2.0 * self.local_g\n"
+    (folder / "model.py").write_text(text + other)
     problems = validate("site", tmp_path)
     assert len(problems) == 4  # plain class and three FMUs
     assert problems[0].startswith("plain class: g at t = 0 s is 19.6")

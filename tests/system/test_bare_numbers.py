@@ -128,5 +128,9 @@ def test_no_documented_command_is_questioned() -> None:
         if isinstance(system, System):
             own = {slot: part for slot, part in parts.items() if part in Bench(standard_folder()).parts()}
             foreign = parts.keys() - own.keys()
-            known = {n: v for n, v in values.items() if n.partition(".")[0] not in foreign and n not in ("profile", "program")}
+            known = {
+                n: v
+                for n, v in values.items()
+                if n.partition(".")[0] not in foreign and n not in ("profile", "program")
+            }
             resolved(system, known, own)

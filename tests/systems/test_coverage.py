@@ -114,6 +114,7 @@ READ: dict[str, tuple[Any, int]] = {  # what is read, runs
     "servo_two_axis": (angles, 44),
     "pickoff_scale_factor": (voltage, 217),
     "torquer_scale_factor": (angle, 205),
+    "table_environment": (current, 97),
     "rebalance_loop_test": (current, 136),
 }
 
