@@ -101,8 +101,8 @@ def test_inner_axis_is_where_the_formula_says(quiet: Any) -> None:
 
 # ------------------------------------------------------------------------------------------ table effects
 def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[Any, Any]:
-    """(18,) changes of the coefficients for the size given, from the budget that both channels share: of its m independent
-    errors the one of ``row``, or all at once.
+    """(18,) changes of the coefficients for the size given, from the budget that both channels share: of its m
+    independent errors the one of ``row``, or all at once.
     """
     parts = [np.array(b["changes"]) for b in result.type_b if b["source"].startswith(source)]
     assert parts
