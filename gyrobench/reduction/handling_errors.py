@@ -25,7 +25,8 @@ Not seen: mistakes that leave the residuals as they are and change the estimates
 rotation throughout a tumble, or a wrong unit of its current, where the input axis sees no rate (coefficients reversed
 or scaled); positions 5 to 8 among themselves with six terms of the eight positions; attitudes that are taken once each
 and are as many as the coefficients (vertical and level servo test: coefficients of the size of the Earth rate); sign,
-latitude and unit in one attitude.  Two mistakes at once.
+latitude and unit in one attitude; start and end of all angles exchanged, latitude of the other sign in the servo tests.
+Two mistakes at once.
 """
 
 from __future__ import annotations
