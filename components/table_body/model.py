@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-from gyrobench.component import IDENTITY, Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.blocks.axis_body import AxisBody
-from gyrobench.component.blocks.table import AxisTable
-from gyrobench.component.math import Number, cos, sin
+from gyrobench.component import IDENTITY, Input, Output, Parameter, sampled
+from gyrobench.component.blocks.axis_body import BodyTable
 
 
-class TableBody(AxisTable):
+class TableBody(BodyTable):
     """Moving part of a table with one axis: torques in, motion out.  [TABLE-SERVO, FRICTION-PRESLIDING]
 
         J w' = torque + M_load + rumble - viscous (w - e) - cable (x - cable_zero) - (unbalance x f)_z + friction
@@ -21,8 +19,6 @@ class TableBody(AxisTable):
 
     version = "1.0.0"
 
-    axis = AxisBody()
-    angle0 = Parameter(0.0, "rad", "angle at the start")
     rate0 = Parameter(0.0, "rad/s", "rate against the base at the start")
 
     face = Input(IDENTITY, "1", "mount: rows are the gyro axes in table axes")
@@ -32,34 +28,17 @@ class TableBody(AxisTable):
     rate_motor = Output("rad/s", "rate of the motor against the base")
     friction = Output("N.m", "friction torque on the table")
 
-    pull = Discrete(0.0, "N.m", "torque of the unbalance at the middle of the next step")
-
     def start(self) -> None:
         self.axis.rest(self.angle0, self.rate0, self.earth())
-        self.pull = self.unbalanced(self.angle0)
-
-    def earth(self) -> Number:
-        """Return the inertial rate of the base along the axis."""
-        return self.tilted[2] @ self.omega_local
-
-    def unbalanced(self, x: Number) -> Number:
-        if self.axis_unbalance[0] == 0.0 and self.axis_unbalance[1] == 0.0:
-            return 0.0
-        return self.axis.unbalanced(cos(x), sin(x), self.tilted @ self.f_local)
 
     def flow(self) -> None:
-        self.axis.turn(self.torque, self.M_load + self.pull, self.earth())
+        self.turn(self.torque, self.M_load)
 
     @sampled(every=1)
     def tick(self) -> None:
-        self.axis.settle(self.torque, self.M_load + self.unbalanced(self.axis_x), self.earth())
-        self.pull = self.unbalanced(self.axis_x + 0.5 * self.h * self.axis_v)
+        self.settle(self.torque, self.M_load)
 
     def outputs(self) -> None:
-        rate = self.axis_w - self.earth()
-        self.feel(cos(self.axis_x), sin(self.axis_x), self.axis_w, rate, self.axis_acc_mean)
-        self.angle = self.axis_x
         self.angle_read = self.axis_x
-        self.rate = rate
-        self.rate_motor = rate + self.axis_twist_rate
+        self.rate_motor = self.rate + self.axis_twist_rate
         self.friction = self.axis_friction_ahead

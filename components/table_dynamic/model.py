@@ -1,16 +1,14 @@
 from __future__ import annotations
 
-from gyrobench.component import IDENTITY, Discrete, Input, Output, Parameter, sampled
+from gyrobench.component import IDENTITY, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.angle import IncrementalEncoder
-from gyrobench.component.blocks.axis_body import AxisBody
+from gyrobench.component.blocks.axis_body import BodyTable
 from gyrobench.component.blocks.command import ARCSEC, RATE_MAX, CountCommand, SampleClock
 from gyrobench.component.blocks.control import InPosition, SampledController
 from gyrobench.component.blocks.drive import SquareLawMotor
-from gyrobench.component.blocks.table import AxisTable
-from gyrobench.component.math import Number, cos, sin
 
 
-class TableDynamic(AxisTable):
+class TableDynamic(BodyTable):
     """Turntable with one axis as it is built: counts, sampled controller, motor, moving part.  [CTRL-SAMPLED]
 
     Every `period` the command count goes on (CountCommand), the encoder is read (IncrementalEncoder), and the
@@ -31,7 +29,6 @@ class TableDynamic(AxisTable):
     version = "1.0.0"
 
     step = Parameter(1e-4, "s", "largest internal step", above=0.0)
-    angle0 = Parameter(0.0, "rad", "angle at the start")
     period = Parameter(5e-3, "s", "sampling period of command and controller", min=1e-3, max=1e-2)
     quantum = Parameter(0.18 * ARCSEC, "rad", "angle of one count (0.18 arcsec)", above=0.0)
     acceleration = Parameter(1.0, "rad/s2", "acceleration of every move", above=0.0)
@@ -45,7 +42,6 @@ class TableDynamic(AxisTable):
     law = SampledController(period="period", quantum="quantum")
     near = InPosition()
     motor = SquareLawMotor()
-    axis = AxisBody()
     scale = IncrementalEncoder(quantum="quantum")
 
     mode = Input(0.0, "1", "0 hold, 1 index, 2 rate")
@@ -58,30 +54,17 @@ class TableDynamic(AxisTable):
     torque = Output("N.m", "motor torque")
     saturated = Output("1", "1 while the demanded torque is limited")
 
-    pull = Discrete(0.0, "N.m", "torque of the unbalance at the middle of the next step")
-
     def start(self) -> None:
         self.command.rest(self.angle0)
         self.axis.rest(self.angle0, 0.0, self.earth())
         self.scale.latch(self.angle0)
-        self.pull = self.unbalanced(self.angle0)
-
-    def earth(self) -> Number:
-        """Return the inertial rate of the base along the axis."""
-        return self.tilted[2] @ self.omega_local
-
-    def unbalanced(self, x: Number) -> Number:
-        if self.axis_unbalance[0] == 0.0 and self.axis_unbalance[1] == 0.0:
-            return 0.0
-        return self.axis.unbalanced(cos(x), sin(x), self.tilted @ self.f_local)
 
     def flow(self) -> None:
-        self.axis.turn(self.motor_M_mean, self.M_load + self.pull, self.earth())
+        self.turn(self.motor_M_mean, self.M_load)
 
     @sampled(every=1)
     def tick(self) -> None:
-        self.axis.settle(self.motor_M, self.M_load + self.unbalanced(self.axis_x), self.earth())
-        self.pull = self.unbalanced(self.axis_x + 0.5 * self.h * self.axis_v)
+        self.settle(self.motor_M, self.M_load)
         self.scale.latch(self.axis_x)
         self.clock.tick()
         self.law.wait()
@@ -92,10 +75,6 @@ class TableDynamic(AxisTable):
         self.motor.advance(self.law_demand, self.axis_v)
 
     def outputs(self) -> None:
-        rate = self.axis_w - self.earth()
-        self.feel(cos(self.axis_x), sin(self.axis_x), self.axis_w, rate, self.axis_acc_mean)
-        self.angle = self.axis_x
-        self.rate = rate
         self.angle_read = self.scale_count * self.quantum
         self.in_position = self.command_arrived * self.near_inside
         self.e = self.law_e

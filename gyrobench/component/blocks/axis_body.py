@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from gyrobench.component.blocks.table import AxisTable
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Noise, Parameter, State
-from gyrobench.component.math import Number, Vector, exp, fabs, sign, sqrt
+from gyrobench.component.math import Number, Vector, cos, exp, fabs, sign, sin, sqrt
 
 
 class Presliding(Block):
@@ -194,3 +195,42 @@ class AxisBody(Block):
         self.acc = acc + self.friction.now * self.per_plate
         self.v = v
         self.e = e
+
+
+class BodyTable(AxisTable):
+    """Common part of the tables with one axis that is a body under torques: block AxisBody on the tilted base.
+
+    A part calls `turn` in its flow and `settle` in its sampled method, with the torque of its motor and its loads; the
+    torque of the unbalance is added here, that of the next step at its middle.
+    """
+
+    axis = AxisBody()
+    angle0 = Parameter(0.0, "rad", "angle at the start")
+
+    pull = Discrete(0.0, "N.m", "torque of the unbalance at the middle of the next step")
+
+    def start(self) -> None:
+        self.pull = self.unbalanced(self.angle0)
+
+    def earth(self) -> Number:
+        """Return the inertial rate of the base along the axis."""
+        return self.tilted[2] @ self.omega_local
+
+    def unbalanced(self, x: Number) -> Number:
+        """Return the torque of the unbalance at the angle x."""
+        if self.axis_unbalance[0] == 0.0 and self.axis_unbalance[1] == 0.0:
+            return 0.0
+        return self.axis.unbalanced(cos(x), sin(x), self.tilted @ self.f_local)
+
+    def turn(self, motor: Number, load: Number) -> None:
+        self.axis.turn(motor, load + self.pull, self.earth())
+
+    def settle(self, motor: Number, load: Number) -> None:
+        self.axis.settle(motor, load + self.unbalanced(self.axis_x), self.earth())
+        self.pull = self.unbalanced(self.axis_x + 0.5 * self.h * self.axis_v)
+
+    def outputs(self) -> None:
+        rate = self.axis_w - self.earth()
+        self.feel(cos(self.axis_x), sin(self.axis_x), self.axis_w, rate, self.axis_acc_mean)
+        self.angle = self.axis_x
+        self.rate = rate
