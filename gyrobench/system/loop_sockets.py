@@ -174,7 +174,7 @@ LOOPS: tuple[Socket, ...] = (
             out("innovation", "", "measurement minus prediction", optional=True),
             out("nis", "1", "normalized innovation squared", optional=True),
             out("R_hat", "", "estimated variance of the measurement, square of the unit", optional=True),
-            out("latency", "s", "delay of the estimate"),
+            out("latency", "s", "delay of the estimate", optional=True),
         ),
     ),
 )

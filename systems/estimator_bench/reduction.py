@@ -44,7 +44,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
 
 def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
     """The channels without the row at t = 0 and the first ``skip`` readings.  Raises ReductionError."""
-    needed = ("time", "source.z", "source.truth", "estimator.estimate", "estimator.latency")
+    needed = ("time", "source.z", "source.truth", "estimator.estimate")
     missing = [n for n in needed if n not in channels]
     if missing:
         raise ReductionError([f"channel {n} is missing" for n in missing])
@@ -54,9 +54,10 @@ def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
 
     series = {n: np.asarray(values, dtype=float)[rows] for n, values in channels.items()}
     of = series.get
+    latency = float(series["estimator.latency"][-1]) if "estimator.latency" in series else None
     return Signals(
         series["time"], series["source.z"], series["estimator.estimate"], series["source.truth"],
-        float(series["estimator.latency"][-1]), of("estimator.variance"), of("estimator.innovation"),
+        latency, of("estimator.variance"), of("estimator.innovation"),
         of("estimator.nis"), of("estimator.R_hat"),
     )  # fmt: skip
 
@@ -89,7 +90,8 @@ def _result(m: Measures, s: Signals, title: str, name: str, limits: Specificatio
         equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
         conventions=[
             f"Truth and readings: {title}.",
-            "Error: estimate less the truth of the same instant. Late error: less the truth one latency ago.",
+            "Error: estimate less the truth of the same instant. Late error: less the truth one latency ago, where the "
+            "estimator states a latency.",
             "dB: 20 log10 of the ratio of rms values; below 0 is better than the reading itself.",
             "Noise reduction is what is left beside the truth as it comes through; it means nothing without the gain.",
         ],

@@ -101,11 +101,12 @@ def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:
     """
     truth = ride[RATE] / k
     raw, left = rms(ride["rebalance.i_read"] - truth), rms(ride["estimator.estimate"] - truth)
-    latency = float(ride["estimator.latency"][-1])
     unit = "mA"
     found.measure("reading error", "reading less true rate over k, rms in the ride", unit, 1e3 * raw.value, 1e3 * raw.u)
     found.measure("estimate error", "the same of the estimate", unit, 1e3 * left.value, 1e3 * left.u)
-    found.measure("latency", "delay that the estimator states", "ms", 1e3 * latency)
+    if "estimator.latency" in ride.channels:  # an estimator need not state it
+        latency = float(ride["estimator.latency"][-1])
+        found.measure("latency", "delay that the estimator states", "ms", 1e3 * latency)
     found.ratio(
         "estimate over reading", "test", 1, "estimator.estimate", "rebalance.i_read",
         caption="What the estimator does to the signal of the loop: gain and phase at the test sines.",

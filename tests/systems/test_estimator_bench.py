@@ -264,3 +264,22 @@ def test_errors_and_innovations_stand_under_their_names_over_the_whole_time(tmp_
     html = report.write(r, tmp_path, ("html",))["html"].read_text(encoding="utf-8")
     assert "Errors and innovations" in html and "Autocorrelation of the innovations" in html
     assert ">Residuals<" not in html and "fitted model" not in html
+
+
+# ------------------------------------------------------------------------------- latency is optional
+def test_an_estimator_that_states_no_latency(foreign: Callable[[str], Path], tmp_path: Path) -> None:
+    """Another maker's lag of 5 ms: y' = (u - y)/T, exact for u held over the step.  It delays a sine of 1 Hz by
+
+        discrete pole a = exp(-0.2), zero-order hold: delay (a / (1 - a)) 1 ms = 4.517 ms for slow signals (measured).
+
+    There is no latency to hold the delay against, no late error, and nothing else is missing.
+    """
+    mapping = tmp_path / "lag.toml"
+    mapping.write_text('[z]\nname = "u"\n\n[estimate]\nname = "y"\n', encoding="utf-8")
+    with Session(load_system(NAME), {"estimator": foreign("lag")}, {"estimator": mapping}) as session:
+        record = session.run({"estimator.T": 5e-3, "samples": 20000})
+        assert "estimator.latency" not in record.channels
+        found = named(session.system.with_values({"samples": 20000}).reduce(record))
+    assert found["delay"].closed is None and "late error re raw" not in found and "phase" in found
+    a = math.exp(-0.2)
+    assert found["delay"].estimate == pytest.approx(a / (1.0 - a), abs=4.0 * found["delay"].u)

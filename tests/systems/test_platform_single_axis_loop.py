@@ -158,3 +158,15 @@ def test_measured_and_computed_margins_that_differ_are_named_with_the_cause():
     (said,) = (w for w in result.warnings if "was measured to cross" in w)
     assert abs(found["PM"].estimate - found["PM"].closed) > 5.0
     assert "friction" in said and f"{found['PM'].closed:.3g}°" in said
+
+
+def test_an_estimator_need_not_state_its_latency(quiet):
+    """Without the channel everything is as before but the row of the latency."""
+    record, _, found = quiet
+    kept = record.channels
+    record.channels = {n: x for n, x in kept.items() if n != "estimator.latency"}
+    try:
+        without = {c.name: c.estimate for c in load_system(NAME).reduce(record).coefficients}
+    finally:
+        record.channels = kept
+    assert without == {n: c.estimate for n, c in found.items() if n != "latency"} and "latency" in found

@@ -31,14 +31,14 @@ CROSSOVER = 10.0  # Hz
 class Signals:
     """Evenly sampled series (n,) in one unit, at ``time`` s; transients are left out before.
 
-    latency: as the estimator states it, s.  variance, innovation, nis, R_hat: None where it has none.
+    latency: as the estimator states it, s.  latency, variance, innovation, nis, R_hat: None where it has none.
     """
 
     time: Array
     z: Array
     estimate: Array
     truth: Array
-    latency: float
+    latency: float | None
     variance: Array | None = None
     innovation: Array | None = None
     nis: Array | None = None
@@ -65,7 +65,7 @@ class Signals:
             steps = np.diff(self.time)
             if np.ptp(steps) > 0.01 * float(np.median(steps)) or not steps[0] > 0.0:
                 problems.append("the samples are not equally spaced in time (to 1 %); record at a fixed rate")
-        if not math.isfinite(self.latency) or self.latency < 0.0:
+        if self.latency is not None and not 0.0 <= self.latency < math.inf:
             problems.append(f"latency = {self.latency:g} s: must be 0 or more")
         return problems
 
@@ -103,26 +103,28 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     if problems := s.problems():
         raise ReductionError(problems)
     step = float(s.time[1] - s.time[0])
-    behind = estimator_metrics.delay_signal(s.time, s.truth, s.latency)
-    known = slice(math.ceil(s.latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
+    latency = s.latency or 0.0
+    behind = estimator_metrics.delay_signal(s.time, s.truth, latency)
+    known = slice(math.ceil(latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
     if s.time[known].size < 400:
-        raise ReductionError(f"the record is too short for the latency of {s.latency:g} s")
+        raise ReductionError(f"the record is too short for the latency of {latency:g} s")
     m = Measures()
     try:
         _errors(m, s, behind, known, frequency, unit)
         _distortion(m, s, behind, known, frequency)
-        most = max(3.0 * s.latency, 50.0 * step)
+        most = max(3.0 * latency, 50.0 * step)
         delay = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
     except ValueError as error:
         raise ReductionError(str(error)) from None
-    meaning = "delay of the best fit to the truth; closed form: the latency stated by the estimator"
+    stated = "the estimator states none" if s.latency is None else "closed form: the latency stated by the estimator"
     scale, in_unit = (1.0, "s") if step > 0.1 else (1e-3, "ms")
-    m.add("delay", meaning, in_unit, _times(delay, 1.0 / scale), closed=s.latency / scale)
+    meaning, closed = f"delay of the best fit to the truth; {stated}", None if s.latency is None else latency / scale
+    m.add("delay", meaning, in_unit, _times(delay, 1.0 / scale), closed=closed)
     _consistency(m, s, R)
-    phase = 360.0 * CROSSOVER * s.latency
+    phase = 360.0 * CROSSOVER * latency
     if phase > LOOP:
         m.warnings.append(
-            f"The stated delay of {s.latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
+            f"The stated delay of {latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
             f"{CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
         )
     return m
@@ -135,9 +137,12 @@ def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: flo
         return estimator_metrics.rms_of_sine(time, x, frequency) if frequency else estimator_metrics.rms(x)
 
     raw, m.error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
-    now, late = size(s.time, m.error), size(s.time[known], (s.estimate - behind)[known])
+    now = size(s.time, m.error)
     m.add(RANKED, "rms error against the truth at the same time", unit, now)
     m.add("error re raw", "rms error relative to that of the readings", "dB", estimator_metrics.decibels(now, raw))
+    if s.latency is None:
+        return
+    late = size(s.time[known], (s.estimate - behind)[known])
     against = "rms error against the delayed truth (delay-compensated), relative to that of the readings"
     m.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
 
