@@ -173,6 +173,7 @@ class Result(Displayed):
     simulated: bool = True
     provenance: dict[str, Any] = field(default_factory=dict)  # run.json of the record, date, operator
     ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
+    purposes: dict[str, str] = field(default_factory=dict)  # further ones -> what the smallest is the choice for
 
     def __post_init__(self) -> None:
         if not self.kind:

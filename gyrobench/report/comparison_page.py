@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report import comparison_summary, plots, ranking_section, responses
+from gyrobench.reduction.ranking import difference
+from gyrobench.report import comparison_summary, plots, ranking_section, replicates, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -37,8 +37,9 @@ _ABREAST = 3  # runs in one table, so that it fits on paper
 def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json:
     """Return the content of ``comparison.json``.
 
-    Differences are run minus baseline; their standard uncertainty takes the runs as independent and the
-    larger coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty,
+    Runs that differ in the seed alone are one candidate (:mod:`.replicates`).  Differences are run minus baseline;
+    their standard uncertainty comes from the pairs of equal seeds, else takes the runs as independent and the larger
+    coverage factor of the two; ``significant`` when the difference exceeds its expanded uncertainty,
     ``beyond_chance`` when it would among all of them.
     Raises ValueError for fewer than two results, repeated names or an unknown baseline.
     """
@@ -49,17 +50,21 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
         raise ValueError(f"names of results must differ: {', '.join(names)}")
     if not 0 <= baseline < len(results):
         raise ValueError(f"baseline {baseline} is not one of the {len(results)} results (0 to {len(results) - 1})")
-    docs = [document(result) for _, result in results]
+    names, docs = replicates.pool(names, [document(result) for _, result in results])
+    if baseline >= len(docs):
+        raise ValueError(f"baseline {baseline} is not one of the {len(docs)} candidates that the runs make up")
     facts = [_facts(doc) for doc in docs]
     keys = list(dict.fromkeys(k for f in facts for k in f))
     rows = [row for key in keys for row in _spread(key, [f.get(key) for f in facts])]
     content: Json = {
         "baseline": baseline,
         "runs": [
-            {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")} | {"name": name}
+            {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")}
+            | {"name": name, "seeds": doc.get("seeds", [])}
             for name, doc in zip(names, docs, strict=True)
         ],
         "ranking": ranking_section.ranking(docs),
+        "purposes": ranking_section.by_purpose(docs),
         "differing": [r for r in rows if any(v != r["values"][0] for v in r["values"])],
         "equal": [
             {"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])
@@ -83,7 +88,8 @@ def _key(coefficient: Json) -> tuple[str, str]:
 
 def _measure(docs: Sequence[Json], key: tuple[str, str], baseline: int) -> Json:
     coefficients = [next((c for c in doc["coefficients"] if _key(c) == key), None) for doc in docs]
-    runs = [None if c is None else {k: c[k] for k in ("estimate", "u", "k", "interval", "truth")} for c in coefficients]
+    kept = ("estimate", "u", "k", "interval", "truth", "draws")
+    runs = [None if c is None else {k: c[k] for k in kept if k in c} for c in coefficients]
     meaning = next(c["meaning"] for c in coefficients if c is not None)
     differences = [None if k == baseline else _difference(runs[k], runs[baseline]) for k in range(len(runs))]
     return {"name": key[0], "unit": key[1], "meaning": meaning, "runs": runs, "differences": differences}
@@ -92,12 +98,10 @@ def _measure(docs: Sequence[Json], key: tuple[str, str], baseline: int) -> Json:
 def _difference(run: Json | None, base: Json | None) -> Json | None:
     if run is None or base is None or run["estimate"] is None or base["estimate"] is None:
         return None
-    value = run["estimate"] - base["estimate"]
-    if None in (run["u"], base["u"], run["k"], base["k"]):
-        return {"value": value, "u": None, "U": None, "significant": None}
-    u = math.hypot(run["u"], base["u"])
-    expanded = max(run["k"], base["k"]) * u
-    return {"value": value, "u": u, "U": expanded, "significant": abs(value) > expanded}
+    d = difference(ranking_section.candidate(base), ranking_section.candidate(run))
+    if d.u is None or d.k is None:
+        return {"value": d.value, "u": None, "U": None, "significant": None}
+    return {"value": d.value, "u": d.u, "U": d.k * d.u, "significant": abs(d.value) > d.k * d.u}
 
 
 def _facts(doc: Json) -> dict[str, Any]:
@@ -182,18 +186,22 @@ def letters(count: int) -> list[str]:
 
 
 def _runs(doc: Json) -> Table:
+    pooled = any(run["seeds"] for run in doc["runs"])
     rows = [
         Row(
             [
                 text_cell(_letter(k), "strong"),
                 *(text_cell(run[c]) for c in ("name", "system", "report_id")),
+                *([text_cell(", ".join(map(str, run["seeds"])) or "–")] if pooled else []),
                 text_cell(run["verdict"], run["verdict"]),
             ]
         )
         for k, run in enumerate(doc["runs"])
     ]
-    columns = [Column(""), Column("run", wide=True), Column("system"), Column("report"), Column("verdict")]
-    return Table(columns, rows, "Runs.")
+    columns = [Column(""), Column("run", wide=True), Column("system"), Column("report")]
+    columns += [*([Column("seeds")] if pooled else []), Column("verdict")]
+    means = " Runs that differ in the seed alone are one: estimates are means over the seeds, u their standard errors."
+    return Table(columns, rows, f"Runs.{means if pooled else ''}")
 
 
 def _differing(doc: Json) -> list[Any]:
@@ -272,9 +280,10 @@ def _differences(doc: Json) -> list[Any]:
         for k in part:
             name = f"{_letter(k)} − {_letter(base)}"
             columns += [Column(name), Column("U (95 %)"), Column("")]
-        caption = (
-            f"Differences from baseline {_letter(base)} with their expanded uncertainty; the runs are treated as "
-            "independent."
+        caption = f"Differences from baseline {_letter(base)} with their expanded uncertainty; " + (
+            "runs of equal seed are compared in pairs."
+            if doc["runs"][base]["seeds"]
+            else "the runs are treated as independent."
         )
         blocks.append(Table(columns, rows, caption))
     blocks.append(

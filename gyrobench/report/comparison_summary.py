@@ -76,16 +76,26 @@ def _settings(differing: Sequence[str]) -> str:
 
 
 def _order(doc: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    ranked = doc["ranking"]
-    if not ranked or len(ranked["order"]) < 2:
-        return []
+    return [_first_of(r, names) for r in (doc["ranking"], *doc["purposes"]) if r and len(r["order"]) > 1]
+
+
+def _first_of(ranked: Json, names: Sequence[str]) -> str:
+    """Return who has the smallest value of a measure, and how many ranks can be told apart."""
     first = [e for e in ranked["order"] if e["place"] == 1]
     measure = f"{ranked['name']} ({ranked['meaning']})"
-    best = ", ".join(names[e["run"]] for e in first)
+    purpose = f"{ranked['purpose']}: " if "purpose" in ranked else ""
     if len(first) == len(ranked["order"]):
-        return [f"No order by {measure}: the runs cannot be told apart."]
-    return [
-        f"The smallest {measure} is that of {best}."
+        return f"{purpose}{'no' if purpose else 'No'} order by {measure}: the runs cannot be told apart."
+    best = ", ".join(names[e["run"]] for e in first)
+    the = "the" if purpose else "The"
+    text = (
+        f"{purpose}{the} smallest {measure} is that of {best}."
         if len(first) == 1
-        else f"The smallest {measure}: {best} share the first place, as they cannot be told apart."
-    ]
+        else f"{purpose}{the} smallest {measure}: {best} share the first place, as they cannot be told apart."
+    )
+    places = sorted({e["place"] for e in ranked["order"]})
+    known = [e["probability"] for e in ranked["order"] if e["apart"]]
+    if None in known:
+        return text
+    least = "more than 0.999" if min(known) > 0.999 else f"{min(known):.3f} or more"
+    return f"{text} {len(places)} ranks are told apart, each step with a probability of {least}."

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
-from gyrobench.report.ranking_section import place_text
+from gyrobench.report.ranking_section import place_text, probability_text
 from gyrobench.result import NO_VERDICT, Result, SuiteResult
 
 WIDTH, NARROW = 120, 30  # characters of a line with a meaning, and of a meaning at least
@@ -105,18 +105,21 @@ def format_summary(comparison: Mapping[str, Any]) -> str:
 
 
 def format_ranking(comparison: Mapping[str, Any]) -> str:
-    """Return the runs of a comparison in the order of the measure that ranks them; empty where none does."""
-    ranked = comparison["ranking"]
-    if not ranked:
+    """Return the runs of a comparison in the order of the measures that rank them; empty where none does."""
+    if not comparison["ranking"]:
         return ""
-    rows = [["", "run", ranked["name"], "u", "unit", "ratio to the smallest"]]
+    return "\n".join(_ranked(comparison, r) for r in (comparison["ranking"], *comparison["purposes"]))
+
+
+def _ranked(comparison: Mapping[str, Any], ranked: dict[str, Any]) -> str:
+    rows = [["", "run", ranked["name"], "u", "unit", "ratio to the smallest", "probability"]]
     for entry in ranked["order"]:
         value, u = (write_number(entry[k], entry["u"]).text for k in ("value", "u"))
         over = write_number(entry["over_best"], significant=3).text
-        rows.append(
-            [place_text(ranked, entry), comparison["runs"][entry["run"]]["name"], value, u, ranked["unit"], over]
-        )
+        name = comparison["runs"][entry["run"]]["name"]
+        rows.append([place_text(ranked, entry), name, value, u, ranked["unit"], over, probability_text(entry)])
     for entry in ranked["void"]:
-        rows.append(["–", comparison["runs"][entry["run"]]["name"], "void", "–", ranked["unit"], "–"])
+        rows.append(["–", comparison["runs"][entry["run"]]["name"], "void", "–", ranked["unit"], "–", ""])
     reasons = [f"{comparison['runs'][v['run']]['name']} has no rank: {v['reason']}" for v in ranked["void"]]
-    return "\n".join([*align_columns(rows, {0, 1, 4}), *reasons, ""])
+    head = [f"{ranked['purpose']}:"] if "purpose" in ranked else []
+    return "\n".join([*head, *align_columns(rows, {0, 1, 4}), *reasons, ""])

@@ -1,27 +1,44 @@
-"""Runs in the order of the one measure that their reduction names for it (``Result.ranked_by``), smallest first."""
+"""Runs in the order of the measures that their reduction names for it (``Result.ranked_by``, ``Result.purposes``)."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
+from gyrobench.reduction.ranking import NORMAL, Candidate, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 
 Json = dict[str, Any]
+NOTE = (
+    "Probability that a run lies behind the first run of its rank or, for the first of a rank, of the rank before, "
+    "lowered for the number of pairs compared (Holm). A new rank begins above 0.975: among equal runs at most one "
+    "comparison in twenty shows a false rank. Noise reduction alone does not improve a rank: measures of error are "
+    "deviations from the truth."
+)
 
 
 def ranking(docs: Sequence[Json]) -> Json:
-    """Return ``{"name", "unit", "meaning", "order": [{"run", "place", "value", "u", "over_best", "apart"}], "void":
-    [{"run", "reason"}]}``; {} when the runs name no measure, or not the same one.
-
-    place: runs that cannot be told from the first of their place share it.  apart: whether a run is farther from that
-    one than the expanded uncertainty of their difference; None for the first of all.  void: runs without a value of the
-    measure, or with the verdict void; they have no rank.
+    """Return the ranking by the measure that all runs name, see :func:`ranking_by`; {} where they name none, or not the
+    same one.
     """
     (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
-    if others or not name:
-        return {}
+    return {} if others or not name else ranking_by(docs, name)
+
+
+def by_purpose(docs: Sequence[Json]) -> list[Json]:
+    """Return a ranking by each further measure that all runs name (``Result.purposes``), with its "purpose"."""
+    common = [n for n in docs[0].get("purposes") or {} if all(n in (doc.get("purposes") or {}) for doc in docs)]
+    ranked = [(ranking_by(docs, name), docs[0]["purposes"][name]) for name in common]
+    return [{**found, "purpose": purpose} for found, purpose in ranked if found]
+
+
+def ranking_by(docs: Sequence[Json], name: str) -> Json:
+    """Return ``{"name", "unit", "meaning", "order": [{"run", "place", "value", "u", "over_best", "apart",
+    "probability"}], "void": [{"run", "reason"}]}``; {} where fewer than two runs can be ordered.
+
+    place, probability: see :mod:`gyrobench.reduction.ranking`.  apart: whether the run begins a rank of its own; None
+    for the first of all.  void: runs without a value of the measure, or with the verdict void; they have no rank.
+    """
     ranked = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
     void = [
         {"run": k, "reason": (c and c["no_value"]) or "another measure of the run has no value"}
@@ -29,27 +46,26 @@ def ranking(docs: Sequence[Json]) -> Json:
         if doc["verdict"] == "void" or (c and c["no_value"])
     ]
     out = {v["run"] for v in void}
-    known = [
-        (c["estimate"], k, c)
-        for k, c in enumerate(ranked)
-        if k not in out and c is not None and c["estimate"] is not None
-    ]
-    if not known or len(known) + len(void) < 2 or len({c["unit"] for _, _, c in known}) > 1:
+    known = [(k, c) for k, c in enumerate(ranked) if k not in out and c is not None and c["estimate"] is not None]
+    if not known or len(known) + len(void) < 2 or len({c["unit"] for _, c in known}) > 1:
         return {}
-    known.sort(key=lambda entry: entry[:2])
-    best, _, first = known[0]
+    places = rank([candidate(c) for _, c in known])
+    best = known[places[0].index][1]
     order: list[Json] = []
-    leader, place = first, 1
-    for count, (value, k, c) in enumerate(known, 1):
-        apart = None
-        if count > 1 and None not in (c["u"], leader["u"]):
-            U = max(c["k"], leader["k"]) * math.hypot(c["u"], leader["u"])
-            apart = value - leader["estimate"] > U
-        if apart or (apart is None and value > leader["estimate"]):
-            leader, place = c, count
-        over = value / best if best else None
-        order.append({"run": k, "place": place, "value": value, "u": c["u"], "over_best": over, "apart": apart})
-    return {"name": name, "unit": first["unit"], "meaning": first["meaning"], "order": order, "void": void}
+    for count, p in enumerate(places):
+        k, c = known[p.index]
+        over = c["estimate"] / best["estimate"] if best["estimate"] else None
+        order.append(
+            {"run": k, "place": p.place, "value": c["estimate"], "u": c["u"], "over_best": over,
+             "apart": p.place == count + 1 if count else None, "probability": p.probability}
+        )  # fmt: skip
+    return {"name": name, "unit": best["unit"], "meaning": best["meaning"], "order": order, "void": void}
+
+
+def candidate(c: Json) -> Candidate:
+    """Return a coefficient of a document as a candidate of a ranking."""
+    draws = {int(seed): value for seed, value in (c.get("draws") or {}).items()}
+    return Candidate(c["estimate"], c["u"], c["k"] or NORMAL, draws)
 
 
 def place_text(ranked: Json, entry: Json) -> str:
@@ -58,15 +74,38 @@ def place_text(ranked: Json, entry: Json) -> str:
     return f"{entry['place']} =" if shared else str(entry["place"])
 
 
+def probability_text(entry: Json) -> str:
+    """Return "0.62", "> 0.999", or "" for the first of all."""
+    p = entry["probability"]
+    return "" if p is None else "> 0.999" if p > 0.999 else f"{p:.3f}" if p > 0.99 else f"{p:.2f}"
+
+
 def section(doc: Json, letters: Sequence[str]) -> Section:
     """Return the section of a comparison document (:mod:`.comparison`) that shows its ranking; empty without one."""
     ranked = doc["ranking"]
     if not ranked:
         return Section("Ranking", "ranking", [])
+    caption = (
+        f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first, runs that cannot be told "
+        "apart (=) share a rank."
+    )
+    blocks: list[Any] = [_table(doc, ("ranking",), caption, letters), Text(NOTE, quiet=True)]
+    for k, other in enumerate(doc["purposes"]):
+        caption = f"{other['purpose']}: ranking by {other['name']}, {other['meaning']}."
+        blocks.append(_table(doc, ("purposes", k), caption, letters))
+    without = {(v["run"], v["reason"]): None for r in (ranked, *doc["purposes"]) for v in r["void"]}
+    if without:
+        blocks.append(BulletList([f"{letters[run]} has no rank: {reason}." for run, reason in without], warn=True))
+    return Section("Ranking", "ranking", blocks)
+
+
+def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequence[str]) -> Table:
+    ranked = doc
+    for key in path:
+        ranked = ranked[key]  # type: ignore[index]
     rows = []
     for index, entry in enumerate(ranked["order"]):
-        run = doc["runs"][entry["run"]]
-        path = ("ranking", "order", index)
+        run, at = doc["runs"][entry["run"]], (*path, "order", index)
         rows.append(
             Row(
                 [
@@ -74,16 +113,17 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
                     text_cell(letters[entry["run"]]),
                     text_cell(run["name"]),
                     text_cell(run["instrument"]),
-                    number_cell(doc, (*path, "value"), entry["u"]),
-                    number_cell(doc, (*path, "u"), entry["u"]),
-                    number_cell(doc, (*path, "over_best"), significant=3),
+                    number_cell(doc, (*at, "value"), entry["u"]),
+                    number_cell(doc, (*at, "u"), entry["u"]),
+                    number_cell(doc, (*at, "over_best"), significant=3),
+                    text_cell(probability_text(entry)),
                 ]
             )
         )
     for entry in ranked["void"]:
         run = doc["runs"][entry["run"]]
         known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"]), text_cell(run["instrument"])]
-        rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(2))]))
+        rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(3))]))
     unit = ranked["unit"] if ranked["unit"] != "1" else ""
     columns = [
         Column("rank"),
@@ -92,15 +132,5 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
         Column("instrument"),
         Column(ranked["name"], unit),
     ]
-    columns += [Column("u"), Column("ratio to the smallest")]
-    caption = (
-        f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first, runs that cannot be told "
-        "apart (=) share a rank."
-    )
-    note = "Noise reduction alone does not improve the rank: the measure is the deviation from the truth."
-    blocks: list[Any] = [Table(columns, rows, caption), Text(note, quiet=True)]
-    if ranked["void"]:
-        blocks.append(
-            BulletList([f"{letters[v['run']]} has no rank: {v['reason']}." for v in ranked["void"]], warn=True)
-        )
-    return Section("Ranking", "ranking", blocks)
+    columns += [Column("u"), Column("ratio to the smallest"), Column("probability")]
+    return Table(columns, rows, caption)

@@ -7,6 +7,7 @@ import json
 import math
 
 import pytest
+from scipy import stats
 from simulated import tumble
 
 from gyrobench.report.comparison_page import comparison
@@ -106,3 +107,64 @@ def test_a_result_without_a_value_keeps_its_reason_on_disk():
     assert document(again) == document(r)
     html = result_html(again)
     assert "no value" in html and f"No value of {r.coefficients[0].name}: unstable, pole." in html
+
+
+def replicate(values_by_part, purposes=None):
+    """Tumbles whose D_F has these values with seeds 1, 2, ...; name -> values."""
+    found = []
+    for part, values in values_by_part.items():
+        for seed, value in enumerate(values, 1):
+            ((_, r),) = runs(value)
+            r.purposes = purposes or {}
+            provenance = {"seed": seed, "parts": {"gyro": part}, "parameters": {"gyro.seed": 7 * seed, "gyro.H": 0.2}}
+            r.provenance = {**r.provenance, **provenance}
+            found.append((f"{part}/{seed}", r))
+    return found
+
+
+def test_runs_that_differ_in_the_seed_alone_are_one_candidate():
+    """Seeds move both by 0.01, the parts differ by 0.0011 on average: told apart in pairs.
+
+    Differences 0.0010, 0.0011, 0.0012: mean 0.0011, u = 1e-4/sqrt 3, t = 19.05 with 2 degrees of freedom.
+    """
+    doc = comparison(replicate({"b": [0.0310, 0.0211, 0.0112], "a": [0.03, 0.02, 0.01]}))
+    assert [(r["name"], r["seeds"]) for r in doc["runs"]] == [("b", [1, 2, 3]), ("a", [1, 2, 3])]
+    first, second = doc["ranking"]["order"]
+    assert (first["run"], first["value"]) == (1, pytest.approx(0.02))
+    assert first["u"] == pytest.approx(0.01 / math.sqrt(3.0))  # of the seeds 0.03, 0.02, 0.01
+    assert second["place"] == 2
+    assert second["probability"] == pytest.approx(stats.t.cdf(0.0011 / (1e-4 / math.sqrt(3.0)), 2))
+    d = next(m for m in doc["measures"] if m["name"] == "D_F")["differences"][1]
+    assert (d["value"], d["u"]) == (pytest.approx(-0.0011), pytest.approx(1e-4 / math.sqrt(3.0)))
+    assert d["significant"]
+    text = format_ranking(doc)
+    assert "probability" in text and "0.999" not in text.splitlines()[1]
+    html = comparison_html(doc, "")
+    assert "1, 2, 3" in html and "Runs that differ in the seed alone are one" in html
+
+
+def test_a_seed_without_a_value_leaves_its_candidate_without_rank():
+    mixed = replicate({"b": [0.031, 0.021, 0.011], "a": [0.03, 0.02, 0.01]})
+    nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
+    r = mixed[4][1]
+    r.coefficients[0] = dataclasses.replace(r.coefficients[0], **nothing, no_value="did not settle")
+    (void,) = comparison(mixed)["ranking"]["void"]
+    assert void == {"run": 1, "reason": "no value with seed 2: did not settle"}
+
+
+def test_runs_of_one_candidate_alone_are_compared_as_they_are():
+    assert len(comparison(replicate({"a": [0.03, 0.02]}))["runs"]) == 2
+    same = replicate({"a": [0.03, 0.02], "b": [0.01, 0.02]})
+    names = [r["name"] for r in comparison([*same, ("again", same[0][1])])["runs"]]
+    assert names == ["a/1", "a/2", "again", "b"]  # two runs of seed 1: what sets them apart is not the seed
+
+
+def test_further_measures_rank_for_their_purpose():
+    doc = comparison(replicate({"a": [0.03, 0.02, 0.01], "b": [0.0311, 0.0211, 0.0111]}, {"D_I": "Least of all"}))
+    (ranked,) = doc["purposes"]
+    assert (ranked["name"], ranked["purpose"]) == ("D_I", "Least of all")
+    assert [e["place"] for e in ranked["order"]] == [1, 1]  # D_I is the same in all
+    assert any(s.startswith("Least of all: no order by D_I") for s in doc["summary"])
+    assert any(s.endswith("2 ranks are told apart, each step with a probability of more than 0.999.")
+               for s in doc["summary"])  # fmt: skip
+    assert "Least of all" in format_ranking(doc) and "Least of all" in comparison_html(doc, "")
