@@ -16,4 +16,5 @@ def written(tmp_path_factory) -> Written:
 def compared(tmp_path_factory) -> Written:
     runs = [("standard", tumble()), ("other gyro", tumble(seed=2, sigma=0.02, offset=0.05)), ("third", tumble(seed=3))]
     runs[1][1].provenance["parameters"]["gyro.J"] = 3e-4
+    runs[2][1].provenance["parameters"]["gyro.C"] = 0.21  # else it would be one candidate with the first: two seeds
     return Written(report.compare(runs, tmp_path_factory.mktemp("comparison")))
