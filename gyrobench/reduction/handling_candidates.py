@@ -165,8 +165,12 @@ def shifted(record: Record, columns: Sequence[str], words: str) -> Iterator[Cand
         yield Candidate(f"{words} belonging to {where}", Record(rows, {}, record.run))
 
 
-def exchanged_rows(record: Record, columns: Sequence[str], words: str, most: int = 80) -> Iterator[Candidate]:
-    """Two groups of rows that follow one another exchanged in ``columns``, whose equal values make a group."""
+def exchanged_rows(
+    record: Record, columns: Sequence[str], words: str, most: int = 80, far: int = 0
+) -> Iterator[Candidate]:
+    """Two groups of rows exchanged in ``columns``, whose equal values make a group: those that follow one another, of
+    up to ``most`` groups; any two, of up to ``far``.
+    """
     w = record.windows
     table = np.column_stack([np.asarray(w[c], dtype=float) for c in columns])
     new = np.concatenate([[True], np.any(np.abs(np.diff(table, axis=0)) > 1e-4 * np.ptp(table, axis=0), axis=1)])
@@ -174,10 +178,12 @@ def exchanged_rows(record: Record, columns: Sequence[str], words: str, most: int
     if not 2 <= first.size <= most:
         return
     group = np.cumsum(new) - 1
-    for k in range(first.size - 1):
-        order = np.where(group == k, first[k + 1], np.where(group == k + 1, first[k], np.arange(group.size)))
+    for a, b in combinations(range(first.size), 2):
+        if b - a > 1 and first.size > far:
+            continue
+        order = np.where(group == a, first[b], np.where(group == b, first[a], np.arange(group.size)))
         swapped = {c: np.asarray(w[c])[order] for c in columns}
-        yield Candidate(f"{words} {k + 1} and {k + 2} exchanged", changed(record, **swapped))
+        yield Candidate(f"{words} {a + 1} and {b + 1} exchanged", changed(record, **swapped))
 
 
 def odd_rows(record: Record, column: str, words: str) -> Iterator[Candidate]:
@@ -197,6 +203,13 @@ def odd_rows(record: Record, column: str, words: str) -> Iterator[Candidate]:
             yield Candidate(f"{words} {what} in {where}", changed(record, **{column: np.where(rows, v / f, v)}))
 
 
+def _late(record: Record, means: Sequence[str]) -> Iterator[Candidate]:
+    """Currents that belong to the row before or after, all of them or one."""
+    yield from shifted(record, means, "the current" if len(means) == 1 else "the currents")
+    for n in means if len(means) > 1 else ():
+        yield from shifted(record, [n], f"the current {n}".replace("mean_", "about "))
+
+
 # --------------------------------------------------------------------------------------------- families of tests
 def tumble(record: Record) -> Iterator[Candidate]:
     """Rebalance currents (mean or mean_x, mean_y) over the angle of a turning table, and in dwells."""
@@ -209,7 +222,7 @@ def tumble(record: Record) -> Iterator[Candidate]:
     yield from scaled(record, ANGLES, ANGLE, 0.0)
     yield from scaled(record, means, CURRENT)
     yield from scaled_in_attitudes(record, means, CURRENT)
-    yield from shifted(record, means, "the current")
+    yield from _late(record, means)
 
 
 def positions(record: Record) -> Iterator[Candidate]:
@@ -220,7 +233,7 @@ def positions(record: Record) -> Iterator[Candidate]:
     for n in means:
         yield from reversed_columns(record, [n], f"the current {n}".replace("mean_", "about "), len(means) == 1)
     yield from wrong_hemisphere(record)
-    yield from shifted(record, means, "the current")
+    yield from _late(record, means)
 
 
 def readings(record: Record) -> Iterator[Candidate]:
@@ -287,8 +300,10 @@ def at_rest(record: Record) -> Iterator[Candidate]:
 
 def table_of_rates(record: Record) -> Iterator[Candidate]:
     """A row for each current: rates of both senses."""
-    yield from exchanged_rows(record, ["current"], "the currents of rows")
-    yield from exchanged_rows(record, ["rate_plus", "rate_minus"], "the rates of rows")
+    yield from exchanged_rows(record, ["current"], "the currents of rows", far=12)
+    yield from exchanged_rows(record, ["rate_plus", "rate_minus"], "the rates of rows", far=12)
+    yield from exchanged_rows(record, ["rate_plus"], "the positive rates of rows", far=12)
+    yield from exchanged_rows(record, ["rate_minus"], "the negative rates of rows", far=12)
     w = record.windows
     for k in range(len(w["current"])):
         for f, words in ((1e3, "mA given as A"), (1e-3, "A given as mA"), (2.0, "half of it"), (0.5, "twice of it")):

@@ -25,8 +25,8 @@ Not seen: mistakes that leave the residuals as they are and change the estimates
 rotation throughout a tumble, or a wrong unit of its current, where the input axis sees no rate (coefficients reversed
 or scaled); positions 5 to 8 among themselves with six terms of the eight positions; attitudes that are taken once each
 and are as many as the coefficients (vertical and level servo test: coefficients of the size of the Earth rate); sign,
-latitude and unit in one attitude; start and end of all angles exchanged, latitude of the other sign in the servo tests.
-Two mistakes at once.
+latitude and unit in one attitude; latitude of the other sign in the servo tests.  Coefficients of the size of the Earth
+rate, which some of them leave, are pointed out (plausibility.py).  Two mistakes at once.
 """
 
 from __future__ import annotations
@@ -42,9 +42,10 @@ from scipy import special
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.reduction import plausibility
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import UNSTATED
-from gyrobench.reduction.run_metadata import NO_TYPE_B
+from gyrobench.reduction.run_metadata import NO_TYPE_B, Site
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
@@ -99,6 +100,8 @@ def examined(candidates: Callable[[Record], Iterable[Candidate]]) -> Callable[[R
                     hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
                     raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
                 raise
+            if "latitude" in record.run.options:
+                result.warnings += plausibility.earth_rate_warnings(result, Site.of(record.run))
             reference, plain = result, record
             if _hides(result, record):
                 plain = with_options(record, PLAIN)

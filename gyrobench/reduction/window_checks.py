@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from gyrobench.errors import GyrobenchError
 
 Array = NDArray[np.float64]
+AXES = ("angle", "outer", "inner")
+SAME = 0.1  # of the mean motion of a window: angles that are the same
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")
 
 
@@ -61,6 +63,7 @@ def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQU
     back = np.flatnonzero((np.diff(t0) < -slack) | ((t0[1:] < t1[:-1] - slack) & (np.diff(t0) > slack))) + 1
     if back.size:
         problems.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
+    problems += [p for axis in AXES if (p := _exchanged_ends(windows, t0, t1, axis))]
     for c in (c for c in windows if c.startswith("flagged")):
         invalid = np.flatnonzero(np.asarray(windows[c]) > 0)
         if invalid.size:
@@ -70,3 +73,28 @@ def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQU
                 "is no measurement: repeat the phase or leave these rows out"
             )
     return problems
+
+
+def _exchanged_ends(windows: Mapping[str, Array], t0: Array, t1: Array, axis: str) -> str:
+    """Return that the angles at the start and at the end of the windows stand in each other's column; "" if not.
+
+    Where one window begins when the one before it ends, so does its angle.  With the columns exchanged the table would
+    jump by two windows and turn back; the first angle of a window is then the second of the one after it.
+    """
+    columns = [np.asarray(windows.get(f"{axis}_{end}", ()), dtype=float) for end in ("start", "end")]
+    phase = np.asarray(windows.get("phase", np.zeros(t0.size)), dtype=float)
+    if any(c.size != t0.size for c in columns) or phase.size != t0.size:
+        return ""
+    start, end = columns
+    joined = (np.abs(t0[1:] - t1[:-1]) <= SAME * (t1 - t0)[:-1]) & (phase[1:] == phase[:-1])
+    if np.count_nonzero(joined) < 2:
+        return ""
+    motion = float(np.median(np.abs(end - start)[:-1][joined]))
+    as_labelled = float(np.median(np.abs(start[1:] - end[:-1])[joined]))
+    exchanged = float(np.median(np.abs(end[1:] - start[:-1])[joined]))
+    if not as_labelled > motion > 0.0 or exchanged > SAME * motion:
+        return ""
+    return (
+        f"columns {axis}_start and {axis}_end are exchanged: a window that follows another begins "
+        f"{as_labelled / motion:.3g} times its motion away from where that ended, and ends where that began"
+    )

@@ -32,7 +32,7 @@ from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
-from . import marks
+from . import marks, row_checks
 from .estimates import Estimates, Number, of_table, of_windows
 from .precession import Precession, precession
 
@@ -135,10 +135,12 @@ def reduce(
         )
     if "range_plus" not in rows:
         warnings.append("No angle ranges given: all currents weigh alike in the least squares.")
+    against, said = row_checks.contradictions(i, marked, half, theta) if found is None else ([], [])
+    warnings += said
     gain = np.vstack([e.gain, np.zeros(n)])
     covariance = gain @ e.cofactor @ gain.T
     covariance[5, 5] = 1.0
-    return DriftTestResult(
+    result = DriftTestResult(
         system="torquer_scale_factor",
         title="Scale factor and linearity of a torquer",
         method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
@@ -188,6 +190,7 @@ def reduce(
         simulated=s.simulated,
         site=dict(s.site),
     )  # fmt: skip
+    return uncertainty.withhold(result, against)
 
 
 def _noise(e: Estimates, found: Precession | None) -> dict[str, Any]:

@@ -18,6 +18,8 @@ from tumbling import NAME, SHORT
 
 from gyrobench.bench import standard_folder
 from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.linear_fit import Quantity, fit
 
 Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'
@@ -135,3 +137,41 @@ def test_a_reversed_current_in_a_dwell(command: Command, tmp_path: Path) -> None
     assert code == 1 and "of the opposite sign in rows 20 to 30" in found["warnings"][0]
     # k times the scatter of the noise, 17.2 x 1e-4 deg/h = 0.0017
     assert scatters(found["warnings"][0])[1] == pytest.approx(17.2 * float(np.std(noise, ddof=1)), rel=1e-2)
+
+
+def test_start_and_end_of_the_angles_exchanged(command: Command, text: str, tmp_path: Path) -> None:
+    """Windows that follow one another share an angle; the table cannot jump by two of them and turn back."""
+    swapped = text.replace("angle_start", "@").replace("angle_end", "angle_start").replace("@", "angle_end")
+    (tmp_path / "lab.csv").write_text(swapped, encoding="utf-8")
+    code, _, err = command("reduce", NAME, "--data", tmp_path / "lab.csv", "--out", tmp_path / "out")
+    assert code in (2, 3) and "columns angle_start and angle_end are exchanged" in " ".join(err.split())
+
+
+def test_a_misalignment_that_no_setup_has() -> None:
+    """A fit that takes a misplaced column for a misalignment of 40 degrees says so; one of half a degree may be."""
+    rng = np.random.default_rng(5)
+    n, X = 60, rng.normal(size=(60, 2))
+    tilted = nuisances.Candidate.of("ε", "misalignment", "arcsec", X[:, 1])
+    y = X @ [1.0, np.radians(40.0)] + 1e-3 * rng.normal(size=n)
+    t = np.arange(n, dtype=float)
+    found = fit([Quantity("a", "a", "1", 1.0)], X[:, :1], y, t, t + 1.0, [], "y", "1", 1.0, candidates=[tilted])
+    (reason,) = found.implausible_nuisances()
+    # 40 x 3600 = 144000; limit 1 degree
+    assert "ε = 1.44e+05 ″" in reason and "3600 ″" in reason
+    small = X @ [1.0, np.radians(0.5)] + 1e-3 * rng.normal(size=n)
+    found = fit([Quantity("a", "a", "1", 1.0)], X[:, :1], small, t, t + 1.0, [], "y", "1", 1.0, candidates=[tilted])
+    assert found.implausible_nuisances() == [] and found.nuisance_sentences()
+
+
+def test_coefficients_of_the_size_of_the_earth_rate(command: Command, tmp_path: Path) -> None:
+    """Input axis up at 45.75 deg, drift 0.1 deg/h: rate 15.041 sin(45.75 deg) = 10.774; read with the latitude of the
+    other sign, the drift is 0.1 + 2 x 10.774 = 21.65 deg/h (sign as k i = omega - drift).
+    """
+    up = 15.041067 * np.sin(np.radians(45.75))
+    noise = np.random.default_rng(2).normal(size=30) * 1e-4
+    rows = [f"{120 * k},{120 * k + 120},{v!r}" for k, v in enumerate((noise + (up - 0.1) / 17.2).tolist())]
+    for latitude, warned in (("45.75", False), ("-45.75", True)):
+        head = f"# latitude = {latitude}deg\n# k = 17.2deg/h/mA\n# attitude = U E\n# type_b = none\n"
+        text = "\n".join([head + "t_start [s],t_end [s],mean [mA]", *rows, ""])
+        _, found = strict(command, tmp_path, "fixed_position", text, ("ω_d", "deg/h"))
+        assert any("twice the vertical component" in w for w in found["warnings"]) == warned, found["warnings"]

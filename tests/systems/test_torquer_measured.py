@@ -68,3 +68,33 @@ def test_it_is_listed(command: Command) -> None:
 def test_printed_table_says_where_it_comes_from() -> None:
     head = (Bench.find().system_folder(NAME) / "book_table.csv").read_text("utf-8")
     assert "Hu 1981, table after eq. A3-6" in head and "K_n" in head
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "factor", "words"),
+    [
+        # a row at 1000 times the others' current determines the cubic term alone: no residual is left
+        (0, 5, 1e3, "Row 5 is mistaken"),
+        # 17.17 i and twice that: half the difference is -17.17 i/2 = -1/3 of the mean of both, 1.5 x 17.17 i
+        (2, 0, 2.0, "(K₊ − K₋)/(K₊ + K₋) = -33.3 %"),
+        # 1 % in one of eight rows whose others depart by 0.03 %
+        (1, 3, 1.02, "Row 3 contradicts the others"),
+    ],
+)
+def test_mistaken_rows_and_senses(
+    command: Command, tmp_path: Path, column: int, row: int, factor: float, words: str
+) -> None:
+    """A table with a mistake is inconclusive, whatever its few residuals say; row 0: all rows."""
+    lines = (Bench.find().system_folder(NAME) / "book_table.csv").read_text("utf-8").splitlines()
+    numbers = [k for k, line in enumerate(lines) if line[:1].isdigit()]
+    for k in numbers if row == 0 else [numbers[row - 1]]:
+        cells = lines[k].split(",")
+        cells[column] = repr(float(cells[column]) * factor)
+        lines[k] = ",".join(cells)
+    (tmp_path / "lab.csv").write_text("\n".join([*lines, "# type_b = none", ""]), encoding="utf-8")
+    (tmp_path / "limits.toml").write_text('[coefficients.K]\nunit = "°/h/mA"\nmin = -1e9\nmax = 1e9\n', "utf-8")
+    given = ("--data", tmp_path / "lab.csv", "--spec", tmp_path / "limits.toml", "--out", tmp_path / "out")
+    code, _, err = command("reduce", NAME, *given, "--strict")
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    assert code == 1 and result["verdict"] == "inconclusive", err
+    assert words in " ".join(result["withheld"]), result["withheld"]

@@ -121,7 +121,8 @@ def linear_result(
 def _contradictions(fit: Findings) -> list[str]:
     """Return why the coverage intervals do not hold what they state, as a sentence; nothing where they may."""
     broken = "; ".join(f"{t.name} {uncertainty.p_text(t.p or 0.0)}, {t.finding}" for t in fit.broken())
-    return [f"The residuals contradict the model or its noise ({broken})."] if broken else []
+    against = [f"The residuals contradict the model or its noise ({broken})."] if broken else []
+    return against + fit.implausible_nuisances()
 
 
 def plus_minus(c: Coefficient) -> str:

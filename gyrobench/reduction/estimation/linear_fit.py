@@ -306,6 +306,9 @@ class Findings:
     def nuisance_sentences(self) -> list[str]:
         return nuisances.sentences(self.candidates, self.est)
 
+    def implausible_nuisances(self) -> list[str]:
+        return nuisances.implausible(self.candidates, self.est)
+
     # ------------------------------------------------------------------------------------------ plots
     def series(self) -> list[Series]:
         """Data against what each group is drawn against, with fit, residual and the dense curve."""

@@ -31,6 +31,8 @@ CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
 VISIBLE = 1e-3  # least share of a column's length at right angles to the others
 TORQUER = 0.02  # the same of an effect of the torquer
 ASYMMETRY, SCALE_FACTOR = 1e-3, 1e-2  # largest of a sound torquer; also what a scale factor may have been mistaken by
+#: largest error of a set-up that is meant to be sound, by its unit: a small angle, a torquer
+MISTAKEN = {"arcsec": units.factor("deg"), "%": 0.1}
 FLAGRANT = 10.0  # white-noise uncertainties from which on an effect beyond its bound is weighed too
 TITLE = "Nuisance model"
 COLUMNS = ["candidate", "meaning", "estimate", "u", "unit", "probability", "in the model", "largest change", "of u"]
@@ -48,12 +50,17 @@ class Candidate:
     scatter: bool = False
     visible: float = VISIBLE  # least share of its length at right angles to the coefficients
     bound: float = math.inf  # SI; an effect that a record determines less well than this is not weighed
+    largest: float = math.inf  # SI; of an error of the set-up: beyond it, something else is mistaken
 
     @classmethod
     def of(
         cls, name: str, meaning: str, unit: str, columns: Array, visible: float = VISIBLE, bound: float = math.inf
     ) -> Candidate:
-        return cls(name, meaning, units.display(unit), units.factor(unit), columns, visible=visible, bound=bound)
+        largest = MISTAKEN[unit]
+        return cls(
+            name, meaning, units.display(unit), units.factor(unit), columns, visible=visible, bound=bound,
+            largest=largest,
+        )  # fmt: skip
 
     @property
     def block(self) -> Block:
@@ -251,6 +258,19 @@ def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) 
             f"In the model: {c.meaning}, {c.name} = {value / c.scale:.3g} {c.unit} (u = {u / c.scale:.2g} {c.unit}, "
             f"probability {_percent(e.probability)})."
         )
+    return out
+
+
+def implausible(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
+    """Return which effects that joined are larger than an error of the set-up can be, as sentences."""
+    out = []
+    for c, e in reported(candidates, est):
+        if not c.scatter and abs(float(e.value[0])) > c.largest:
+            size, most = float(e.value[0]) / c.scale, c.largest / c.scale
+            out.append(
+                f"The fit takes the residuals for {c.name} = {size:.3g} {c.unit} ({c.meaning}), more than {most:g} "
+                f"{c.unit}: no error of the set-up, but an attitude, a sign, a column or a unit is mistaken."
+            )
     return out
 
 

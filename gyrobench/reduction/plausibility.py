@@ -1,0 +1,43 @@
+"""Coefficients of the size of the Earth rate, which a mistaken latitude, attitude or sense of rotation leaves behind.
+
+Such mistakes change the estimates and leave the residuals as they are: with the latitude of the other sign the constant
+drift of a gyro with its input axis up is wrong by 2 omega sin(latitude).  A drift of that size may be real, so this is
+a warning and withholds nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gyrobench import units
+from gyrobench.reduction.run_metadata import Site
+from gyrobench.result import DriftTestResult
+
+NEAR = 0.03  # relative distance
+LEAST = 3.0  # deg/h: smaller multiples (near the pole, at the equator) are the size of drifts
+
+
+def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[str]:
+    """Return which coefficients (deg/h, deg/h/g ...) are close to a component of the Earth rate or to twice of it."""
+    whole = site.earth_rate / units.factor("deg/h")
+    rates = {
+        "vertical component of the Earth rate": whole * abs(math.sin(site.latitude)),
+        "horizontal component of the Earth rate": whole * abs(math.cos(site.latitude)),
+        "Earth rate": whole,
+    }
+    found = []
+    for c in result.coefficients:
+        if not c.unit.startswith("°/h") or "mA" in c.unit:
+            continue
+        near = [
+            (abs(abs(c.estimate) / (m * rate) - 1.0), f"{words} {name}, {m * rate:.4g} °/h")
+            for m, words in ((1.0, "the"), (2.0, "twice the"))
+            for name, rate in rates.items()
+            if m * rate > LEAST
+        ]
+        distance, words = min(near, default=(1.0, ""))
+        if distance < NEAR:
+            found.append(f"{c.name} = {c.estimate:.4g} {c.unit} is close to {words}".replace("-", "−"))
+    if not found:
+        return []
+    return [f"{'; '.join(found)}. Check the sign of the latitude, the attitudes and the sense of rotation."]
