@@ -26,6 +26,7 @@ class CompliantGyro(SdfGyro):
 
         omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
                   + D_T T_m + D_B . B + D_dB . dB + turn-on constant + Gauss-Markov + white
+                  + flicker + random walk + ramp t + quantization                             [DRIFT-RANDOM-ALLAN]
 
     All ten terms may be given; there is no choice of `terms`, no ageing and no temperature differences (use
     floated_gyro).  T_m, k_T, B and dB as there.
@@ -35,7 +36,7 @@ class CompliantGyro(SdfGyro):
     Source: Hu 1981, ch. 2, eq. 2-57..2-67.
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping", above=0.0)
     K_I = Parameter(400.0, "N.m/rad", "stiffness of rotor bearing and gimbal about I", above=0.0)

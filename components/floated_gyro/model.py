@@ -21,6 +21,7 @@ class FloatedGyro(SdfGyro):
 
         omega_d = F + X I + Y O + Z S + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
                   + D_T T_m + D_B . B + D_dB . dB + turn-on constant + Gauss-Markov + white
+                  + flicker + random walk + ramp t + quantization                             [DRIFT-RANDOM-ALLAN]
         F = D_F (1 + p_F T) + D_vI v_I + D_vO v_O + D_vS v_S
                                                      I = D_I (1 + p_I T) + D_TI dT_S
         O = D_O (1 + p_O T) - D_TO dT_O              S = D_S (1 + p_S T) - D_TS dT_I        T = age + time
@@ -56,7 +57,7 @@ class FloatedGyro(SdfGyro):
     Source: Hu 1981, ch. 2; Xia 2008, sections 2.1, 2.2.2.2 (corrected).
     """
 
-    version = "1.3.0"
+    version = "1.4.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
     K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)

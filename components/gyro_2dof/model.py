@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
 from gyrobench.component.blocks.gyro import DEG_H, PER_G, ChannelDrift, GaussMarkov, torquer_rate
+from gyrobench.component.blocks.random_drift import Flicker, Quantization, RateRandomWalk
 from gyrobench.component.math import Vector, clip, cos, fabs, pi, sin, vector
 
 
@@ -25,6 +26,7 @@ class Gyro2dof(Component):
 
         omega_dc = Dc_0 + Dc_x X + Dc_y Y + Dc_z Z + Dc_xx X2 + Dc_yy Y2 + Dc_zz Z2 + Dc_xy X Y + Dc_yz Y Z + Dc_xz X Z
                    + turn-on constant + Gauss-Markov + white
+                   + flicker + random walk + ramp t + quantization                              [DRIFT-RANDOM-ALLAN]
 
     Dx_x = -m l_z/H is of the torque about the inner axis, Dy_y of that about the outer axis: it contains the outer
     gimbal, so the two differ (u_zy and u_zx of Hu 1981).  `terms_x`, `terms_y` say which model is meant; a coefficient
@@ -71,7 +73,7 @@ class Gyro2dof(Component):
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.4.0"
+    version = "1.5.0"
     nonlinear = "full"
     integrator = "midpoint"
 
@@ -139,6 +141,17 @@ class Gyro2dof(Component):
     white_y = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density, y channel (0.0178 deg/h/sqrt(Hz))")
     pickoff_x = Noise(5e-8, "V/sqrt(Hz)", "noise density of the x pickoff")
     pickoff_y = Noise(5e-8, "V/sqrt(Hz)", "noise density of the y pickoff")
+    flicker_x = Flicker("rad/s", "drift, x channel", tau="flicker_tau")
+    flicker_y = Flicker("rad/s", "drift, y channel", tau="flicker_tau")
+    flicker_tau = Parameter(1e5, "s", "longest correlation time of the flicker drifts", above=0.0)
+    walk_x = RateRandomWalk("rad/s", "rad/s2/sqrt(Hz)", "drift, x channel")
+    walk_y = RateRandomWalk("rad/s", "rad/s2/sqrt(Hz)", "drift, y channel")
+    quantization_x = Quantization("x channel", tau="quantization_tau")
+    quantization_y = Quantization("y channel", tau="quantization_tau")
+    quantization_tau = Parameter(0.1, "s", "correlation time of the angle noises", above=0.0)
+    ramp_x = Parameter(0.0, "rad/s2", "ramp of the drift, x channel, coefficient R")
+    ramp_y = Parameter(0.0, "rad/s2", "ramp of the drift, y channel, coefficient R")
+    wanders = Discrete(0.0, "1", "1 where one of these is given")
 
     omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
     f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, case axes")
@@ -198,6 +211,11 @@ class Gyro2dof(Component):
         )
         self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the inner gimbal must stop before pi/2 (gimbal lock)")
         self.per_h = 1.0 / self.H
+        self.wanders = 0.0
+        if self.flicker_x > 0.0 or self.walk_x > 0.0 or self.quantization_x > 0.0 or self.ramp_x != 0.0:
+            self.wanders = 1.0
+        if self.flicker_y > 0.0 or self.walk_y > 0.0 or self.quantization_y > 0.0 or self.ramp_y != 0.0:
+            self.wanders = 1.0
 
     def drift_rates(self) -> Vector:
         g = PER_G * (self.mount @ self.f)
@@ -213,6 +231,9 @@ class Gyro2dof(Component):
             y = y + self.Dy.surroundings(self.temperature, field, difference)
         x = x + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
         y = y + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
+        if self.wanders > 0.0:
+            x = x + self.flicker_x_value + self.walk_x_value + self.quantization_x_rate + self.ramp_x * self.t
+            y = y + self.flicker_y_value + self.walk_y_value + self.quantization_y_rate + self.ramp_y * self.t
         return vector([x, y])
 
     def precession(self, drift: Vector) -> Vector:

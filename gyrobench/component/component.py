@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import accumulate
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -56,7 +57,7 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.math import Dual, lift
 from gyrobench.component.numerics import normal, phi1
-from gyrobench.component.vectors import Vector, is_finite
+from gyrobench.component.vectors import Vector, copied, is_finite
 
 PER = ("start", "step", "second")  # when noise is drawn
 RESERVED = ("der", "noise", "instance")
@@ -119,7 +120,8 @@ class Component:
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in declared.values() if isinstance(d, Noise)]
         cls._by_name = {s.name: s for s in cls.layout}
-        cls._ports = {per: [(k, n) for k, n in enumerate(cls.noises) if n.per == per] for per in PER}
+        cls.streams = [0, *accumulate(math.prod(n.sample_shape) for n in cls.noises)][:-1]
+        cls._ports = {per: [p for p in zip(cls.streams, cls.noises, strict=True) if p[1].per == per] for per in PER}
         cls._inputs = Watched(s for s in cls.layout if s.section == "input")
         cls._watched = Watched(
             s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory
@@ -128,7 +130,8 @@ class Component:
     _own: ClassVar[dict[str, Any]] = {}
     _functions: ClassVar[dict[str, Any]] = {}
     _by_name: ClassVar[dict[str, Scalar]] = {}
-    _ports: ClassVar[dict[str, list[tuple[int, Noise]]]] = {}  # by when they are drawn: number and declaration
+    streams: ClassVar[list[int]] = []  # of each noise port: number of its (first) random stream
+    _ports: ClassVar[dict[str, list[tuple[int, Noise]]]] = {}  # by when they are drawn: first stream and declaration
     _inputs: ClassVar[Watched]  # must be finite before each step
     _watched: ClassVar[Watched]  # and these after it
 
@@ -240,7 +243,7 @@ class Component:
     def reset(self) -> None:
         """Return to the state before initialization, every value at its start."""
         self.der = Derivatives()
-        self.noise = SimpleNamespace(**{n.name: 0.0 for n in self.noises})
+        self.noise = SimpleNamespace(**{n.name: floats(full(0.0, n.sample_shape)) for n in self.noises})
         for d in self.declarations.values():
             setattr(self, d.name, floats(d.start))
             if isinstance(d, State):
@@ -257,7 +260,7 @@ class Component:
         return {
             "part": f"{type(self).__name__} {self.version}",
             "v": [self._at(s) for s in self.layout],
-            "noise": [getattr(self.noise, n.name) for n in self.noises],
+            "noise": [copied(getattr(self.noise, n.name)) for n in self.noises],
             **{n: getattr(self, n) for n in TIMES},
             "tick": self._tick,
             "running": self._running,
@@ -272,7 +275,7 @@ class Component:
         for s, x in zip(self.layout, state["v"], strict=True):
             self._put(s, x)
         for n, x in zip(self.noises, state["noise"], strict=True):
-            setattr(self.noise, n.name, x)
+            setattr(self.noise, n.name, floats(x))
         for time in TIMES:
             setattr(self, time, state[time])
         self._tick = state["tick"]
@@ -348,14 +351,18 @@ class Component:
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:
-        for port, n in self._ports[per]:
+        for stream, n in self._ports[per]:
             size = getattr(self, n.name)
-            x = 0.0
+            x: Any = floats(full(0.0, n.sample_shape))
             if size != 0.0:
-                x = size * normal(int(self.seed), port, self._tick)
-                if per == "second":
-                    x = x / math.sqrt(self.h)
+                x = self._sample(size, stream, per)
+                if n.sample_shape:
+                    x = Vector([self._sample(size, stream + k, per) for k in range(n.sample_shape[0])])
             setattr(self.noise, n.name, x)
+
+    def _sample(self, size: float, stream: int, per: str) -> float:
+        x = size * normal(int(self.seed), stream, self._tick)
+        return x / math.sqrt(self.h) if per == "second" else x
 
     # ------------------------------------------------------------------ integration
     def _flow(self) -> list[float]:
@@ -376,7 +383,7 @@ class Component:
             setattr(twin, name, _dual(getattr(self, name)))
             if isinstance(d, State):
                 setattr(twin.der, name, _dual(getattr(self.der, name)))
-        twin.noise = SimpleNamespace(**{k: Dual(v) for k, v in vars(self.noise).items()})
+        twin.noise = SimpleNamespace(**{k: _dual(v) for k, v in vars(self.noise).items()})
         for name, weight in seeds.items():
             s = self._find(name)
             _dig(getattr(twin, s.path[0]), s.path[1:]).d = weight

@@ -106,14 +106,15 @@ class Noise(Parameter):
     ``per="second"``: white, the size is the two-sided density (unit/sqrt(Hz)); a sample is
     ``size * xi / sqrt(h)``, so the mean over a time T has variance ``size**2 / T`` whatever the step.
     ``per="step"``: ``size * xi``, one for each internal step.  ``per="start"``: drawn once.
-    A port of size 0 draws nothing.
+    A port of size 0 draws nothing.  ``samples=n``: the sample is a vector of n independent numbers of that size.
     """
 
-    def __init__(self, start: float, unit: str, doc: str = "", *, per: str = "second") -> None:
+    def __init__(self, start: float, unit: str, doc: str = "", *, per: str = "second", samples: int = 0) -> None:
         if per not in ("second", "step", "start"):
             raise ValueError(f'Noise(per="{per}"): one of "second", "step", "start"')
         super().__init__(start, unit, doc, min=0.0)
         self.per = per
+        self.sample_shape: Shape = (samples,) if samples else ()
 
 
 MEMORY = 64  # elements; a larger discrete array is a memory

@@ -26,9 +26,9 @@ typedef struct {
 typedef struct { /* what follows from the numbers, kept because it seldom changes */
     double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
     int n, keyed;
-    double seed; /* the seed that the keys of the noise ports were made for */
-    uint64_t key[N_PORTS + 1], first[N_PORTS + 1];
-    double ahead[N_PORTS + 1][AHEAD]; /* normal numbers of the counts first, first + 1, ... */
+    double seed; /* the seed that the keys of the noise streams were made for */
+    uint64_t key[N_STREAMS + 1], first[N_STREAMS + 1];
+    double ahead[N_STREAMS + 1][AHEAD]; /* normal numbers of the counts first, first + 1, ... */
     double seen[N_FOLLOWED > 0 ? N_FOLLOWED : 1]; /* what the outputs were last made from, while `settled` */
     int settled;
 } Kept;

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gyrobench.component import State
+from gyrobench.component import Noise, State
 from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
 from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells, words
@@ -143,8 +143,8 @@ class Expressions:
             raise self.refuse(e, f"self.{e.attr} is not declared in {owner.__name__}")
         if source == "self.der" and isinstance(d, State):
             return Place(f"der.{member(name)}", "self", f"der.{name}", d.shape)
-        if source == "self.noise" and any(n.name == name for n in self.translation.source.cls.noises):
-            return Place(f"noise.{member(name)}", "self", f"noise.{name}")
+        if source == "self.noise" and isinstance(d, Noise):
+            return Place(f"noise.{member(name)}", "self", f"noise.{name}", d.sample_shape)
         if source.startswith("self.") and (place := self.of_block(e, source)) is not None:
             return place
         raise self.refuse(e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise")

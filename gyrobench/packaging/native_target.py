@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
@@ -36,7 +37,8 @@ def _struct(cls: type[Component]) -> str:
     if inner:
         lines.append(f"    struct {{ double {', '.join(inner)}; }} der;")
     if cls.noises:
-        lines.append(f"    struct {{ double {', '.join(member(n.name) for n in cls.noises)}; }} noise; /* samples */")
+        drawn = ", ".join(f"{member(n.name)}{dimensions(n.sample_shape)}" for n in cls.noises)
+        lines.append(f"    struct {{ double {drawn}; }} noise; /* samples */")
     lines.append("    double t, h, step_start, step_end, tick; /* times as in component.py; count of internal steps */")
     return "\n".join(["typedef struct {", *lines, "} Vars;"])
 
@@ -86,7 +88,10 @@ def c_source(cls: type[Component], guid: str) -> str:
     discrete = [s for s in layout if s.section == "discrete" and not s.is_memory]
     watched = _runs([s.reference for s in discrete])
     stepped = _runs([s.reference for s in discrete if s.decl.name in changing])
-    ports = [f"{{{param[n.name]}, {samples + i}, {PER[n.per]}}}" for i, n in enumerate(cls.noises)]
+    ports = [
+        f"{{{param[n.name]}, {samples + stream}, {PER[n.per]}, {stream}, {math.prod(n.sample_shape)}}}"
+        for stream, n in zip(cls.streams, cls.noises, strict=True)
+    ]
     defines = {
         "MODEL_GUID": f'"{guid}"',
         "N_REFERENCES": len(layout),
@@ -98,6 +103,7 @@ def c_source(cls: type[Component], guid: str) -> str:
         "N_Y": counts.get("output", 0),
         "N_X": counts.get("state", 0),
         "N_PORTS": len(ports),
+        "N_STREAMS": sum(math.prod(n.sample_shape) for n in cls.noises),
         "N_BOUNDS": len(bounds),
         "N_WATCHED": len(watched),
         "N_STEPPED": len(stepped),
@@ -116,9 +122,9 @@ def c_source(cls: type[Component], guid: str) -> str:
         _table("static const double starts[]", [repr(s.start) for s in layout], "0.0"),
         _table("static const char *const names[]", names, '""'),
         _table("static const char *const unit_names[]", units, '""'),
-        "/* kind of bound: 0 >=, 1 <=, 2 >, 3 <.  per: 0 start, 1 internal step, 2 second */",
+        "/* kind of bound: 0 >=, 1 <=, 2 >, 3 <.  per: 0 start, 1 internal step, 2 second; first stream and number */",
         _table("static const struct { int reference, kind; double limit; } bounds[]", bounds, "{-1, 0, 0.0}"),
-        _table("static const struct { int parameter, sample, per; } ports[]", ports, "{0, 0, 0}"),
+        _table("static const struct { int parameter, sample, per, stream, streams; } ports[]", ports, "{0}"),
         "/* discrete values but for memories, and those that steps change: first reference and number */",
         _table("static const struct { int from, n; } watched[]", [f"{{{a}, {n}}}" for a, n in watched], "{0, 0}"),
         _table("static const struct { int from, n; } stepped[]", [f"{{{a}, {n}}}" for a, n in stepped], "{0, 0}"),

@@ -77,13 +77,21 @@ static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of cou
 
 enum { ONCE, PER_STEP, PER_SECOND }; /* kinds of ports */
 
+static inline double number_of(Part *p, int stream, uint64_t count) { /* the normal number of a stream */
+    if (count - p->kept.first[stream] >= AHEAD) { /* unsigned: before the first too */
+        normals(p->kept.key[stream], count, p->kept.ahead[stream]);
+        p->kept.first[stream] = count;
+    }
+    return p->kept.ahead[stream][count - p->kept.first[stream]];
+}
+
 static inline void draw(Part *p, int from, int to) { /* the samples of these kinds */
 #if N_PORTS > 0
     double *a = value(p);
     const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
-    int i;
+    int i, j;
     if (!p->kept.keyed || p->kept.seed != p->n.v.seed) {
-        for (i = 0; i < N_PORTS; i++) {
+        for (i = 0; i < N_STREAMS; i++) {
             p->kept.key[i] = key_of((uint64_t)p->n.v.seed, i);
             p->kept.first[i] = (uint64_t)1 << 63; /* none made: far from every count */
         }
@@ -91,18 +99,18 @@ static inline void draw(Part *p, int from, int to) { /* the samples of these kin
         p->kept.keyed = 1;
     }
     for (i = 0; i < N_PORTS; i++) {
-        double x = 0.0, size;
+        double size;
         if (ports[i].per < from || ports[i].per > to) continue;
         size = a[ports[i].parameter];
-        if (size != 0.0) {
-            if (count - p->kept.first[i] >= AHEAD) { /* unsigned: before the first too */
-                normals(p->kept.key[i], count, p->kept.ahead[i]);
-                p->kept.first[i] = count;
+        if (size == 0.0 && a[ports[i].sample] == 0.0) continue; /* off, and 0 already */
+        for (j = 0; j < ports[i].streams; j++) {
+            double x = 0.0;
+            if (size != 0.0) {
+                x = size * number_of(p, ports[i].stream + j, count);
+                if (ports[i].per == PER_SECOND) x = x / p->kept.root;
             }
-            x = size * p->kept.ahead[i][count - p->kept.first[i]];
-            if (ports[i].per == PER_SECOND) x = x / p->kept.root;
+            a[ports[i].sample + j] = x;
         }
-        a[ports[i].sample] = x;
     }
 #else
     (void)p;

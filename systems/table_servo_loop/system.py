@@ -9,6 +9,7 @@ from typing import Any
 from gyrobench.system.connectors import element_names
 from gyrobench.system.families.loop_test import LoopTest, data_sheet, hold, torquer
 from gyrobench.system.families.servo_test import gyro_on_table
+from gyrobench.system.families.table_test import SDF_NOISES
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -74,7 +75,7 @@ class TableServoLoop(LoopTest):
         "test": Option("0.4arcsec", "rad", "amplitude of test sines, as an angle; tenfold with an undamped gyro", 1e-9),
         **hold(60.0),
     }  # fmt: skip
-    noises = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff", "table.rumble")
+    noises = (*SDF_NOISES, "table.rumble")
     step = 1e-4
     channel_period = 5e-4
     channels = (

@@ -140,6 +140,23 @@ def test_seed_and_size(instance: Callable) -> None:
         assert doubled[0] == pytest.approx(2 * first(target)[0], rel=1e-15)
 
 
+def test_a_port_of_several_samples(instance: Callable) -> None:
+    """Each sample has the size of the port and a stream of its own, in all targets: port 4 has the streams 4 to 6."""
+    got = {}
+    for target in ("plain", "native", "python"):
+        one = instance("noisy", target, toy=True)
+        one.initialize()
+        one.step(0.0, 0.25)
+        saved = one.save(one.get_state())
+        one.step(0.25, 0.25)
+        got[target] = one.get(["e[1]", "e[2]", "e[3]"])
+        one.set_state(one.load(saved))
+        one.step(0.25, 0.25)
+        assert one.get(["e[1]", "e[2]", "e[3]"]) == got[target]
+    assert got["native"] == got["plain"] == got["python"]
+    assert got["plain"] == [0.5 * normal(1, stream, 2) / math.sqrt(0.25) for stream in (4, 5, 6)]
+
+
 def test_cannot_be_declared_wrong(written: Callable) -> None:
     with pytest.raises(ValueError, match='one of "second", "step", "start"'):
         written("toy", '    n = Noise(1.0, "V", per="hour")\n')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gyrobench.component.blocks.random_drift import Flicker, Quantization, RateRandomWalk
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block, sampled
 from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
@@ -150,6 +151,7 @@ class SdfGyro(Component):
 
         omega_d = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_OO Y2 + D_SS Z2 + D_IO X Y + D_OS Y Z + D_IS X Z
                   + D_T T + D_B . B + D_dB . dB + turn-on bias + Gauss-Markov + white
+                  + flicker + random walk + ramp t + quantization                             [DRIFT-RANDOM-ALLAN]
         (X, Y, Z) = -f/g0 along I, O, S; T: mean temperature above that of the coefficients; B, dB: magnetic field
         torquer: precession rate k (1 + k_T T) i (1 + k2 i + k3 i2)
         u = K_sg b + noise, limited to +-u_max
@@ -184,6 +186,11 @@ class SdfGyro(Component):
     markov = GaussMarkov(0.002 * DEG_H, "rad/s", "Gauss-Markov drift", "0.002 deg/h")
     white = Noise(0.0178 * DEG_H, "rad/s/sqrt(Hz)", "white drift density (0.0178 deg/h/sqrt(Hz))")
     pickoff = Noise(5e-8, "V/sqrt(Hz)", "pickoff noise density")
+    flicker = Flicker("rad/s", "drift")
+    walk = RateRandomWalk("rad/s", "rad/s2/sqrt(Hz)", "drift")
+    quantization = Quantization("drift")
+    ramp = Parameter(0.0, "rad/s2", "ramp of the drift, coefficient R")
+    wanders = Discrete(0.0, "1", "1 where one of these four is given")
 
     omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, case axes")
     alpha = Input([0.0, 0.0, 0.0], "rad/s2", "angular acceleration, case axes")
@@ -201,6 +208,11 @@ class SdfGyro(Component):
     float_angle = State(0.0, "rad", "float angle b about O relative to the case")
     float_rate = State(0.0, "rad/s", "its rate r")
 
+    def start(self) -> None:
+        self.wanders = 0.0
+        if self.flicker > 0.0 or self.walk > 0.0 or self.quantization > 0.0 or self.ramp != 0.0:
+            self.wanders = 1.0
+
     def polynomial(self, fixed: Number, linear: Vector, x: Vector) -> Number:
         return drift_polynomial(
             fixed, linear, vector([self.D_II, self.D_OO, self.D_SS, self.D_IO, self.D_OS, self.D_IS]), x
@@ -214,7 +226,10 @@ class SdfGyro(Component):
         static = self.static_drift(PER_G * (self.mount @ self.f))
         if self.D_exposed > 0.0:
             static = static + self.D.added(self.temperature, self.mount @ self.B, self.mount @ self.dB)
-        return static + self.noise.turn_on + self.markov_value + self.noise.white
+        rate = static + self.noise.turn_on + self.markov_value + self.noise.white
+        if self.wanders > 0.0:
+            rate = rate + self.flicker_value + self.walk_value + self.quantization_rate + self.ramp * self.t
+        return rate
 
     def precession(self) -> Number:
         """Return the precession rate by the torquer."""

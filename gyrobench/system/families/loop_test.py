@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from gyrobench.record.motion_profile import read_profile
+from gyrobench.system.families.option_groups import GYRO_NOISES
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
@@ -39,7 +40,7 @@ def hold(time: float, least: float = 1.0) -> dict[str, Option]:
 
 def noises(gyros: Iterable[str] = ("gyro",), channels: Sequence[str] = ("",)) -> tuple[str, ...]:
     """Return the noises of gyros; channels: "_x", "_y" of those with two degrees of freedom."""
-    return tuple(f"{g}.{n}{c}" for g in gyros for n in ("turn_on", "markov", "white", "pickoff") for c in channels)
+    return tuple(f"{g}.{n}{c}" for g in gyros for n in GYRO_NOISES for c in channels)
 
 
 def three(*names: str) -> tuple[str, ...]:

@@ -6,6 +6,8 @@ import math
 
 from gyrobench.system.configurable import Option
 
+#: noise ports of a gyro, of each channel
+GYRO_NOISES = ("turn_on", "markov", "white", "pickoff", "flicker", "walk", "quantization")
 SITE = {
     "latitude": Option(
         "45.75deg", "rad", "geographic latitude, north positive", -math.pi / 2, math.pi / 2, sets="site.latitude"

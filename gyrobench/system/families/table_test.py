@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyrobench import frames
 from gyrobench.system.connectors import Socket
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import GYRO_NOISES, SITE
 from gyrobench.system.families.physical_form import physical_drift
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
@@ -21,7 +21,7 @@ FACE = "input axis along the table axis"
 #: gyro axes I, O, S (rows) in table axes: I = z_T, O = x_T, S = y_T
 ON_TABLE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
-SDF_NOISES = ("gyro.turn_on", "gyro.markov", "gyro.white", "gyro.pickoff")
+SDF_NOISES = tuple(f"gyro.{name}" for name in GYRO_NOISES)
 
 
 def on_table(**sockets: str | Socket | Slot) -> dict[str, Slot]:
