@@ -1,0 +1,1 @@
+"""Statistics of evenly sampled series: deviations, noise coefficients, models of random drift; plain arrays, SI."""

@@ -1,0 +1,208 @@
+"""Noise coefficients N, B, K, R, Q of a rate record, by restricted maximum likelihood and by slopes of the deviation.
+
+Model of the rate [IEEE 952, annex C], S two-sided: sigma_A^2(tau) = 4 int_0^inf S sin^4(pi f tau)/(pi f tau)^2 df,
+
+    term                      S(f)                            sigma_A^2(tau)        unit
+    N  angle random walk      N^2                             N^2/tau               rad/s/sqrt(Hz) = rad/sqrt(s)
+    B  bias instability       B^2/(2 pi f)                    2 ln 2 B^2/pi         rad/s
+    K  rate random walk       K^2/(2 pi f)^2                  K^2 tau/3             rad/s^2/sqrt(Hz)
+    Q  quantization           (2 pi f)^2 tau0 Q^2, f << 1/tau0   3 Q^2/tau^2        rad
+    R  rate ramp              (deterministic, R t)            R^2 tau^2/2           rad/s^2
+
+B is flicker at every frequency of the record, no cutoff.  A sample is the mean of the rate over tau0, a difference of
+angles; Q is the standard deviation of the error of an angle, independent from reading to reading.
+
+fit() maximizes the likelihood of :mod:`noise_likelihood`, where averaging, aliasing and the ramp are exact; slopes()
+reads the Allan deviation as the standard does.  [DRIFT-COEFFICIENTS; IEEE 952, annex C]
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+from gyrobench.reduction.series.deviations import Deviation
+from gyrobench.reduction.series.noise_likelihood import Likelihood
+
+Array = NDArray[np.float64]
+SHORTEST = 32  # samples of a stretch that is used
+NAMES = ("N", "B", "K", "Q")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One coefficient; not determined: the interval of 95 % holds zero, the coefficient is below ``high``."""
+
+    value: float
+    low: float
+    high: float
+    determined: bool
+
+
+@dataclass(frozen=True)
+class NoiseCoefficients:
+    """N [rad/s/sqrt(Hz)], B [rad/s], K [rad/s^2/sqrt(Hz)], R [rad/s^2, signed], Q [rad] with intervals of 95 %."""
+
+    N: Estimate
+    B: Estimate
+    K: Estimate
+    R: Estimate
+    Q: Estimate
+
+    def allan(self, tau: Array) -> Array:
+        """Return the Allan deviation (k,) of the determined terms over tau (s)."""
+        n, b, k, r, q = (e.value if e.determined else 0.0 for e in (self.N, self.B, self.K, self.R, self.Q))
+        parts = n * n / tau + 2.0 * math.log(2.0) / math.pi * b * b + k * k * tau / 3.0
+        out: Array = np.sqrt(parts + r * r * tau**2 / 2.0 + 3.0 * q * q / tau**2)
+        return out
+
+
+@functools.cache
+def _critical_table() -> tuple[Array, Array]:
+    """Critical value of the likelihood ratio at 95 % for a normal estimate bounded by zero, against the true value/sd.
+
+    1.645^2 at zero, 1.960^2 from 1.96 on; between, the ratio of a truncated estimate is accepted in 95 %.
+    """
+    size = np.linspace(0.0, 2.0, 41)
+
+    def excess(c: float, mu: float) -> float:
+        root = math.sqrt(c)
+        lowest = mu - root if root <= mu else (mu * mu - c) / (2.0 * mu)
+        return float(special.ndtr(root) - special.ndtr(lowest - mu)) - 0.95
+
+    values = [optimize.brentq(excess, 1.0, 9.0, args=(mu,)) if mu > 0.0 else 2.705543 for mu in size]
+    return size, np.array(values)
+
+
+class _Fit:
+    """Maximum of the likelihood and profiles of it."""
+
+    def __init__(self, likelihood: Likelihood) -> None:
+        self.f = likelihood
+        start = likelihood.start()
+        self.scale = self._sd(start)
+        start = np.maximum(start, 0.1 * self.scale * (start > 0.0))
+        self.v, self.least = self._minimum(start, None)
+
+    def _sd(self, v: Array) -> Array:
+        info = self.f.information(v)
+        d = 1.0 / np.sqrt(np.diag(info))
+        out: Array = d * np.sqrt(np.diag(np.linalg.pinv(info * np.outer(d, d), rcond=1e-10, hermitian=True)))
+        return out
+
+    def _minimum(self, start: Array, fixed: int | None) -> tuple[Array, float]:
+        free = np.array([i for i in range(4) if i != fixed])
+
+        def value(x: Array) -> float:
+            v = start.copy()
+            v[free] = np.maximum(x, 0.0) * self.scale[free]
+            return self.f(v)
+
+        best = optimize.minimize(
+            value, start[free] / self.scale[free], method="L-BFGS-B", bounds=[(0.0, None)] * free.size,
+            options={"ftol": 1e-7, "gtol": 1e-3},
+        )  # fmt: skip
+        v = start.copy()
+        v[free] = np.maximum(best.x, 0.0) * self.scale[free]
+        if best.fun < self.f(start):
+            return v, float(best.fun)
+        return start, self.f(start)
+
+    def interval(self, j: int) -> tuple[float, float]:
+        """Return the ends of v_j: where the profile of the likelihood ratio reaches its critical value."""
+        path = {float(self.v[j]): (self.v, self.least)}
+
+        def excess(value: float) -> float:
+            near = min(path, key=lambda known: abs(known - value))
+            start = path[near][0].copy()
+            start[j] = value
+            path[value] = v, least = self._minimum(start, j)
+            return least - self.least - float(np.interp(value / self._sd(v)[j], *_critical_table()))
+
+        centre, step = float(self.v[j]), float(self.scale[j])
+        low = 0.0
+        if centre > 0.0 and excess(0.0) > 0.0:
+            low = float(optimize.brentq(excess, 0.0, centre, rtol=1e-3, xtol=1e-3 * step))
+        upper = centre + 2.0 * step
+        while excess(upper) < 0.0:
+            upper = centre + 2.0 * (upper - centre)
+        high = float(optimize.brentq(excess, centre, upper, rtol=1e-3, xtol=1e-3 * step))
+        return low, high
+
+    def ramp(self) -> tuple[float, float]:
+        """Return the ramp per sample and its standard deviation at the maximum."""
+        _, info, score = self.f.ramp(self.v)
+        return score / info, 1.0 / math.sqrt(info)
+
+
+def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
+    """Return the coefficients of a rate (n,) in rad/s, means over tau0 (s), or of stretches of it.
+
+    Stretches (or parts between NaN) of SHORTEST samples or more are used as independent of each other: their means and
+    the time between them tell nothing.
+    """
+    parts = [
+        p for x in ([rate] if isinstance(rate, np.ndarray) else rate) for p in _present(np.asarray(x, dtype=float))
+    ]
+    if not parts:
+        raise ValueError(f"no stretch of {SHORTEST} samples without a gap")
+    size = math.sqrt(float(np.mean([np.var(np.diff(p)) for p in parts])))
+    if not size > 0.0:
+        raise ValueError("the record is constant; it has no noise to fit")
+    found = _Fit(Likelihood([p / size for p in parts]))
+    unit = {"N": size * math.sqrt(tau0), "B": size, "K": size / math.sqrt(tau0), "Q": size * tau0}
+    estimates = {}
+    for j, name in enumerate(NAMES):
+        low, high = found.interval(j)
+        value, low, high = (math.sqrt(x) * unit[name] for x in (float(found.v[j]), low, high))
+        estimates[name] = Estimate(value, low, high, low > 0.0)
+    slope, sd = (x * size / tau0 for x in found.ramp())
+    low, high = slope - 1.96 * sd, slope + 1.96 * sd
+    return NoiseCoefficients(R=Estimate(slope, low, high, low * high > 0.0), **estimates)
+
+
+def _present(x: Array) -> list[Array]:
+    there = np.isfinite(x)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]])))
+    return [x[a:b] for a, b in edges.reshape(-1, 2) if b - a >= SHORTEST]
+
+
+#: Slope of the Allan deviation and what its value at tau is multiplied by: coefficient = factor * sigma * tau^-slope.
+SLOPES = {
+    "Q": (-1.0, 1.0 / math.sqrt(3.0)),
+    "N": (-0.5, 1.0),
+    "B": (0.0, math.sqrt(math.pi / (2.0 * math.log(2.0)))),
+    "K": (0.5, math.sqrt(3.0)),
+    "R": (1.0, math.sqrt(2.0)),
+}
+
+
+def slopes(deviation: Deviation) -> NoiseCoefficients:
+    """Return the coefficients as they are read from an Allan deviation, [IEEE 952, annex C]; R without its sign.
+
+    A straight line of the slope of the term through the pair of neighbouring tau (edf of 5 or more) whose slope is
+    nearest; its interval is that of the deviation there.  No pair within 0.25 of the slope: not determined, below the
+    lowest line over the upper ends of the deviation.  Terms are read as if alone: where two are of like size, the
+    reading is high by up to the square root of two, and the interval does not cover.
+    """
+    usable = deviation.edf >= 5.0
+    tau, dev = deviation.tau[usable], deviation.deviation[usable]
+    low, high = deviation.low[usable], deviation.high[usable]
+    local = np.diff(np.log(dev)) / np.diff(np.log(tau))
+    found = {}
+    for name, (slope, factor) in SLOPES.items():
+        line = factor * tau**-slope
+        top = float(np.min(line * high, initial=math.inf))
+        i = int(np.argmin(np.abs(local - slope))) if local.size else 0
+        if not local.size or abs(local[i] - slope) > 0.25:
+            found[name] = Estimate(0.0, 0.0, top, False)
+            continue
+        value, least, most = (math.sqrt(float(y[i] * y[i + 1])) for y in (line * dev, line * low, line * high))
+        found[name] = Estimate(value, least, most, True)
+    return NoiseCoefficients(**found)
