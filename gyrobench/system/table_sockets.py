@@ -19,6 +19,7 @@ TABLES: tuple[Socket, ...] = (
             inp("rate", "rad/s", "rate of the shaft relative to the base"),
             out("torque", "N.m", "motor torque on the shaft"),
             out("voltage", "V", "voltage of the motor", optional=True),
+            out("current", "A", "current of the motor", optional=True),
             limit_flag("saturated", "1 while the motor is at its limit"),
         ),
     ),

@@ -1,17 +1,22 @@
-"""How often 95 % intervals of the rate and position tests of a table hold the truth, over random tables.
+"""How often 95 % intervals of the tests of a table hold the truth, over random tables.
 
-python tests/benchmarks/table_tests.py [--runs 300]
+python tests/benchmarks/table_tests.py [--runs 300] [--test table_rate_test]
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 
 import gyrobench as gb
+
+sys.path.append(str(Path(__file__).parents[1] / "systems"))
+import test_table_motor
 
 ARCSEC = math.pi / 648000
 
@@ -60,6 +65,7 @@ def position_test(seed: int) -> gb.Run:
 TESTS = {
     "table_rate_test": rate_test,
     "table_position_test": position_test,
+    "table_motor_test": test_table_motor.drawn,
 }
 
 
