@@ -16,10 +16,12 @@ SIGMA2 = 3.3697e-6  # its innovation variance
 
 
 def arrays(parameters: dict[str, Any]) -> dict[str, float]:
-    """phi=[a, b] as phi[1] ... phi[5]."""
+    """phi=[a, b] as phi[1] ... phi[5]; an array of numpy as it is, element by element."""
     found: dict[str, float] = {}
     for name, value in parameters.items():
-        if isinstance(value, Sequence):
+        if isinstance(value, np.ndarray):
+            found |= {f"{name}[{','.join(str(k + 1) for k in i)}]": float(x) for i, x in np.ndenumerate(value)}
+        elif isinstance(value, Sequence):
             found |= {f"{name}[{i + 1}]": float(x) for i, x in enumerate([*value, *[0.0] * (5 - len(value))])}
         else:
             found[name] = float(value)
@@ -42,21 +44,26 @@ def play(
 ) -> Array:
     """Outputs after each reading: (n,) for one output, (n, m) for a list; T: communication step, s.
 
+    z, valid: (n,), or (n, m) for the first m readings of a part that has several.
+
     instance: of the part, used and reset.
     """
     names = [outputs] if isinstance(outputs, str) else list(outputs)
     one: Any = instance or make(part, "native")
-    given = np.column_stack([z] if valid is None else [z, valid]).astype(float).tolist()
+    columns = np.asarray(z, dtype=float).reshape(len(z), -1)
+    there = np.ones_like(columns) if valid is None else np.asarray(valid, dtype=float).reshape(len(z), -1)
+    given = np.hstack([columns, there]).tolist()
+    fed = [f"{n}{'' if k == 0 else f'_{k + 1}'}" for n in ("z", "valid") for k in range(columns.shape[1])]
     try:
         one.set(arrays(parameters))
         one.initialize(0.0)
         found = np.empty((len(z), len(names)))
         # by FMI's own functions with buffers made once: there are tests with a million readings
-        fmu, known, wanted = one.fmu, ["z", "valid"][: len(given[0])], len(names)
+        fmu, known, wanted = one.fmu, [n for n in fed if n in one.variables], len(names)
         inputs, found_at = (_references(one, ns) for ns in (known, names))
         x, y = (c_double * len(known))(), (c_double * wanted)()
         for k, reading in enumerate(given):
-            x[:] = reading
+            x[:] = reading[: len(known)]
             fmu.fmi2SetReal(fmu.component, inputs, len(known), x)
             fmu.fmi2DoStep(fmu.component, k * T, T, 1)
             fmu.fmi2GetReal(fmu.component, found_at, wanted, y)
@@ -105,6 +112,35 @@ def kalman(z: Array, F: Array, G: Array, R: float, P0: Array, valid: Array | Non
             P = (np.eye(n) - K @ H) @ P @ (np.eye(n) - K @ H).T + K @ K.T * R
         found.append((x[0, 0], P[0, 0], y, e))
     return np.array(found)
+
+
+def kalman_of_many(
+    z: Array, A: Array, C: Array, W: Array, V: Array, x0: Array, P0: Array, valid: Array | None = None
+) -> list[tuple[Array, Array, float]]:
+    """(x, P, nis) after each instant of the filter written in matrices; z: (k, m); rows that are missing left out."""
+    x, P, found = np.array(x0, dtype=float), np.array(P0, dtype=float), []
+    for k, reading in enumerate(z):
+        x, P, e = A @ x, A @ P @ A.T + W, 0.0
+        rows = np.flatnonzero(valid[k]) if valid is not None else np.arange(len(C))
+        if rows.size:
+            H, R = C[rows], V[np.ix_(rows, rows)]
+            S = H @ P @ H.T + R
+            K = np.linalg.solve(S, H @ P).T
+            y = reading[rows] - H @ x
+            e = float(y @ np.linalg.solve(S, y))
+            x, L = x + K @ y, np.eye(len(x)) - K @ H
+            P = L @ P @ L.T + K @ R @ K.T
+        found.append((x, P, e))
+    return found
+
+
+def padded(**matrices: Array) -> dict[str, Array]:
+    """A, W, P0 (6, 6), C (3, 6), V, psi (3, 3), x0 (6,) for the parts of the linear model."""
+    shapes = {"A": (6, 6), "W": (6, 6), "P0": (6, 6), "C": (3, 6), "V": (3, 3), "psi": (3, 3), "x0": (6,)}
+    found = {name: np.zeros(shapes[name]) for name in matrices}
+    for name, x in matrices.items():
+        found[name][tuple(slice(0, k) for k in np.shape(x))] = x
+    return found
 
 
 def riccati(F: Array, G: Array, R: float) -> tuple[float, float]:

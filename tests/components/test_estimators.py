@@ -18,6 +18,9 @@ SAMPLED = [
     "estimator_alpha_beta_gamma",
     "estimator_kalman_ar",
     "estimator_kalman_rate",
+    "estimator_kalman_robust",
+    "estimator_lti",
+    "estimator_coloured",
     "estimator_sage_husa",
     "estimator_wavelet",
 ]

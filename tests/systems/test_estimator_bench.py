@@ -283,3 +283,19 @@ def test_an_estimator_that_states_no_latency(foreign: Callable[[str], Path], tmp
     assert found["delay"].closed is None and "late error re raw" not in found and "phase" in found
     a = math.exp(-0.2)
     assert found["delay"].estimate == pytest.approx(a / (1.0 - a), abs=4.0 * found["delay"].u)
+
+
+@pytest.mark.parametrize(
+    ("benchmark", "same"), [("sine", "kalman_rate"), ("level", "kalman_rate"), ("ar3", "kalman_ar")]
+)
+@pytest.mark.parametrize("part", ["lti", "coloured"])
+def test_the_filters_of_any_model_get_the_model_of_the_benchmark(part: str, benchmark: str, same: str) -> None:
+    """Swapped in with nothing else said, they are the filter made for it (white readings: psi = 0)."""
+    found, expected = (named(result(p, benchmark)) for p in (part, same))
+    for name in ("error", "NEES", "NIS"):
+        assert found[name].estimate == pytest.approx(expected[name].estimate, rel=1e-5), name
+
+
+def test_a_gate_costs_nothing_where_no_reading_is_wild() -> None:
+    robust, plain = (named(result(p, "level")) for p in ("kalman_robust", "kalman_rate"))
+    assert robust["error re raw"].estimate == pytest.approx(plain["error re raw"].estimate, abs=0.05)

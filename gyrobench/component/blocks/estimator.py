@@ -5,7 +5,7 @@ from __future__ import annotations
 from gyrobench.component.component import Component
 from gyrobench.component.composition import sampled
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter
-from gyrobench.component.math import Number, Vector, fabs, floor, index
+from gyrobench.component.math import Number, Vector, exp, fabs, floor, index, pi, sqrt
 
 ZERO = [0.0, 0.0, 0.0, 0.0, 0.0]
 
@@ -62,6 +62,61 @@ class KalmanEstimator(SampledEstimator):
         self.nis = self.e
 
 
+class RateFilter(KalmanEstimator):
+    """Kalman filter of a rate that wanders, its prediction and its update: value and slope, or a level alone."""
+
+    q = Parameter(0.5, "1/s3", "density of the white noise that drives the slope, (unit of z)2/s3", min=0.0)
+    walk = Parameter(0.0, "1/s", "density of the white noise that drives the value, (unit of z)2/s", min=0.0)
+    R = Parameter(2.699449e-6, "1", "variance of the noise of one reading, (unit of z)2", above=0.0)
+    P0 = Parameter(1.0, "1", "variance of the value at the start, (unit of z)2", min=0.0)
+    P0_slope = Parameter(1.0, "1/s2", "variance of the slope at the start, (unit of z)2/s2", min=0.0)
+
+    x = Discrete(0.0, "1", "value")
+    v = Discrete(0.0, "1/s", "slope")
+    P_xx = Discrete(0.0, "1", "variance of the value")
+    P_xv = Discrete(0.0, "1/s", "covariance of value and slope")
+    P_vv = Discrete(0.0, "1/s2", "variance of the slope")
+
+    def start(self) -> None:
+        self.x = 0.0
+        self.v = 0.0
+        self.P_xx = self.P0
+        self.P_xv = 0.0
+        self.P_vv = self.P0_slope
+
+    def predict(self) -> None:
+        T = self.Ts
+        self.x = self.x + T * self.v
+        self.P_xx = self.P_xx + T * (2.0 * self.P_xv + T * self.P_vv) + self.q * T * T * T / 3.0 + self.walk * T
+        self.P_xv = self.P_xv + T * self.P_vv + 0.5 * self.q * T * T
+        self.P_vv = self.P_vv + self.q * T
+        self.y = 0.0
+        self.e = 0.0
+
+    def judge(self) -> None:
+        """Set innovation and nis of a reading."""
+        self.y = self.z - self.x
+        self.e = self.y * self.y / (self.P_xx + self.R)
+
+    def update(self, R: Number) -> None:
+        """Take the reading, with R for the variance of its noise."""
+        variance = self.P_xx + R
+        k = self.P_xx / variance
+        g = self.P_xv / variance
+        self.x = self.x + k * self.y
+        self.v = self.v + g * self.y
+        a = 1.0 - k
+        xx = self.P_xx
+        xv = self.P_xv
+        self.P_xx = a * a * xx + k * k * R
+        self.P_xv = a * (xv - g * xx) + k * g * R
+        self.P_vv = self.P_vv - 2.0 * g * xv + g * g * xx + g * g * R
+
+    def outputs(self) -> None:
+        self.estimate = self.x
+        self.variance = self.P_xx
+
+
 def stationary(phi: Vector, p: Number, sense: Number) -> Number:
     """Return 1 where x_t = sense (phi_1 x_{t-1} + ... + phi_p x_{t-p}) + w_t is stationary, else 0.
 
@@ -84,3 +139,24 @@ def stationary(phi: Vector, p: Number, sense: Number) -> Number:
                 if i < last:
                     f[i] = (g[i] + k * g[index(last - 1.0 - i)]) / (1.0 - k * k)
     return inside
+
+
+def chi_square_gate(p: Number) -> Number:
+    """Return the bound below which a chi-square variable of one degree of freedom lies with the probability p.
+
+    The bound of its root t by halving: p = erf(t/sqrt 2) = sqrt(2/pi) e^(-t2/2) (t + t3/3 + t5/15 + t7/105 ...).
+    """
+    low = 0.0
+    high = 7.0
+    for _k in range(60):
+        t = 0.5 * (low + high)
+        term = t
+        total = t
+        for i in range(100):
+            term = term * t * t / (2.0 * i + 3.0)
+            total = total + term
+        if sqrt(2.0 / pi) * exp(-0.5 * t * t) * total < p:
+            low = t
+        else:
+            high = t
+    return low * low
