@@ -16,8 +16,8 @@ class EstimatorKalmanRobust(RateFilter):
     Inflated, not thrown away: a wild reading moves the value by P_xx g / |y|, less the wilder it is, and the variance
     that the filter states hardly falls with it.  The `patience`-th wild reading in a row is taken for a change of the
     signal: P is inflated instead, P <- (y2/g - R)/P_xx P (patience = 0: never).  Where model and noise (normal) are
-    right, one reading in 1/(1 - p) is called wild, and
-    (1 - p)^patience of them restart the filter: 0.001 and 1e-15 by default.
+    right, one reading in 1/(1 - p) is called wild, and (1 - p)^patience of them restart the filter: 0.001 and 1e-15 by
+    default.
 
     nis = y2/S of every reading, wild or not; wild: 1 while the last reading was; wild_count, restarts: how often.
     valid = 0: prediction only.
