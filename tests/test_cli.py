@@ -17,6 +17,7 @@ import pytest
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.commands import cli, progress_display
+from gyrobench.commands.arguments import parse_settings
 from gyrobench.commands.console import print_notes
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
@@ -125,6 +126,24 @@ def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path
     assert (tmp_path / "w.svg").read_text(encoding="utf-8").startswith("<svg")
 
 
+def test_values_of_a_file(gyrobench: Call, tmp_path: Path) -> None:
+    """Options at the top, parameters under their slot; a value given singly goes before that of the file."""
+    (tmp_path / "v.toml").write_text(
+        'latitude = "50deg"\nturns = 3\n[gyro]\nwhite = "0.05deg/h/sqrt(Hz)"\nreaction = true\n'
+        '[table]\n"tilt[1]" = 1e-5\n'
+    )
+    assert parse_settings(["@v.toml", "turns=2"]) == {
+        "latitude": "50deg", "turns": "2", "gyro.white": "0.05deg/h/sqrt(Hz)", "gyro.reaction": "true",
+        "table.tilt[1]": "1e-05",
+    }  # fmt: skip
+    code, out, err = gyrobench("show", NAME, "--set", "@v.toml", "--set", "latitude=60deg")
+    assert (code, err) == (0, "") and "latitude        60°" in out and "turns           3" in out
+    (tmp_path / "v.toml").write_text("[gyro]\nwite = 0.0\n")
+    assert "gyro has no parameter 'wite'; nearest: white" in gyrobench("show", NAME, "--set", "@v.toml")[2]
+    (tmp_path / "v.toml").write_text("date = 2026-01-01\n")
+    assert "--set @v.toml: date = 2026-01-01: write a number" in gyrobench("show", NAME, "--set", "@v.toml")[2]
+
+
 # --------------------------------------------------------------------------------------------- refused
 REFUSED = [
     (["run", "tumbl_single_axis"], "no system 'tumbl_single_axis'; did you mean tumble_single_axis?"),
@@ -137,6 +156,8 @@ REFUSED = [
     (["run", NAME, "--set", "latitude=45m"], "'m' (m) does not convert to 'rad'"),
     (["run", NAME, "--set", "latitude"], "--set latitude: write NAME=VALUE, for example --set latitude=45.75deg"),
     (["run", NAME, "--set", "turns=1", "--set", "turns=2"], "--set turns: given twice, 1 and 2"),
+    (["run", NAME, "--set", "@no.toml"], "--set @no.toml: No such file or directory"),
+    (["run", NAME, "--set", "@bad.fmu"], "--set @bad.fmu: not a TOML file"),
     (["run", NAME, "--step", "1m"], "units that fit: s, ms"),
     (["run", NAME, "--part", "gyr=site"], "no slot 'gyr'; slots: site"),
     (["run", NAME, "--part", "gyro=floated_gyr"], "no part 'floated_gyr'; did you mean floated_gyro?"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -32,8 +34,41 @@ def parse_assignments(values: list[str] | None, option: str, example: str) -> di
 
 
 def parse_settings(values: list[str] | None) -> dict[str, str]:
-    """Return the values of --set by name.  Raises UsageError."""
-    return parse_assignments(values, "--set", "latitude=45.75deg")
+    """Return the values of --set by name; those given one by one go before those of files.  Raises UsageError."""
+    from_files: dict[str, str] = {}
+    for v in values or []:
+        if v.startswith("@"):
+            from_files |= read_settings(Path(v[1:].strip()))
+    singly = [v for v in values or [] if not v.startswith("@")]
+    return from_files | parse_assignments(singly, "--set", "latitude=45.75deg")
+
+
+def read_settings(file: Path) -> dict[str, str]:
+    """Return the values of a TOML file by name: options at the top, parameters of a part in a table named as its slot.
+
+    Raises UsageError.
+    """
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"--set @{file}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"--set @{file}: not a TOML file: {error}") from None
+    settings: dict[str, str] = {}
+
+    def add(name: str, value: Any) -> None:
+        if isinstance(value, dict):
+            for inner, v in value.items():
+                add(f"{name}.{inner}" if name else inner, v)
+        elif isinstance(value, str):
+            settings[name] = value
+        elif isinstance(value, bool | int | float | list):
+            settings[name] = json.dumps(value)
+        else:
+            raise UsageError(f"--set @{file}: {name} = {value}: write a number (SI), a text with its unit, or a list")
+
+    add("", content)
+    return settings
 
 
 def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict[str, str], dict[str, Path]]:

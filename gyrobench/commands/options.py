@@ -19,8 +19,9 @@ Set = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        metavar="NAME=VALUE",
-        help="Set an option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  Repeatable.",
+        metavar="NAME=VALUE|@FILE",
+        help="Set an option of the system, or slot.parameter of a part; with unit (2deg/s) or in SI.  @FILE.toml: all "
+        "values of a file, parameters in a table named as their slot.  Repeatable.",
         autocompletion=complete_setting,
     ),
 ]
