@@ -66,7 +66,8 @@ def reduce(
         raise UsageError(f"no record named; gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
     if len(data) > 1:
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
-    return _print_outcome(reduce_measured(test, data[0], values, spec, out, force, formats=formats), as_json)
+    outcome = reduce_measured(test, data[0], values, spec, out, force, formats=formats, feedback=FEEDBACK)
+    return _print_outcome(outcome, as_json)
 
 
 def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:

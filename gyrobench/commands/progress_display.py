@@ -23,7 +23,12 @@ def format_duration(seconds: float) -> str:
 
 
 def format_status(status: Any) -> str:
-    """Return simulated time, rate and time left of a :class:`gyrobench.engine.run_driver.ProgressReport`."""
+    """Return simulated time, rate and time left of a :class:`gyrobench.engine.run_driver.ProgressReport`.
+
+    The progress of anything else has its own ``words``.
+    """
+    if hasattr(status, "words"):
+        return str(status.words)
     rate = status.steps / max(status.elapsed, 1e-9)
     speed = f"{rate / 1e6:.2f} M steps/s" if rate >= 1e5 else f"{rate:,.0f} steps/s"
     if status.time >= status.total:  # the transitions between the phases of a plan are not known beforehand

@@ -197,7 +197,7 @@ class Experiment:
         spec, out, force: as of :meth:`run`.  Raises errors of type GyrobenchError.
         """
         file = Path(data)
-        if not file.is_file():
+        if not file.exists():
             raise UsageError(f"{file}: no such file of measured data")
         outcome = reduce_measured(
             self.system.with_values({}), file, {**self._given, **circumstances}, spec,

@@ -234,6 +234,7 @@ class RunDocument(Document):
     problem: str = Field(default="", description="why the run is not complete")
     tables: dict[str, str] = Field(default_factory=dict, description="file of the record -> SHA-256")
     data: DataFile | None = None
+    series: dict[str, Any] | None = Field(default=None, description="of a drift record: columns and acquisition, SI")
     days: list[Day] = Field(default_factory=list, description="of a record of several days")
     polarity: str = Field(default="", description="sign convention of measured data")
     type_b: str = Field(default="", description="of measured data, none: no uncertainty of type B is declared")

@@ -80,7 +80,9 @@ def _open(file: Path, head: Head, wanted: list[str], kind: Any, invalid: Callabl
     return arrow.open_csv(
         file,
         arrow.ReadOptions(skip_rows=head.line, column_names=names, block_size=BLOCK),
-        arrow.ParseOptions(delimiter=head.delimiter, invalid_row_handler=invalid),
+        arrow.ParseOptions(  # an empty line is a row of one empty cell, or none
+            delimiter=head.delimiter, invalid_row_handler=invalid, ignore_empty_lines=len(head.names) > 1
+        ),
         convert,
     )
 

@@ -104,10 +104,12 @@ class MeasuredData:
 
     template: an empty record with its explanations, printed by ``gyrobench reduce SYSTEM --template``.
     read: (system, file, values) -> record; see gyrobench.system.lab_record for one that fits most tests.
+    progress: the reader takes a fourth argument, which gets its progress: a file may have any length.
     """
 
     template: str
-    read: Callable[[System, Path, Mapping[str, str]], Record]
+    read: Callable[..., Record]
+    progress: bool = False
 
 
 class System(Configurable):

@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import DataFile
 from gyrobench.report import FORMATS
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import MeasuredData, System
+from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import find_specification, load_limits, load_test
 from gyrobench.workflow.run_folders import prepare_folder
 from gyrobench.workflow.saved_run import RunOutcome, write_report
@@ -44,16 +46,21 @@ def reduce_measured(
     force: bool = False,
     in_memory: bool = False,
     formats: Sequence[str] = FORMATS,
+    feedback: Feedback = SILENT,
 ) -> RunOutcome:
     """Reduce a laboratory's file; write record and report, unless they are kept in memory.
 
     values: as given to --set, for the reader.  Raises UsageError, DataError, ReductionError and PostRunError.
     """
-    reader = _measured_data(system).read
+    measured = _measured_data(system)
     file = find_specification(spec)
     limits = load_limits(file)
-    record = reader(system, data, values)
-    with data.open("rb") as content:
+    if measured.progress:
+        with feedback.progress("reading") as progress:
+            record = measured.read(system, data, values, progress)
+    else:
+        record = measured.read(system, data, values)
+    with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
     digest.update(repr(sorted(values.items())).encode())

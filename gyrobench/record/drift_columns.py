@@ -1,0 +1,248 @@
+"""Tables of drift records: which columns are a rate, an angle or counts, and their rows in blocks of bounded size.
+
+    # scale = 0.5arcsec
+    time [s],counts x [1],counts y [1],temperature [degC]
+
+CSV, Parquet (columns named "name [unit]", or the unit in the field's metadata; comments in the file's), or the folder
+of a run.  A column is a rate or an angle by its unit, or by ``scale``, the rate or angle of one of its units.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.record.csv_reader import Column, DataError, Head, header_places, read_head
+from gyrobench.record.record import Record
+from gyrobench.record.time_series import read_blocks
+
+Array = NDArray[np.float64]
+Blocks = Iterator[dict[str, Array]]
+TIME, FLAG = "time", "flag"
+ROWS = 1 << 18  # of a block of a Parquet file
+RATE, ANGLE, INCREMENT = "rate", "angle", "increment"
+KINDS = {RATE: "rad/s", ANGLE: "rad"}
+SIGNALS = "a drift record holds a rate [deg/h], an angle [arcsec], or another quantity with '# scale = 17.2deg/h/mA'"
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A column that becomes a rate: SI value * factor is rad/s (rate) or rad (angle, cumulative; increment)."""
+
+    name: str
+    unit: str  # as in the file
+    kind: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of unknown length.  blocks(columns): rows in SI, missing cells as NaN; size: rows, 0 where not known."""
+
+    source: Path
+    head: Head
+    size: int
+    blocks: Callable[[Sequence[Column]], Blocks]
+
+    def done(self, rows: int) -> float:
+        """Return the part of the table that so many rows are."""
+        return rows / self.size if self.size else 0.0
+
+
+def open_table(source: Path) -> Table:
+    """Return a CSV or Parquet file, or the channels (windows, where there are none) of a run's folder.
+
+    Raises DataError for anything else, RecordError for a folder that is not a run.
+    """
+    if source.is_dir():
+        return _of_run(Record.load(source), source)
+    if not source.is_file():
+        raise DataError(source, ["no such file; name a CSV or Parquet file, or the folder of a run"])
+    if source.stat().st_size == 0:
+        raise DataError(source, ["the file is empty"])
+    with source.open("rb") as file:
+        parquet = file.read(4) == b"PAR1"
+    if parquet or source.suffix == ".parquet":
+        return _of_parquet(source)
+    head = read_head(source)
+    return Table(source, head, _rows_of_csv(source, head), lambda columns: read_blocks(source, head, columns))
+
+
+def _rows_of_csv(source: Path, head: Head) -> int:
+    """Return the number of rows, from the length of the first ones; only for the progress."""
+    with source.open("rb") as lines:
+        for _ in range(head.line):
+            next(lines)
+        start = lines.tell()
+        sample = lines.read(1 << 16)
+    count = sample.count(b"\n")
+    return int((source.stat().st_size - start) * count / len(sample)) if count else 0
+
+
+def _of_parquet(source: Path) -> Table:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        file = pq.ParquetFile(source, memory_map=True)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise DataError(source, [f"not a readable Parquet file: {error}"]) from None
+    schema = file.schema_arrow
+    names, problems = [], []
+    for field in schema:
+        unit = (field.metadata or {}).get(b"unit", b"").decode()
+        names.append(f"{field.name} [{unit}]" if unit and "[" not in field.name else field.name)
+    comments = {k.decode(): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items()
+                if k not in (b"ARROW:schema", b"pandas")}  # fmt: skip
+    head = Head(names, comments, 0, ",", False)
+
+    def blocks(columns: Sequence[Column]) -> Blocks:
+        places, wrong = header_places(names, {c.name: c for c in columns})
+        for name, (k, _) in places.items():
+            kind = schema.field(k).type
+            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+                wrong.append(f"column '{name}': holds {kind}, numbers are expected")
+        if wrong:
+            raise DataError(source, wrong)
+        asked = [schema.field(k).name for k, _ in places.values()]
+        for batch in file.iter_batches(ROWS, columns=asked):
+            yield {n: f.to_si(_numbers(batch.column(schema.field(k).name))) for n, (k, f) in places.items()}
+
+    if not file.metadata.num_rows:
+        problems.append("no rows below the header")
+    if problems:
+        raise DataError(source, problems)
+    return Table(source, head, file.metadata.num_rows, blocks)
+
+
+def _numbers(column: Any) -> Array:
+    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=float)
+
+
+def _of_run(record: Record, source: Path) -> Table:
+    """The channels of a run, or its windows: time is then the middle of each."""
+    columns, of = record.table("channels")
+    if not columns:
+        columns, of = record.table("windows")
+        if "t_start" in columns:
+            columns = {TIME: 0.5 * (columns["t_start"] + columns["t_end"]), **columns}
+            of = {**of, TIME: "s"}
+    heads = [f"{n} [{of[n]}]" if of.get(n) not in ("", "1", None) else n for n in columns]
+    head = Head(heads, {"instrument": record.run.instrument} if record.run.instrument else {}, 0, ",", False)
+
+    def blocks(asked: Sequence[Column]) -> Blocks:
+        yield {c.name: np.asarray(columns[c.name], dtype=float) for c in asked if c.name in columns}
+
+    return Table(source, head, len(next(iter(columns.values()), ())), blocks)
+
+
+def named(head: Head) -> dict[str, str | None]:
+    """Return the columns: name -> unit, None where none is written."""
+    out: dict[str, str | None] = {}
+    for text in head.names:
+        name, bracket, unit = text.partition("[")
+        out.setdefault(name.strip(), unit.strip().rstrip("]").strip() if bracket else None)
+    return out
+
+
+def find_signals(table: Table, channel: str, scale: str, increments: bool) -> list[Signal]:
+    """Return the columns that become rates: those that ``channel`` names, or all whose unit (times scale) says so.
+
+    scale: "0.5arcsec", "17.2deg/h/mA": one unit (of a column without one: 1) as rate or angle; "" for none.
+    increments: an angle is the one of a sample, not cumulative.  Raises DataError.
+    """
+    there = named(table.head)
+    wanted = [n for n in channel.replace(",", " ").split() if n] if channel else []
+    if channel and channel.strip() in there:
+        wanted = [channel.strip()]
+    problems = [f"column '{n}' is missing; columns of the file: {', '.join(there)}" for n in wanted if n not in there]
+    if not wanted:
+        wanted = [n for n in there if n not in (TIME, FLAG) and not n.startswith(("temperature", "t_", "angle_"))]
+    signals = []
+    for name in wanted:
+        if name not in there:
+            continue
+        found = _signal(name, there[name], scale, increments)
+        if isinstance(found, Signal):
+            signals.append(found)
+        elif channel:
+            problems.append(found)
+    if not signals and not problems:
+        whys = [_signal(n, there[n], scale, increments) for n in wanted]
+        none = f"no rate and no angle among the columns of the file ({', '.join(there)}); {SIGNALS}"
+        problems = [w for w in whys if isinstance(w, str)][:4] or [none]
+    if problems:
+        raise DataError(table.source, problems)
+    return signals
+
+
+def _signal(name: str, unit: str | None, scale: str, increments: bool) -> Signal | str:
+    """Return the column as a signal, or why it is none."""
+    try:
+        own = units.unit(unit or "1")
+    except units.UnitError as error:
+        return f"column '{name}': {error}"
+    angle = INCREMENT if increments else ANGLE
+    for kind, si in KINDS.items():
+        if own.exponents == units.unit(si).exponents:
+            return Signal(name, unit or "", angle if kind == ANGLE else kind, 1.0)
+    if own.offset:
+        return f"column '{name}': [{unit}] is neither a rate nor an angle; {SIGNALS}"
+    if not scale:
+        what = f"[{unit}] is neither a rate nor an angle" if unit else "no unit"
+        return f"column '{name}': {what}; {SIGNALS}, counts '# scale = 0.5arcsec'"
+    if re.fullmatch(r"[-+.\deE\s]+", scale):
+        return f"scale = {scale}: no unit; write what one unit of '{name}' is, '0.5arcsec' or '17.2deg/h/mA'"
+    for kind, si in KINDS.items():
+        try:
+            factor = units.parse_quantity(scale, _per(si, unit))
+        except units.UnitError:
+            continue
+        if not factor:
+            return f"scale = {scale}: must not be 0"
+        return Signal(name, unit or "", angle if kind == ANGLE else kind, factor)
+    return f"column '{name}': scale = {scale} times [{unit or '1'}] is neither a rate nor an angle; {SIGNALS}"
+
+
+def _per(si: str, unit: str | None) -> str:
+    """Return the SI unit of a rate or angle per unit of a column."""
+    if not unit or units.unit(unit).exponents == units.unit("1").exponents:
+        return si
+    return f"{si}/({units.unit(unit).dimension})"
+
+
+def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list[Column]:
+    """Return what is read: time, signals in SI of their own unit, flag, temperatures and the named regressors.
+
+    Raises DataError for a regressor that is missing or has a wrong unit.
+    """
+    there = named(table.head)
+    if TIME in there and there[TIME] is None:
+        raise DataError(table.source, [f"column '{TIME}': no unit; write '{TIME} [s]' (or [ms], [min], [h])"])
+    columns = [Column(TIME, "s", "time of the sample")] if TIME in there else []
+    columns += [Column(s.name, _si(s.unit), "signal") for s in signals]
+    columns += [Column(FLAG, "1", "suspect", required=False)] if FLAG in there else []
+    names = [n for n in there if n.startswith("temperature")]
+    asked = [n for n in regressors.replace(",", " ").split() if n]
+    problems = [f"regressor '{n}': no such column; columns of the file: {', '.join(there)}"
+                for n in asked if n not in there]  # fmt: skip
+    for n in dict.fromkeys([*names, *asked]):
+        if n in there and n not in {s.name for s in signals}:
+            try:
+                columns.append(Column(n, _si(there[n] or ""), "regressor", required=False))
+            except units.UnitError as error:
+                problems.append(f"column '{n}': {error}")
+    if problems:
+        raise DataError(table.source, problems)
+    return columns
+
+
+def _si(unit: str) -> str:
+    return units.unit(unit or "1").dimension

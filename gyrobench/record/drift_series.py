@@ -1,0 +1,376 @@
+"""A drift record of any length as an evenly sampled rate with gaps, in bounded memory.
+
+Samples are put on the grid k * step from the first one.  A sample that is missing, flagged or not a number is a gap;
+so is the step of an angle or a counter that was reset (a jump of more than JUMP times its usual spread), unless it is a
+full turn or a power of two of counts: then it is unwrapped.  Rate from angle: the difference quotient, the mean rate
+between two samples; its amplitude at f is that of the rate times sin(pi f step)/(pi f step).  [RED-RATE; Hu 1981,
+eq. 4-1..4-11]
+
+The means that are held are bounded, see gyrobench.record.block_means; ``observers`` get every sample before that.
+
+Not modelled: dead time; jitter of the samples themselves (time stamps more than 1 % off the grid are warned of).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.record.block_means import Held
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.drift_columns import FLAG, RATE, TIME, Signal, Table, columns_of
+from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
+
+Array = NDArray[np.float64]
+GAP = 1.5  # steps
+CHUNK = 200  # samples whose median step is held against the usual one
+MIXED = 0.1  # of the step: a larger change of it is another sampling rate
+UNEVEN = 0.25  # of the step, rms: not a grid
+JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
+JUMP = 100.0  # spreads of the increments of an angle
+TURNS = (2.0 * math.pi,)
+WRAPS = tuple(2.0**k for k in (8, 12, 14, 16, 18, 20, 24, 32))  # of counts
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Progress of a file that is read."""
+
+    rows: int
+    fraction: float
+    elapsed: float
+
+    @property
+    def words(self) -> str:
+        """Return rows and rate for a person."""
+        return f"{self.rows / 1e6:.1f} million rows, {self.rows / max(self.elapsed, 1e-9) / 1e6:.2f} million/s"
+
+
+Progress = Callable[[Reading], None]
+#: gets (name, index of the first sample on the grid, rates without a gap between them)
+Observer = Callable[[str, int, Array], None]
+
+
+@dataclass
+class Acquisition:
+    """What the file says of its acquisition; times in s (resolution: of the values as rate or angle, SI)."""
+
+    step: float = 0.0
+    samples: int = 0
+    first: float = 0.0
+    last: float = 0.0
+    gaps: int = 0
+    missing: int = 0  # samples on the grid that are not there
+    flagged: int = 0
+    incomplete: int = 0  # rows without a value
+    jitter: float = 0.0  # of the time stamps against even steps, rms, in steps
+    rounded: float = 0.0  # s, to which the stamps are rounded, where that is their jitter
+    longest: tuple[float, float] = (0.0, 0.0)  # gap: its beginning and its length
+    resets: dict[str, int] = field(default_factory=dict)
+    wraps: dict[str, int] = field(default_factory=dict)
+    resolution: dict[str, float] = field(default_factory=dict)  # rad/s or rad, 0: none seen
+    stuck: dict[str, int] = field(default_factory=dict)  # samples at the largest or smallest value of the file
+
+
+@dataclass
+class _Angle:
+    """Differences of a cumulative angle over blocks."""
+
+    signal: Signal
+    last: float = math.nan
+    usual: float = 0.0
+    spread: float = 0.0
+    resets: int = 0
+    wraps: int = 0
+
+    def increments(self, value: Array, follows: NDArray[np.bool_]) -> Array:
+        """Return the increments up to each sample, NaN where the sample before is missing or a reset lies between."""
+        d = np.diff(np.concatenate([[self.last], value]))
+        d[~follows] = np.nan
+        self.last = float(value[-1])
+        there = d[np.isfinite(d)]
+        if not self.spread and there.size > 8:
+            self.usual = float(np.median(there))
+            self.spread = 1.4826 * float(np.median(np.abs(there - self.usual)))
+            if not self.spread:
+                off = np.abs(there - self.usual)
+                self.spread = float(np.min(off[off > 0.0], initial=math.inf)) if np.any(off > 0.0) else 0.0
+        if not self.spread:
+            return d
+        jumped = np.flatnonzero(np.abs(d - self.usual) > JUMP * self.spread)
+        counts = self.signal.unit in ("", "1")
+        periods = tuple(w * abs(self.signal.factor) for w in WRAPS) if counts else TURNS
+        for k in jumped.tolist():
+            right = [d[k] - s * p for p in periods for s in (1.0, -1.0)]
+            best = min(right, key=lambda v: abs(v - self.usual))
+            if abs(best - self.usual) <= JUMP * self.spread:
+                d[k], self.wraps = best, self.wraps + 1
+            else:
+                d[k], self.resets = np.nan, self.resets + 1
+        return d
+
+
+class DriftReader:
+    """Reads a table once: rates of the signals on a grid, with what is known of the acquisition."""
+
+    def __init__(self, table: Table, signals: Sequence[Signal], regressors: str = "", sampling: float = 0.0) -> None:
+        self.table, self.signals = table, signals
+        self.columns = columns_of(table, signals, regressors)
+        self.timed = any(c.name == TIME for c in self.columns)
+        if not self.timed and not sampling:
+            raise DataError(
+                table.source,
+                ["column 'time [s]' is missing, and no sampling rate is given: write '# sampling = 100Hz' in the file "
+                 "or --set sampling=100Hz"],
+            )  # fmt: skip
+        self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
+        self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
+        self.held = Held([*(s.name for s in signals), *self.others])
+        self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (RATE, PER_SAMPLE)}
+        self.position = 0  # on the grid, of the next sample
+        self.before = math.nan  # time of the last sample
+        self.last_other = dict.fromkeys(self.others, math.nan)
+        self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
+        self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
+
+    def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
+        """Return the means that are held, NaN in gaps: rates in rad/s, other columns in SI.  Raises DataError."""
+        start, rows, told = time.monotonic(), 0, 0.0
+        for block in self.table.blocks(self.columns):
+            first = next(iter(block.values()))
+            try:
+                self._add(block, rows, observers)
+            except ValueError as error:
+                raise DataError(self.table.source, [str(error)]) from None
+            rows += first.size
+            elapsed = time.monotonic() - start
+            if progress is not None and elapsed - told > 0.2:
+                told = elapsed
+                progress(Reading(rows, min(1.0, self.table.done(rows)), elapsed))
+        self._finish(rows)
+        return self.held.columns()
+
+    # ------------------------------------------------------------------ block by block
+    def _add(self, block: Mapping[str, Array], rows: int, observers: Sequence[Observer]) -> None:
+        about = self.about
+        size = next(iter(block.values())).size
+        row = self.table.head.line + 1 + rows + np.arange(size)
+        good = np.all(np.isfinite([block[s.name] for s in self.signals]), axis=0)
+        if self.timed:
+            good &= np.isfinite(block[TIME])
+        about.incomplete += int(size - good.sum())
+        if FLAG in block:
+            suspect = good & (np.nan_to_num(block[FLAG]) != 0.0)
+            about.flagged += int(suspect.sum())
+            good &= ~suspect
+        if not good.any():
+            return
+        t = block[TIME][good] if self.timed else np.empty(0)
+        place = self._places(t, row[good]) if self.timed else rows + np.flatnonzero(good)
+        if not self.timed:
+            about.gaps += int(np.sum(np.diff(np.concatenate([[self.position - 1], place])) > 1))
+        follows = np.diff(np.concatenate([[self.position - 1], place])) == 1
+        follows[0] = follows[0] and about.samples > 0
+        dt = self._intervals(t) if self.timed else np.full(place.size, about.step)
+        values = {s.name: self._rate(s, block[s.name][good], follows, dt) for s in self.signals}
+        others = {n: block[n][good] for n in self.others}
+        about.samples += place.size
+        self._put(place, values, others, observers)
+
+    def _places(self, t: Array, row: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the index of each sample on the grid.  Raises ValueError for time that does not fit one."""
+        about = self.about
+        first = not about.samples
+        d = np.diff(t) if first else np.diff(np.concatenate([[self.before], t]))
+        after = row[1:] if first else row
+        back = np.flatnonzero(d <= 0.0)
+        if back.size:
+            k = int(back[0])
+            others = f" ({back.size} rows in this part of the file)" if back.size > 1 else ""
+            now = t[k + 1] if first else t[k]
+            raise ValueError(
+                f"row {after[k]}: time = {now:.9g} s does not come after {now - d[k]:.9g} s{others}; time must "
+                "increase: sort the rows, or reduce the parts as records of their own"
+            )
+        if first:
+            about.first = float(t[0])
+            if d.size:
+                usual = float(np.median(d[:CHUNK]))
+                about.step = float(np.mean(d[d < GAP * usual]))
+        if not about.step:  # a single row
+            about.step = float(d[0]) if d.size else 0.0
+            return np.zeros(t.size, dtype=np.int64)
+        self._same_rate(d, after)
+        steps = np.maximum(np.rint(d / about.step), 1.0).astype(np.int64)
+        even = d < GAP * about.step
+        self.regular[0] += int(even.sum())
+        self.regular[1] += float(d[even].sum())
+        self.regular[2] += float(np.sum((d[even] / about.step - 1.0) ** 2))
+        gaps = np.flatnonzero(~even)
+        about.gaps += gaps.size
+        if gaps.size:
+            k = int(gaps[np.argmax(d[gaps])])
+            if d[k] > about.longest[1]:
+                about.longest = (float((t[k + 1] if first else t[k]) - d[k] - about.first), float(d[k]))
+        steps[even] = 1
+        start = self.position if first else self.position - 1
+        place: NDArray[np.int64] = start + np.concatenate([[0], np.cumsum(steps)] if first else [np.cumsum(steps)])
+        return place
+
+    def _same_rate(self, d: Array, row: NDArray[np.int64]) -> None:
+        """Raise ValueError where the usual step changes within the file, or there is none."""
+        step = self.about.step
+        chunks = d[: d.size // CHUNK * CHUNK].reshape(-1, CHUNK)
+        if not chunks.size:
+            return
+        usual = np.median(chunks, axis=1)
+        ratio = chunks / usual[:, None]
+        even = ratio < GAP
+        off = np.sqrt(np.sum(np.where(even, ratio - 1.0, 0.0) ** 2, axis=1) / even.sum(axis=1))
+        if float(np.median(off)) > UNEVEN:
+            raise ValueError(
+                f"the samples are not evenly spaced: steps from {float(d.min()):.4g} to {float(chunks[even].max()):.4g}"
+                " s; deviations and spectra need an even grid: resample the record, and say so"
+            )
+        other = np.flatnonzero(np.abs(usual / step - 1.0) > MIXED)
+        if other.size:
+            k = int(other[0])
+            raise ValueError(
+                f"the sampling changes from {step:.6g} s to {usual[k]:.6g} s at about row {row[k * CHUNK]}: mixed "
+                "sampling rates; split the file, or bring it to one rate by means over whole numbers of samples"
+            )
+
+    def _intervals(self, t: Array) -> Array:
+        """Return the time since the sample before, of an angle's mean rate: the step where stamps are rounded."""
+        about = self.about
+        d = np.diff(np.concatenate([[self.before], t]))
+        if not about.samples:
+            about.rounded = _rounding(t, about.step)
+        self.before = float(t[-1])
+        return np.full(t.size, about.step) if about.rounded else d
+
+    def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
+        self._extreme(s, value)
+        value = value * s.factor if s.factor != 1.0 else value
+        if not self.about.samples:
+            self.about.resolution[s.name] = _resolution(value)
+        if s.kind == RATE:
+            return value
+        if s.kind == PER_SAMPLE:
+            return value / self.about.step
+        return self.angles[s.name].increments(value, follows) / dt
+
+    def _extreme(self, s: Signal, value: Array) -> None:
+        """Count samples that stay at the largest or smallest value: a converter at its limit."""
+        e = self.extremes[s.name]
+        for k, end in enumerate((float(value.min()), float(value.max()))):
+            sign = (1.0, -1.0)[k]
+            if sign * end < sign * e[k]:
+                e[k], e[k + 2] = end, 0
+            if end == e[k]:
+                at = value == end
+                e[k + 2] += int(np.sum(at[1:] & at[:-1]))
+
+    def _put(
+        self,
+        place: NDArray[np.int64],
+        values: dict[str, Array],
+        others: dict[str, Array],
+        observers: Sequence[Observer],
+    ) -> None:
+        """Hand on runs without a gap; what lies between is missing."""
+        self.held.skip(int(place[0]) - self.position)
+        self.about.missing += int(place[0]) - self.position
+        size = int(place[-1] - place[0]) + 1
+        gap_free = size == place.size
+        at = place - place[0]
+        dense = {}
+        for n, v in {**values, **others}.items():
+            if not gap_free:
+                grid = np.full(size, np.nan)
+                grid[at] = v
+                v = grid
+            dense[n] = self._filled(n, v) if n in others else v
+        self.about.missing += size - place.size
+        for k in range(0, size, 1 << 18):
+            self.held.add({n: v[k : k + (1 << 18)] for n, v in dense.items()})
+        for n in values if observers else ():
+            v = dense[n]
+            edges = np.flatnonzero(np.diff(np.isfinite(v).astype(np.int8), prepend=0, append=0))
+            for a, b in edges.reshape(-1, 2).tolist():
+                for observer in observers:
+                    observer(n, int(place[0]) + a, v[a:b])
+        self.position = int(place[-1]) + 1
+
+    def _filled(self, name: str, v: Array) -> Array:
+        """Return a slow quantity with its gaps filled by the last value: a thermometer is logged less often."""
+        known = np.isfinite(v)
+        last = np.maximum.accumulate(np.where(known, np.arange(v.size), -1))
+        out = np.where(last >= 0, v[np.maximum(last, 0)], self.last_other[name])
+        self.last_other[name] = float(out[-1])
+        return out
+
+    # ------------------------------------------------------------------ at the end
+    def _finish(self, rows: int) -> None:
+        about = self.about
+        if about.samples < 2:
+            lacking = f"; {rows - about.samples} of {rows} rows have none" if rows > about.samples else ""
+            raise DataError(self.table.source, [f"{about.samples} samples with a value{lacking}"])
+        if about.gaps > 0.05 * about.samples and about.missing > about.samples:
+            raise DataError(
+                self.table.source,
+                [f"{about.gaps} of {about.samples} steps are longer than the usual one of {about.step:.4g} s: mixed or "
+                 "uneven sampling; bring the record to one rate by means over whole numbers of samples"],
+            )  # fmt: skip
+        if self.timed and self.regular[0]:
+            mean = self.regular[1] / self.regular[0]
+            about.jitter = math.sqrt(max(self.regular[2] / self.regular[0] - (mean / about.step - 1.0) ** 2, 0.0))
+            about.step = mean
+        about.last = self.before if self.timed else about.step * (self.position - 1)
+        for s in self.signals:
+            e = self.extremes[s.name]
+            about.stuck[s.name] = max(int(e[2]), int(e[3])) if e[0] < e[1] else 0
+            if e[0] == e[1]:
+                raise DataError(
+                    self.table.source, [f"column '{s.name}': all its values are {e[0] * s.factor:.6g} (SI)"]
+                )
+        about.resets = {n: a.resets for n, a in self.angles.items() if a.resets}
+        about.wraps = {n: a.wraps for n, a in self.angles.items() if a.wraps}
+
+
+def _rounding(t: Array, step: float) -> float:
+    """Return the decimal to which time stamps are rounded, s, where that alone puts them off the grid; else 0."""
+    d = np.diff(t)
+    d = d[d < GAP * step]
+    if d.size < 2 or np.all(np.abs(d / step - 1.0) < JITTER):
+        return 0.0
+    for digits in range(9):
+        q = 10.0**-digits
+        if q < JITTER * step:
+            return 0.0
+        if q <= 2.0 * step and np.all(np.abs(t / q - np.rint(t / q)) < 1e-3):
+            return q
+    return 0.0
+
+
+def _resolution(value: Array) -> float:
+    """Return the step of which all differences of the values are multiples; 0 where there is none."""
+    apart = np.diff(np.unique(value[: 1 << 16]))
+    if apart.size < 2:
+        return 0.0
+    q = float(apart.min())
+    size = float(np.max(np.abs(value)))
+    return q if q > 1e-12 * size and np.all(np.abs(apart / q - np.rint(apart / q)) < 0.01) else 0.0
+
+
+def as_dict(about: Acquisition) -> dict[str, Any]:
+    """Return what is known of the acquisition, for run.json."""
+    from dataclasses import asdict
+
+    return asdict(about)
