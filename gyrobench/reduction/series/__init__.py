@@ -1,1 +1,1 @@
-"""Statistics of evenly sampled series: deviations, noise coefficients, models of random drift; plain arrays, SI."""
+"""Analysis of evenly sampled series: deviations, noise coefficients, models; arrays (SI), no record, no report."""

@@ -1,0 +1,50 @@
+"""What every series must be before anything is computed from it, and block means."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.errors import GyrobenchError
+
+Array = NDArray[np.float64]
+NORMAL = 1.959963984540054  # 97.5 % point of a normal distribution
+
+
+class SeriesError(GyrobenchError, ValueError):
+    """The series or a setting does not allow the analysis; the message says which, and what would do."""
+
+
+def checked(x: Any, minimum: int = 2, what: str = "series") -> Array:
+    """Return ``x`` as a float array (n,).
+
+    Raises SeriesError for another shape, fewer than ``minimum`` values, a non-finite or a constant series.
+    """
+    out: Array = np.asarray(x, dtype=float)
+    if out.ndim != 1:
+        raise SeriesError(f"{what}: {out.ndim} dimensions; one is needed")
+    if out.size < minimum:
+        raise SeriesError(f"{what}: {out.size} values; at least {minimum} are needed")
+    low, high = float(out.min()), float(out.max())
+    if not (np.isfinite(low) and np.isfinite(high)):
+        first = int(np.flatnonzero(~np.isfinite(out))[0])
+        raise SeriesError(f"{what}: value {first + 1} is not a finite number; analyse the stretches between gaps")
+    if high - low <= 1e-14 * max(abs(low), abs(high)):
+        raise SeriesError(f"{what}: all values are equal; there is nothing to analyse")
+    return out
+
+
+def checked_step(dt: float) -> float:
+    """Return the sampling interval, s; raises SeriesError unless it is finite and positive."""
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise SeriesError(f"sampling interval {dt}: it must be finite and positive")
+    return float(dt)
+
+
+def block_means(x: Array, m: int) -> Array:
+    """Return the means of consecutive blocks of ``m`` values; an incomplete last block is left out."""
+    k = x.size // m
+    out: Array = x[: k * m].reshape(k, m).mean(axis=1) if m > 1 else x
+    return out
