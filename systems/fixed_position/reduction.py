@@ -26,6 +26,7 @@ from gyrobench.reduction.estimation import nuisances, repeatability
 from gyrobench.reduction.estimation.effects import Effect, corrected
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
@@ -194,9 +195,18 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Se
     )
 
 
-@handling_errors.examined(handling_candidates.at_rest)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance."""
+    """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance.
+
+    A long record has a table of its noise coefficients.
+    """
+    result = _examined(record, specification)
+    result.tables += noise_coefficients_table(result, record)
+    return result
+
+
+@handling_errors.examined(handling_candidates.at_rest)
+def _examined(record: Record, specification: Specification | None = None) -> DriftTestResult:
     setup = setup_of(record.run, specification)
     day = {row.phase: row.day for row in record.run.plan}
     phases = np.asarray(record.windows["phase"]).astype(int).tolist()

@@ -27,6 +27,7 @@ from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import Findings, Group, fit
+from gyrobench.reduction.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
@@ -39,9 +40,18 @@ DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 
-@handling_errors.examined(handling_candidates.servo)
 def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError."""
+    """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError.
+
+    A long record has a table of its noise coefficients.
+    """
+    result = _examined(record, specification)
+    result.tables += noise_coefficients_table(result, record, residual=True)
+    return result
+
+
+@handling_errors.examined(handling_candidates.servo)
+def _examined(record: Record, specification: Specification | None = None) -> DriftTestResult:
     run, windows = record.run, record.windows
     options = dict(run.options)
     site = run_metadata.Site.of(run)

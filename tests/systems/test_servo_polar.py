@@ -393,3 +393,16 @@ def test_stopped_and_continued(tmp_path: Any) -> None:
         run(NAME, values=values, seed=3, out=tmp_path / "day", stop_at=90.0)
     again = run(NAME, values=values, seed=3, out=tmp_path / "day", resume=True)
     assert again.same_data(whole) and again.run.resumed_at == pytest.approx([90.0], abs=2e-3)
+
+
+def test_noise_coefficients_of_the_residuals(day: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long test has their table, from its residuals and said so; this day is too short for it."""
+    from gyrobench.reduction import noise_coefficients_table as module
+
+    def tables() -> list[dict[str, Any]]:
+        return [t for t in load_system(NAME).reduce(day).tables if t["title"] == "Noise coefficients"]
+
+    assert len(day.windows["t_start"]) < module.LEAST and tables() == []
+    monkeypatch.setattr(module, "LEAST", 64)
+    (table,) = tables()
+    assert module.RESIDUAL in table["caption"] and [row[0][0] for row in table["rows"]] == list("NBKRQ")

@@ -1,0 +1,79 @@
+"""Table of the noise coefficients N, B, K, R, Q of a long test, for its report.  [DRIFT-COEFFICIENTS]"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.record.record import Record
+from gyrobench.reduction.series.noise_coefficients import fit
+from gyrobench.result import DriftTestResult
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+LEAST = 400  # windows of a long test
+#: coefficient -> unit of the report, SI of one of it, meaning
+TERMS: Mapping[str, tuple[str, float, str]] = {
+    "N": ("°/√h", math.radians(1.0) / 60.0, "angle random walk"),
+    "B": ("°/h", DPH, "bias instability: flicker floor 0.664 B"),
+    "K": ("°/h/√h", DPH / 60.0, "rate random walk"),
+    "R": ("°/h²", DPH / 3600.0, "rate ramp"),
+    "Q": ("″", units.factor("arcsec"), "angle noise of a reading"),
+}
+RESIDUAL = (
+    "From the residuals of the fit: drift that its terms take up, of the period of the turn and longer, is missing "
+    "here; K and R, and B of a short test, may be too small and their intervals too narrow"
+)
+
+
+def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[dict[str, Any]]:
+    """Return the table, or none where a test has fewer than LEAST windows, or windows that do not stand end to end.
+
+    Of the drift rate itself, or of its residuals.  Each series of the result is a stretch of its own; missing windows,
+    and those of another length, are gaps.
+    """
+    start, end = (np.asarray(record.windows[n], dtype=float) for n in ("t_start", "t_end"))
+    length = float(np.median(end - start)) if start.size else 0.0
+    if sum(len(s.t) for s in result.series) < LEAST:
+        return []
+    stretches = [on_grid(np.array(s.t), np.array(s.residual if residual else s.y), length) for s in result.series]
+    try:
+        found = fit([DPH * x for x in stretches], length)
+    except ValueError:
+        return []  # constant, or a gap after each window
+    rows: list[list[Any]] = []
+    for name, (unit, si, meaning) in TERMS.items():
+        e = getattr(found, name)
+        value = e.value / si if e.determined else None
+        finding = "" if e.determined else "not determined: the interval holds 0"
+        rows.append([f"{name}, {meaning}", value, float(e.low) / si, float(e.high) / si, unit, finding])
+    count = sum(int(np.isfinite(x).sum()) for x in stretches)
+    caption = (
+        f"IEEE 952, from {count} means of {length:g} s by maximum likelihood. Gauss-Markov drift is not among the five "
+        "terms: B and K take it up"
+    )
+    columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
+    title = "Noise coefficients"
+    return [{"title": title, "caption": f"{caption}. {RESIDUAL}" if residual else caption, "columns": columns,
+             "rows": rows}]  # fmt: skip
+
+
+def on_grid(t: Array, x: Array, step: float) -> Array:
+    """Return values in the order of their times, NaN where one is missing; a time off the grid begins a gap."""
+    order = np.argsort(t, kind="stable")
+    t, x = t[order], x[order]
+    places = np.concatenate([[0], np.cumsum(np.where(_next(t, step), 1, 2))])
+    out = np.full(int(places[-1]) + 1, math.nan)
+    out[places] = x
+    return out
+
+
+def _next(t: Array, step: float) -> NDArray[np.bool_]:
+    """True where a time follows the one before by a step, within a hundredth of it."""
+    found: NDArray[np.bool_] = np.abs(np.diff(t) - step) < 0.01 * step
+    return found

@@ -1,0 +1,60 @@
+"""Table of noise coefficients of a long test: stretches, gaps, units, and when there is none."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.reduction.noise_coefficients_table import LEAST, RESIDUAL, noise_coefficients_table, on_grid
+
+T = 60.0  # s
+N = 0.6  # deg/h/sqrt(Hz): 0.01 deg/sqrt(h)
+
+
+def long_test(count: int = LEAST, gap: bool = False, length: float = T) -> tuple[Any, Any]:
+    """Return a result of two series and its record: white noise, in y on a slope, in the residuals alone."""
+    rng = np.random.default_rng(2)
+    series, start = [], []
+    for k in range(2):
+        t = T * np.arange(count // 2) + 1e5 * k
+        if gap:
+            t = np.delete(t, [20, 21, 90])
+        x = N / math.sqrt(T) * rng.normal(size=t.size)
+        y = x + 1e-4 * t
+        order = rng.permutation(t.size)  # a report has them by table angle
+        series.append(SimpleNamespace(t=t[order].tolist(), residual=x[order].tolist(), y=y[order].tolist()))
+        start.append(t - T / 2.0)
+    windows = {"t_start": np.concatenate(start), "t_end": np.concatenate(start) + length}
+    return SimpleNamespace(series=series), SimpleNamespace(windows=windows)
+
+
+@pytest.mark.parametrize("gap", [False, True])
+def test_residuals_and_the_rate_itself(gap: bool) -> None:
+    """White noise of 0.01 deg/sqrt(h); the slope of 1e-4 deg/h/s = 0.36 deg/h2 is the ramp of the rate alone."""
+    result, record = long_test(LEAST + 100, gap)
+    (left,) = noise_coefficients_table(result, record, residual=True)
+    (whole,) = noise_coefficients_table(result, record)
+    assert RESIDUAL in left["caption"] and RESIDUAL not in whole["caption"]
+    assert f"from {LEAST + 94 if gap else LEAST + 100} means of 60 s" in left["caption"]
+    for table, ramp in ((left, 0.0), (whole, 0.36)):
+        rows = {row[0].partition(",")[0]: row for row in table["rows"]}
+        assert list(rows) == ["N", "B", "K", "R", "Q"]
+        assert rows["N"][1] == pytest.approx(0.01, rel=0.1) and rows["N"][2] < 0.01 < rows["N"][3]
+        assert rows["R"][2] < ramp < rows["R"][3] and (rows["R"][1] is not None) == (ramp > 0.0)
+        assert rows["K"][1] is None and rows["K"][2] == 0.0 and "not determined" in rows["K"][5]
+
+
+def test_short_tests_and_windows_with_pauses_have_none() -> None:
+    assert noise_coefficients_table(*long_test(LEAST - 2)) == []
+    assert noise_coefficients_table(*long_test(LEAST, length=0.5 * T)) == []
+    assert noise_coefficients_table(*long_test(LEAST)) != []
+
+
+def test_a_missing_window_is_a_gap() -> None:
+    """Times 0, 10, 30, 40: one value is missing between the pairs."""
+    x = on_grid(np.array([40.0, 0.0, 30.0, 10.0]), np.array([4.0, 1.0, 3.0, 2.0]), 10.0)
+    assert np.array_equal(x, [1.0, 2.0, math.nan, 3.0, 4.0], equal_nan=True)
