@@ -28,10 +28,11 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from gyrobench.reduction.series.deviations import Deviation
-from gyrobench.reduction.series.noise_likelihood import Likelihood
+from gyrobench.reduction.series.noise_likelihood import SHORTEST, Likelihood
 
 Array = NDArray[np.float64]
-SHORTEST = 32  # samples of a stretch that is used
+STEPS = 100  # of the search for a maximum, at most
+RAMPS = 13  # values of K over which the interval of the ramp is a mixture
 NAMES = ("N", "B", "K", "Q")
 
 
@@ -85,10 +86,8 @@ class _Fit:
 
     def __init__(self, likelihood: Likelihood) -> None:
         self.f = likelihood
-        start = likelihood.start()
-        self.scale = self._sd(start)
-        start = np.maximum(start, 0.1 * self.scale * (start > 0.0))
-        self.v, self.least = self._minimum(start, None)
+        self.v, self.least = self._minimum(likelihood.start(), None)
+        self.scale = self._sd(self.v)
 
     def _sd(self, v: Array) -> Array:
         info = self.f.information(v)
@@ -96,23 +95,33 @@ class _Fit:
         out: Array = d * np.sqrt(np.diag(np.linalg.pinv(info * np.outer(d, d), rcond=1e-10, hermitian=True)))
         return out
 
-    def _minimum(self, start: Array, fixed: int | None) -> tuple[Array, float]:
+    def _minimum(self, v: Array, fixed: int | None) -> tuple[Array, float]:
+        """Return v >= 0 of the least -2 log likelihood by scoring steps, one component fixed; and the value there."""
         free = np.array([i for i in range(4) if i != fixed])
-
-        def value(x: Array) -> float:
-            v = start.copy()
-            v[free] = np.maximum(x, 0.0) * self.scale[free]
-            return self.f(v)
-
-        best = optimize.minimize(
-            value, start[free] / self.scale[free], method="L-BFGS-B", bounds=[(0.0, None)] * free.size,
-            options={"ftol": 1e-7, "gtol": 1e-3},
-        )  # fmt: skip
-        v = start.copy()
-        v[free] = np.maximum(best.x, 0.0) * self.scale[free]
-        if best.fun < self.f(start):
-            return v, float(best.fun)
-        return start, self.f(start)
+        f, slope = self.f(v)
+        for _ in range(STEPS):
+            # the step to v + d >= 0 that minimizes slope d + d' info d, as a least squares problem of v + d
+            info = 2.0 * self.f.information(v)[np.ix_(free, free)]
+            size = 1.0 / np.sqrt(np.diag(info))
+            root = np.linalg.cholesky(info * np.outer(size, size) + 1e-9 * np.eye(free.size))
+            now = v[free] / size
+            new, _ = optimize.nnls(root.T, root.T @ now - np.linalg.solve(root, slope[free] * size))
+            step = np.zeros(4)
+            step[free] = (new - now) * size
+            gain = -float(slope @ step)
+            if gain < 1e-4:
+                break
+            part = 1.0
+            while part > 1e-6:
+                trial = v + part * step
+                value, changed = self.f(trial)
+                if value <= f - 1e-3 * part * gain:
+                    break
+                part *= 0.5
+            else:
+                break
+            v, f, slope = trial, value, changed
+        return v, f
 
     def interval(self, j: int) -> tuple[float, float]:
         """Return the ends of v_j: where the profile of the likelihood ratio reaches its critical value."""
@@ -135,10 +144,26 @@ class _Fit:
         high = float(optimize.brentq(excess, centre, upper, rtol=1e-3, xtol=1e-3 * step))
         return low, high
 
-    def ramp(self) -> tuple[float, float]:
-        """Return the ramp per sample and its standard deviation at the maximum."""
-        _, info, score = self.f.ramp(self.v)
-        return score / info, 1.0 / math.sqrt(info)
+    def ramp(self) -> tuple[float, float, float]:
+        """Return the ramp per sample and the ends of its interval of 95 %.
+
+        A mixture of normals over the profile of K, which is what makes the ramp uncertain and is uncertain itself.
+        """
+        top = math.sqrt(max(self.interval(2)[1], float(self.v[2])))
+        rows = []
+        for root in np.linspace(0.0, 1.5 * top, RAMPS):
+            start = self.v.copy()
+            start[2] = root * root
+            v, least = self._minimum(start, 2)
+            rows.append((math.exp(0.5 * (self.least - least)), *self.f.ramp(v)))
+        weight, mean, sd = np.array(rows).T
+        weight /= weight.sum()
+        ends = float((mean - 8.0 * sd).min()), float((mean + 8.0 * sd).max())
+
+        def quantile(p: float) -> float:
+            return float(optimize.brentq(lambda r: float(weight @ special.ndtr((r - mean) / sd)) - p, *ends))
+
+        return self.f.ramp(self.v)[0], quantile(0.025), quantile(0.975)
 
 
 def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
@@ -155,6 +180,7 @@ def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
     size = math.sqrt(float(np.mean([np.var(np.diff(p)) for p in parts])))
     if not size > 0.0:
         raise ValueError("the record is constant; it has no noise to fit")
+    parts, line = _without_ramp(parts, tau0)
     found = _Fit(Likelihood([p / size for p in parts]))
     unit = {"N": size * math.sqrt(tau0), "B": size, "K": size / math.sqrt(tau0), "Q": size * tau0}
     estimates = {}
@@ -162,9 +188,15 @@ def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
         low, high = found.interval(j)
         value, low, high = (math.sqrt(x) * unit[name] for x in (float(found.v[j]), low, high))
         estimates[name] = Estimate(value, low, high, low > 0.0)
-    slope, sd = (x * size / tau0 for x in found.ramp())
-    low, high = slope - 1.96 * sd, slope + 1.96 * sd
+    slope, low, high = (x * size / tau0 + line for x in found.ramp())
     return NoiseCoefficients(R=Estimate(slope, low, high, low * high > 0.0), **estimates)
+
+
+def _without_ramp(parts: list[Array], tau0: float) -> tuple[list[Array], float]:
+    """Return stretches less the common line of least squares, and its slope: bins hold what is left of a ramp."""
+    times = [(np.arange(p.size) - 0.5 * (p.size - 1)) * tau0 for p in parts]
+    line = sum(float(t @ p) for t, p in zip(times, parts, strict=True)) / sum(float(t @ t) for t in times)
+    return [p - line * t for t, p in zip(times, parts, strict=True)], line
 
 
 def _present(x: Array) -> list[Array]:

@@ -1,16 +1,17 @@
 """Likelihood of the variances of white, flicker, random-walk and quantization noise in a rate record.
 
-The cosine transform (DCT of type 2) of a stretch of n samples, without its mean, has uncorrelated ordinates k = 1 .. n-1
-for N and K, for Q but for the errors of the first and last angle, which are kept as two effects of their own, and nearly
-for B (correlations up to 0.12 among the first, kept for k <= LOW).  Variances per sample, phi = pi k/n, nu = k/2n, of
+The cosine transform (DCT of type 2) of a stretch of n samples, without its mean, has ordinates k = 1 .. n-1 that are
+uncorrelated for N and K, for Q but for the errors of the first and last angle, which are kept as two effects of their
+own, and nearly for B (correlations up to 0.12 among the first, kept for k <= 2 LOW).  Variances per sample of
 
     N^2/tau0     1
     B^2          c_k sin^2(pi nu) [zeta(3, nu) + zeta(3, 1 - nu)]/(2 pi^3)
     K^2 tau0     (2 + cos phi)/(12 sin^2(phi/2))
     (Q/tau0)^2   4 sin^2(phi/2)
 
-so averaging over tau0 and aliasing are exact.  c_k = 1 - 2/(pi^2 k), the first ones from the covariance of flicker.  R
-is a mean of the odd ordinates, eliminated as in restricted maximum likelihood.  [DRIFT-COEFFICIENTS; own derivation]
+with phi = pi k/n, nu = k/2n: averaging over tau0 and aliasing are exact.  c_k = 1 - 2/(pi^2 k), the first ones from the
+covariance of flicker.  R is a mean of the odd ordinates, eliminated as in restricted maximum likelihood.
+[DRIFT-COEFFICIENTS; own derivation]
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, optimize, special
+from scipy import fft, special
 
 Array = NDArray[np.float64]
-LOW = 32  # ordinates whose correlations by flicker are kept
+LOW = 16  # first ordinates of each parity whose correlations by flicker are kept
+SHORTEST = 40  # samples of a stretch that is used
 WIDTH = 0.02  # of a bin of ordinates, of the logarithm of k
 FLOOR = 1e-14  # of a variance, where that of the first differences of the record is 1
 
@@ -62,35 +64,30 @@ def _basis(k: Array, n: int) -> Array:
 
 
 @dataclass(frozen=True)
-class _Stretch:
-    """Binned ordinates of one parity of one stretch: the first ones singly, then sums over bins.
+class _Ordinates:
+    """Ordinates of one parity of one stretch: the first LOW singly, then sums over bins.
 
-    basis (4, b), count, sum and sum of squares (b,); u: of the error of the angles at the ends; r: of a unit ramp.
+    basis (4, b); products (6, b): sums over a bin of cc, cu, cr, uu, ur, rr, of the ordinates c, of the error of the
+    angles at the ends u and of a unit ramp r; columns (LOW, 3): c, u, r; flicker (LOW, LOW): covariance for unit B.
     """
 
-    low: int
     basis: Array
     count: Array
-    total: Array
-    square: Array
-    u: Array
-    r: Array
-    correlation: Array  # (low, low), of flicker
+    products: Array
+    columns: Array
+    flicker: Array
 
 
-def _bins(rate: Array) -> list[_Stretch]:
+def _ordinates(rate: Array) -> list[_Ordinates]:
     n = rate.size
     c = fft.dct(rate - rate.mean(), norm="ortho")
-    edges = [*range(1, int(2.0 / WIDTH))]
+    edges = list(range(1, int(2.0 / WIDTH)))
     while edges[-1] < n:
         edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
-    edges = [e for e in edges if e < n] + [n]
     out = []
-    for parity in (0, 1):
+    for parity in (1, 0):
         k = np.arange(2 - parity, n, 2)
-        if not k.size:
-            continue
-        start = np.unique(np.searchsorted(k, edges[:-1]))
+        start = np.unique(np.searchsorted(k, edges))
         start = start[start < k.size]
         x = c[k]
         count = np.diff(np.append(start, k.size)).astype(float)
@@ -100,9 +97,11 @@ def _bins(rate: Array) -> list[_Stretch]:
         half = np.pi * middle / (2 * n)
         u = math.sqrt(2.0 / n) * np.cos(half)
         r = -u / (2.0 * np.sin(half) ** 2) if parity else np.zeros_like(u)
-        low = min(LOW // 2, int(np.count_nonzero(first == last)))
-        correlation = _flicker()[1][1 - parity :: 2, 1 - parity :: 2][:low, :low]
-        out.append(_Stretch(low, _basis(middle, n), count, total, square, u, r, correlation))
+        basis = _basis(middle, n)
+        size = np.sqrt(basis[1, :LOW])
+        flicker = _flicker()[1][1 - parity :: 2, 1 - parity :: 2][:LOW, :LOW] * np.outer(size, size)
+        products = np.array([square, total * u, total * r, count * u * u, count * u * r, count * r * r])
+        out.append(_Ordinates(basis, count, products, np.array([total, u, r])[:, :LOW].T, flicker))
     return out
 
 
@@ -110,57 +109,80 @@ class Likelihood:
     """-2 log of the restricted likelihood of v = (N^2/tau0, B^2, K^2 tau0, (Q/tau0)^2), the ramp eliminated."""
 
     def __init__(self, stretches: list[Array]) -> None:
-        self.parts = [b for x in stretches for b in _bins(x)]
-        self.basis = np.concatenate([p.basis for p in self.parts], axis=1)
-        self.count = np.concatenate([p.count for p in self.parts])
-        self.square = np.concatenate([p.square for p in self.parts])
+        parts = [part for x in stretches for part in _ordinates(x)]
+        self.basis = np.concatenate([p.basis for p in parts], axis=1)
+        self.count = np.concatenate([p.count for p in parts])
+        self.square = np.concatenate([p.products[0] for p in parts])
+        self._columns = np.array([p.columns for p in parts])  # (g, LOW, 3)
+        terms = np.zeros((len(parts), 4, LOW, LOW))  # covariance of the first ordinates, g parities of stretches
+        terms[:, :, np.arange(LOW), np.arange(LOW)] = [p.basis[:, :LOW] for p in parts]
+        terms[:, 1] = [p.flicker for p in parts]
+        self._terms = terms
+        self._high = np.concatenate([p.basis[:, LOW:] for p in parts], axis=1)
+        self._counts = np.concatenate([p.count[LOW:] for p in parts])
+        products = np.concatenate([p.products[:, LOW:] for p in parts], axis=1)
+        self._sums = np.concatenate([products, (products[:, None] * self._high).reshape(24, -1)])
+        self._starts = np.cumsum([0] + [p.count.size - LOW for p in parts])[:-1]
 
-    def ramp(self, v: Array) -> tuple[float, float, float]:
-        """Return -2 log likelihood without the ramp, information of the ramp and its score, ramp per sample."""
-        value = info = score = 0.0
-        for p in self.parts:
-            spectrum = np.maximum(v @ p.basis, FLOOR)
-            weight = 1.0 / spectrum[p.low :]
-            count, total, u, r = p.count[p.low :], p.total[p.low :], p.u[p.low :], p.r[p.low :]
-            columns = np.array([np.zeros_like(u), u, r])
-            g = (columns * (weight * count)) @ columns.T
-            g[0] = [p.square[p.low :] @ weight, (weight * total) @ u, (weight * total) @ r]
-            value += float(count @ np.log(spectrum[p.low :]))
-            if p.low:
-                flicker = np.sqrt(v[1] * p.basis[1, : p.low])
-                cov = p.correlation * np.outer(flicker, flicker)
-                cov[np.diag_indices(p.low)] = spectrum[: p.low]
-                root = np.linalg.cholesky(cov)
-                white = np.linalg.solve(root, np.array([p.total, p.u, p.r])[:, : p.low].T)
-                g += np.triu(white.T @ white)
-                value += 2.0 * float(np.log(np.diag(root)).sum())
-            shrink = 2.0 * v[3] / (1.0 + 2.0 * v[3] * g[1, 1])
-            value += g[0, 0] - shrink * g[0, 1] ** 2 + math.log1p(2.0 * v[3] * g[1, 1])
-            info += g[2, 2] - shrink * g[1, 2] ** 2
-            score += g[0, 2] - shrink * g[0, 1] * g[1, 2]
-        return value, info, score
+    def _forms(self, v: Array) -> tuple[float, Array, Array, Array]:
+        """Return log determinant, its derivative (4,), the forms x' A^-1 y (6, g) and their derivatives (6, 4, g).
 
-    def __call__(self, v: Array) -> float:
-        value, info, score = self.ramp(v)
-        return value - score * score / info + math.log(info)
+        A: covariance without the angles at the ends; x, y as in :class:`_Ordinates`.products.
+        """
+        weight = 1.0 / np.maximum(v @ self._high, FLOOR)
+        cov = np.tensordot(v, self._terms, (0, 1))
+        cov[:, np.arange(LOW), np.arange(LOW)] += FLOOR
+        inverse = np.linalg.inv(cov)
+        solved = inverse @ self._columns
+        value = float(np.linalg.slogdet(cov)[1].sum() - self._counts @ np.log(weight))
+        slope = np.einsum("gab,gjba->j", inverse, self._terms) + self._high @ (self._counts * weight)
+        powers = np.concatenate([self._sums[:6] * weight, self._sums[6:] * weight**2])
+        high = np.add.reduceat(powers, self._starts, axis=1)
+        low = np.swapaxes(self._columns, 1, 2) @ solved
+        change = np.swapaxes(solved, 1, 2)[:, None] @ (self._terms @ solved[:, None])
+        i, j = np.triu_indices(3)
+        forms = high[:6] + low[:, i, j].T
+        changes = -(high[6:].reshape(6, 4, -1) + change[:, :, i, j].transpose(2, 1, 0))
+        return value, slope, forms, changes
+
+    def ramp(self, v: Array) -> tuple[float, float]:
+        """Return the ramp per sample and its standard deviation, for given v."""
+        _, _, (_, cu, cr, uu, ur, rr), _ = self._forms(v)
+        shrink = 2.0 * v[3] / (1.0 + 2.0 * v[3] * uu)
+        info = float(np.sum(rr - shrink * ur**2))
+        return float(np.sum(cr - shrink * cu * ur)) / info, 1.0 / math.sqrt(info)
+
+    def __call__(self, v: Array) -> tuple[float, Array]:
+        """Return the value and its derivative (4,)."""
+        value, slope, (cc, cu, cr, uu, ur, rr), changes = self._forms(v)
+        s = 2.0 * v[3]
+        left = 1.0 / (1.0 + s * uu)
+        shrink = s * left
+        info, score = float(np.sum(rr - shrink * ur**2)), float(np.sum(cr - shrink * cu * ur))
+        value += float(np.sum(cc - shrink * cu**2 - np.log(left))) - score**2 / info + math.log(info)
+        by_info, by_score = (score / info) ** 2 + 1.0 / info, -2.0 * score / info
+        one = np.ones_like(cc)
+        gradient = np.array([
+            one,
+            -2.0 * shrink * cu - by_score * shrink * ur,
+            by_score * one,
+            shrink + shrink**2 * (cu**2 + by_info * ur**2 + by_score * cu * ur),
+            -2.0 * by_info * shrink * ur - by_score * shrink * cu,
+            by_info * one,
+        ])  # fmt: skip
+        slope = slope + np.einsum("pg,pjg->j", gradient, changes)
+        slope[3] += 2.0 * float(np.sum(uu * left - left**2 * (cu**2 + by_info * ur**2 + by_score * cu * ur)))
+        return value, slope
 
     def information(self, v: Array) -> Array:
-        """Expected information (4, 4) of v, of ordinates taken as uncorrelated."""
+        """Return the expected information (4, 4) of v, of ordinates taken as uncorrelated."""
         scaled = self.basis / np.maximum(v @ self.basis, FLOOR)
         out: Array = 0.5 * (scaled * self.count) @ scaled.T
         return out
 
     def start(self) -> Array:
-        """Return v by repeated weighted non-negative least squares, the maximum for uncorrelated ordinates."""
-        mean, weight = self.square / self.count, np.sqrt(self.count)
-        level = mean
-        v = np.zeros(4)
-        for _ in range(30):
-            size = weight / level
-            new, _ = optimize.nnls((self.basis * size).T, mean * size)
-            done = np.all(np.abs(new - v) <= 1e-3 * new)
-            v = new
-            level = np.maximum(v @ self.basis, 1e-9 * mean.mean())
-            if done:
-                break
-        return v
+        """Return v of which every component alone is half of what the powers of neighbouring bins allow."""
+        first = np.arange(0, self.count.size, 8)
+        level = np.add.reduceat(self.square, first) / np.add.reduceat(self.count * self.basis, first, axis=1)
+        out: Array = 0.5 * level.min(axis=1)
+        return out
