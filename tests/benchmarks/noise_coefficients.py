@@ -111,9 +111,7 @@ def covered(truth: Array, found: Array) -> Array:
 def table(n: Array, truth: Array, ours: Array, lines: Array) -> None:
     """Print coverage, errors and widths."""
     print("95 % intervals: share that hold the truth (term present, absent), share determined (present, absent)")
-    print(
-        "                 all     n < 1e4 < 1e5 < 1e6   present absent   determined, if absent   slopes: all  determined"
-    )
+    print("            all    n<1e4     <1e5     <1e6   present    absent   determined, if absent   slopes  determined")
     for j, name in enumerate(NAMES):
         t, e, s = truth[:, j], ours[:, j], lines[:, j]
         size = np.abs(t)
@@ -132,7 +130,8 @@ def table(n: Array, truth: Array, ours: Array, lines: Array) -> None:
         closer = np.mean(np.abs(np.log(value / t[both])) < np.abs(np.log(line / t[both])))
         print(
             f"    {name}  {both.sum():4d} records: fit {np.median(np.abs(np.log(value / t[both]))):.3f}, "
-            f"slopes {np.median(np.abs(np.log(line / t[both]))):.3f}, fit closer in {closer:.2f}; width "
+            f"slopes {np.median(np.abs(np.log(line / t[both]))):.3f}, "
+            f"fit closer in {closer:.2f}; width "
             f"{np.median(wide[:, 1] / wide[:, 0]):.2f} and {np.median(s[both, 2] / s[both, 1]):.2f}, coverage "
             f"{covered(truth[both, j], e[both]).mean():.3f} and {covered(t[both], s[both]).mean():.3f}"
         )

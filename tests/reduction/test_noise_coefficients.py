@@ -12,6 +12,7 @@ from scipy import fft
 
 from gyrobench.reduction.estimation.noise import process_covariance
 from gyrobench.reduction.series import deviations, noise_likelihood
+from gyrobench.reduction.series.long_record import Condensed
 from gyrobench.reduction.series.noise_coefficients import NoiseCoefficients, fit, slopes
 
 N = 64
@@ -54,7 +55,7 @@ def test_ordinates_of_flicker_are_those_of_many_relaxations() -> None:
 def test_likelihood_of_a_short_record_is_that_of_its_covariance() -> None:
     """-2 log likelihood of the ordinates by their complete covariance, the ramp eliminated: equal up to a constant."""
     x = np.random.default_rng(0).normal(size=N)
-    f = noise_likelihood.Likelihood([x])
+    f = noise_likelihood.Likelihood(Condensed([x], 1, 0, np.zeros(63), np.zeros(63)))
     c, ramp = (fft.dct(y - y.mean(), norm="ortho")[1:] for y in (x, np.arange(N)))
     k = np.arange(1.0, N)
     basis, (_, correlation) = noise_likelihood._basis(k, N), noise_likelihood._flicker()
@@ -166,3 +167,19 @@ def test_allan_of_the_model() -> None:
     curve = deviations.deviations(x, 1.0)["allan"]
     model = all_five().allan(curve.tau)
     assert np.mean((curve.low < model) & (model < curve.high)) > 0.8
+
+
+def test_check_of_the_model() -> None:
+    """White noise passes; a line and Gauss-Markov drift of half the variance do not, and are found where they are."""
+    n, rng = 20000, np.random.default_rng(1)
+    x = rng.normal(size=n)
+    good = fit(x, 0.1).check
+    assert good is not None and good.p > 0.01 and good.line_p > 0.01
+    line = fit(x + 0.1 * np.sin(0.3 * np.arange(n)), 0.1).check
+    assert line is not None and line.p > 0.01 and line.line_p < 1e-6
+    assert line.line == pytest.approx(0.3 / (2.0 * math.pi) / 0.1, abs=1e-3)
+    from scipy.signal import lfilter
+
+    drift = lfilter([1.0], [1.0, -math.exp(-1.0 / 50.0)], 0.2 * rng.normal(size=n))  # corner at 0.032 Hz
+    bad = fit(x + drift, 0.1).check
+    assert bad is not None and bad.p < 1e-6 and 0.002 < bad.band[0] < 0.3

@@ -25,15 +25,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special
+from scipy import fft, optimize, special
 
 from gyrobench.reduction.series.deviations import Deviation
-from gyrobench.reduction.series.noise_likelihood import SHORTEST, Likelihood
+from gyrobench.reduction.series.long_record import SHORTEST, Condensed, LongRecord
+from gyrobench.reduction.series.noise_likelihood import Likelihood
 
 Array = NDArray[np.float64]
 STEPS = 100  # of the search for a maximum, at most
 RAMPS = 13  # values of K over which the interval of the ramp is a mixture
-NAMES = ("N", "B", "K", "Q")
+NAMES = ("N", "B", "K", "Q")  # order of the variances
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,34 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class ModelCheck:
+    """Whether the spectrum is that of the five terms.
+
+    p: probability of so large a departure if it is; band: lower and upper frequency (Hz) of the largest, ratio: power
+    over the model's there.  line_p: probability of a single ordinate so large, line: its frequency (Hz); of a record of
+    more than 2^21 samples only up to 1/(1024 tau0).
+    """
+
+    p: float
+    band: tuple[float, float]
+    ratio: float
+    line_p: float
+    line: float
+
+
+@dataclass(frozen=True)
 class NoiseCoefficients:
-    """N [rad/s/sqrt(Hz)], B [rad/s], K [rad/s^2/sqrt(Hz)], R [rad/s^2, signed], Q [rad] with intervals of 95 %."""
+    """N [rad/s/sqrt(Hz)], B [rad/s], K [rad/s^2/sqrt(Hz)], R [rad/s^2, signed], Q [rad] with intervals of 95 %.
+
+    check: of the fit; where p is small the five terms do not describe the record and the intervals mean little.
+    """
 
     N: Estimate
     B: Estimate
     K: Estimate
     R: Estimate
     Q: Estimate
+    check: ModelCheck | None = None
 
     def allan(self, tau: Array) -> Array:
         """Return the Allan deviation (k,) of the determined terms over tau (s)."""
@@ -113,7 +134,7 @@ class _Fit:
                 break
             part = 1.0
             while part > 1e-6:
-                trial = v + part * step
+                trial = np.maximum(v + part * step, 0.0)
                 value, changed = self.f(trial)
                 if value <= f - 1e-3 * part * gain:
                     break
@@ -166,43 +187,68 @@ class _Fit:
         return self.f.ramp(self.v)[0], quantile(0.025), quantile(0.975)
 
 
-def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
-    """Return the coefficients of a rate (n,) in rad/s, means over tau0 (s), or of stretches of it.
+class CoefficientAccumulator:
+    """Coefficients of a record that comes in blocks: ``add`` each, ``gap`` where the time is not known; SI.
 
-    Stretches (or parts between NaN) of SHORTEST samples or more are used as independent of each other: their means and
-    the time between them tell nothing.
+    Up to 16 lost samples in a row (NaN) are filled if they are 1 % at most, more of them split the record.  Stretches
+    of 40 samples or more, at most the 200 longest, are used as independent of each other: their means and the time
+    between them are not used.  The memory is that of 2^21 samples and of one in 512.
     """
-    parts = [
-        p for x in ([rate] if isinstance(rate, np.ndarray) else rate) for p in _present(np.asarray(x, dtype=float))
-    ]
-    if not parts:
-        raise ValueError(f"no stretch of {SHORTEST} samples without a gap")
-    size = math.sqrt(float(np.mean([np.var(np.diff(p)) for p in parts])))
-    if not size > 0.0:
-        raise ValueError("the record is constant; it has no noise to fit")
-    parts, line = _without_ramp(parts, tau0)
-    found = _Fit(Likelihood([p / size for p in parts]))
+
+    def __init__(self, tau0: float) -> None:
+        if not tau0 > 0.0:
+            raise ValueError(f"tau0 = {tau0} s; it must be positive")
+        self.tau0, self._record = tau0, LongRecord()
+        self.add, self.gap = self._record.add, self._record.gap
+
+    def result(self) -> NoiseCoefficients:
+        """End the record; return its coefficients."""
+        record = self._record.condensed()
+        if not record.stretches:
+            raise ValueError(f"no stretch of {SHORTEST * record.block} samples without a gap")
+        size = math.sqrt(float(np.mean([np.var(np.diff(p)) for p in record.stretches])))
+        if not size > 0.0:
+            raise ValueError("the record is constant; it has no noise to fit")
+        return _coefficients(*_without_ramp(record, size), size, self.tau0)
+
+
+def fit(rate: Array | Iterable[Array], tau0: float) -> NoiseCoefficients:
+    """Return the coefficients of a rate (n,), or of stretches of it, see :class:`CoefficientAccumulator`."""
+    total = CoefficientAccumulator(tau0)
+    for stretch in [rate] if isinstance(rate, np.ndarray) else rate:
+        total.add(stretch)
+        total.gap()
+    return total.result()
+
+
+def _without_ramp(record: Condensed, size: float) -> tuple[Condensed, float]:
+    """Return the record in units of ``size`` less the line of least squares common to its stretches, and its slope.
+
+    What is left of a ramp is small, so that it may be taken as even within a bin of ordinates.
+    """
+    parts = [p / size for p in record.stretches]
+    times = [(np.arange(p.size) - 0.5 * (p.size - 1)) * record.block for p in parts]
+    slope = sum(float(t @ p) for t, p in zip(times, parts, strict=True)) / sum(float(t @ t) for t in times)
+    n = record.total.size + 1
+    line = fft.dct(slope * np.arange(n), norm="ortho")[1:]
+    square = record.square / size**2 - 2.0 * line * record.total / size + record.blocks * line**2
+    level = [p - slope * t for t, p in zip(times, parts, strict=True)]
+    return Condensed(level, record.block, record.blocks, record.total, square), slope
+
+
+def _coefficients(record: Condensed, line: float, size: float, tau0: float) -> NoiseCoefficients:
+    found = _Fit(Likelihood(record))
     unit = {"N": size * math.sqrt(tau0), "B": size, "K": size / math.sqrt(tau0), "Q": size * tau0}
     estimates = {}
     for j, name in enumerate(NAMES):
         low, high = found.interval(j)
         value, low, high = (math.sqrt(x) * unit[name] for x in (float(found.v[j]), low, high))
         estimates[name] = Estimate(value, low, high, low > 0.0)
-    slope, low, high = (x * size / tau0 + line for x in found.ramp())
-    return NoiseCoefficients(R=Estimate(slope, low, high, low * high > 0.0), **estimates)
-
-
-def _without_ramp(parts: list[Array], tau0: float) -> tuple[list[Array], float]:
-    """Return stretches less the common line of least squares, and its slope: bins hold what is left of a ramp."""
-    times = [(np.arange(p.size) - 0.5 * (p.size - 1)) * tau0 for p in parts]
-    line = sum(float(t @ p) for t, p in zip(times, parts, strict=True)) / sum(float(t @ t) for t in times)
-    return [p - line * t for t, p in zip(times, parts, strict=True)], line
-
-
-def _present(x: Array) -> list[Array]:
-    there = np.isfinite(x)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]])))
-    return [x[a:b] for a, b in edges.reshape(-1, 2) if b - a >= SHORTEST]
+    slope, low, high = ((x + line) * size / tau0 for x in found.ramp())
+    p, (lower, upper, ratio), line_p, line_at = found.f.check(found.v)
+    check = ModelCheck(p, (float(lower) / tau0, float(upper) / tau0), float(ratio), line_p, line_at / tau0)
+    estimates["R"] = Estimate(slope, low, high, low * high > 0.0)
+    return _result(estimates, check)
 
 
 #: Slope of the Allan deviation and what its value at tau is multiplied by: coefficient = factor * sigma * tau^-slope.
@@ -237,4 +283,8 @@ def slopes(deviation: Deviation) -> NoiseCoefficients:
             continue
         value, least, most = (math.sqrt(float(y[i] * y[i + 1])) for y in (line * dev, line * low, line * high))
         found[name] = Estimate(value, least, most, True)
-    return NoiseCoefficients(**found)
+    return _result(found)
+
+
+def _result(found: dict[str, Estimate], check: ModelCheck | None = None) -> NoiseCoefficients:
+    return NoiseCoefficients(found["N"], found["B"], found["K"], found["R"], found["Q"], check)

@@ -24,21 +24,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
+from gyrobench.reduction.series.long_record import BLOCK, Condensed
+
 Array = NDArray[np.float64]
 LOW = 16  # first ordinates of each parity whose correlations by flicker are kept
-SHORTEST = 40  # samples of a stretch that is used
 WIDTH = 0.02  # of a bin of ordinates, of the logarithm of k
+BAND = 1.5  # frequencies of a band of the check
 FLOOR = 1e-14  # of a variance, where that of the first differences of the record is 1
 
 
 @functools.cache
-def _flicker() -> tuple[Array, Array]:
-    """Variance over that of the folded spectrum and correlation matrix of the first ordinates of flicker, k = 1 .. 64.
+def _flicker(n: int = 1024, low: int = 64) -> tuple[Array, Array]:
+    """Variance over that of the folded spectrum and correlation matrix of the first ordinates of flicker, k = 1 .. low.
 
     From the generalized covariance of means over unit time, -(second difference of t^2 log t)/(2 pi).  They do not
     depend on n (to 1e-4 from n = 1024 on).
     """
-    n, low = 1024, 64
     t = np.arange(n + 1.0)
     g = t * t * np.log(np.maximum(t, 1.0))
     gram = np.concatenate([[2.0 * g[1] - 2.0 * g[0]], g[2:] - 2.0 * g[1:-1] + g[:-2]]) / (-2.0 * np.pi)
@@ -63,12 +64,22 @@ def _basis(k: Array, n: int) -> Array:
     return np.array([np.ones_like(k), share * _folded(k / (2 * n)), (1.0 - sine / 6.0) / sine, sine])
 
 
+def _basis_of_blocks(n: int) -> Array:
+    """Variances (4, n - 1) of all ordinates of short blocks, with what the angles at their ends add."""
+    k = np.arange(1.0, n)
+    out = _basis(k, n)
+    out[1] = _flicker(n, n - 1)[0] * _folded(k / (2 * n))
+    out[3] += 4.0 / n * np.cos(np.pi * k / (2 * n)) ** 2
+    return out
+
+
 @dataclass(frozen=True)
 class _Ordinates:
     """Ordinates of one parity of one stretch: the first LOW singly, then sums over bins.
 
     basis (4, b); products (6, b): sums over a bin of cc, cu, cr, uu, ur, rr, of the ordinates c, of the error of the
-    angles at the ends u and of a unit ramp r; columns (LOW, 3): c, u, r; flicker (LOW, LOW): covariance for unit B.
+    angles at the ends u and of a unit ramp r; columns (LOW, 3): c, u, r; flicker (LOW, LOW): covariance for unit B;
+    frequency (b,), per sample; largest (2, b): square of an ordinate of the bin, and its frequency.
     """
 
     basis: Array
@@ -76,9 +87,12 @@ class _Ordinates:
     products: Array
     columns: Array
     flicker: Array
+    frequency: Array
+    largest: Array
 
 
-def _ordinates(rate: Array) -> list[_Ordinates]:
+def _ordinates(rate: Array, block: int) -> list[_Ordinates]:
+    """Both parities of a stretch of means over ``block`` samples, odd ordinates first."""
     n = rate.size
     c = fft.dct(rate - rate.mean(), norm="ortho")
     edges = list(range(1, int(2.0 / WIDTH)))
@@ -97,32 +111,52 @@ def _ordinates(rate: Array) -> list[_Ordinates]:
         half = np.pi * middle / (2 * n)
         u = math.sqrt(2.0 / n) * np.cos(half)
         r = -u / (2.0 * np.sin(half) ** 2) if parity else np.zeros_like(u)
-        basis = _basis(middle, n)
+        # in the units of single samples
+        basis = _basis(middle, n) * np.array([[1.0 / block], [1.0], [block], [block**-2.0]])
+        u, r = u / block, r * block
         size = np.sqrt(basis[1, :LOW])
         flicker = _flicker()[1][1 - parity :: 2, 1 - parity :: 2][:LOW, :LOW] * np.outer(size, size)
         products = np.array([square, total * u, total * r, count * u * u, count * u * r, count * r * r])
-        out.append(_Ordinates(basis, count, products, np.array([total, u, r])[:, :LOW].T, flicker))
+        largest = np.maximum.reduceat(x * x, start)
+        at = np.flatnonzero(x * x == np.repeat(largest, count.astype(int)))
+        at = at[np.searchsorted(at, start)]  # the first of equal ones
+        tops = np.array([largest, k[at] / (2.0 * n * block)])
+        columns = np.array([total, u, r])[:, :LOW].T
+        out.append(_Ordinates(basis, count, products, columns, flicker, middle / (2 * n * block), tops))
     return out
 
 
 class Likelihood:
     """-2 log of the restricted likelihood of v = (N^2/tau0, B^2, K^2 tau0, (Q/tau0)^2), the ramp eliminated."""
 
-    def __init__(self, stretches: list[Array]) -> None:
-        parts = [part for x in stretches for part in _ordinates(x)]
-        self.basis = np.concatenate([p.basis for p in parts], axis=1)
-        self.count = np.concatenate([p.count for p in parts])
-        self.square = np.concatenate([p.products[0] for p in parts])
+    def __init__(self, record: Condensed) -> None:
+        parts = [part for x in record.stretches for part in _ordinates(x, record.block)]
         self._columns = np.array([p.columns for p in parts])  # (g, LOW, 3)
         terms = np.zeros((len(parts), 4, LOW, LOW))  # covariance of the first ordinates, g parities of stretches
         terms[:, :, np.arange(LOW), np.arange(LOW)] = [p.basis[:, :LOW] for p in parts]
         terms[:, 1] = [p.flicker for p in parts]
         self._terms = terms
-        self._high = np.concatenate([p.basis[:, LOW:] for p in parts], axis=1)
-        self._counts = np.concatenate([p.count[LOW:] for p in parts])
-        products = np.concatenate([p.products[:, LOW:] for p in parts], axis=1)
-        self._sums = np.concatenate([products, (products[:, None] * self._high).reshape(24, -1)])
-        self._starts = np.cumsum([0] + [p.count.size - LOW for p in parts])[:-1]
+        basis, count = [p.basis for p in parts], [p.count for p in parts]
+        products = [p.products for p in parts]
+        starts = np.cumsum([0] + [c.size - LOW for c in count])[: len(parts)]
+        high = [slice(LOW, None)] * len(parts)
+        if record.blocks:  # their powers are one more group, without the parts of u and r
+            basis.append(_basis_of_blocks(BLOCK))
+            count.append(np.full(BLOCK - 1, float(record.blocks)))
+            products.append(np.concatenate([record.square[None], np.zeros((5, BLOCK - 1))]))
+            high.append(slice(None))
+            starts = np.append(starts, sum(c.size - LOW for c in count[:-1]))
+        self.basis, self.count = np.concatenate(basis, axis=1), np.concatenate(count)
+        self.products = np.concatenate(products, axis=1)
+        self.frequency = np.concatenate([p.frequency for p in parts])
+        self.largest = np.concatenate([p.largest for p in parts], axis=1)
+        if record.blocks:
+            self.frequency = np.append(self.frequency, np.arange(1, BLOCK) / (2.0 * BLOCK))
+        self._high = np.concatenate([b[:, s] for b, s in zip(basis, high, strict=True)], axis=1)
+        self._counts = np.concatenate([c[s] for c, s in zip(count, high, strict=True)])
+        fast = np.concatenate([p[:, s] for p, s in zip(products, high, strict=True)], axis=1)
+        self._sums = np.concatenate([fast, (fast[:, None] * self._high).reshape(24, -1)])
+        self._starts, self._sizes = starts, [c.size for c in count]
 
     def _forms(self, v: Array) -> tuple[float, Array, Array, Array]:
         """Return log determinant, its derivative (4,), the forms x' A^-1 y (6, g) and their derivatives (6, 4, g).
@@ -141,8 +175,9 @@ class Likelihood:
         low = np.swapaxes(self._columns, 1, 2) @ solved
         change = np.swapaxes(solved, 1, 2)[:, None] @ (self._terms @ solved[:, None])
         i, j = np.triu_indices(3)
-        forms = high[:6] + low[:, i, j].T
-        changes = -(high[6:].reshape(6, 4, -1) + change[:, :, i, j].transpose(2, 1, 0))
+        forms, changes = high[:6], -high[6:].reshape(6, 4, -1)
+        forms[:, : len(low)] += low[:, i, j].T
+        changes[:, :, : len(low)] -= change[:, :, i, j].transpose(2, 1, 0)
         return value, slope, forms, changes
 
     def ramp(self, v: Array) -> tuple[float, float]:
@@ -180,9 +215,35 @@ class Likelihood:
         out: Array = 0.5 * (scaled * self.count) @ scaled.T
         return out
 
+    def check(self, v: Array) -> tuple[float, Array, float, float]:
+        """Return p of so large a departure of the spectrum, its band, p of so large an ordinate (a line), its place.
+
+        Powers over those of the model, in bands of a factor BAND, are chi-squared over their number of ordinates; their
+        normal scores (Wilson and Hilferty) squared and summed up are chi-squared over the bands less the terms fitted.
+        Band (3,): lower and upper frequency per sample, power over the model's, where it departs most.  Line: the
+        largest single ordinate over the model, and its frequency per sample.
+        """
+        ramp, model = self.ramp(v)[0], np.maximum(v @ self.basis, FLOOR)
+        _, _, (_, cu, _, uu, ur, _), _ = self._forms(v)
+        ends = np.repeat(2.0 * v[3] * (cu - ramp * ur) / (1.0 + 2.0 * v[3] * uu), self._sizes)
+        cc, cu, cr, uu, ur, rr = self.products
+        power = (cc - 2.0 * (ramp * cr + ends * cu - ramp * ends * ur) + ramp**2 * rr + ends**2 * uu) / model
+        band = np.floor(np.log(self.frequency / self.frequency.min()) / math.log(BAND)).astype(int)
+        number, total = np.bincount(band, self.count), np.bincount(band, power)
+        used = number >= 4
+        number, ratio = number[used], total[used] / number[used]
+        score = (np.cbrt(ratio) - 1.0 + 2.0 / (9.0 * number)) / np.sqrt(2.0 / (9.0 * number))
+        p = float(special.chdtrc(max(number.size - np.count_nonzero(v), 1), score @ score))
+        worst = int(np.argmax(np.abs(score)))
+        edge = self.frequency.min() * BAND ** (np.flatnonzero(used)[worst] + np.arange(2.0))
+        tops = self.largest[0] / model[: self.largest.shape[1]]
+        top = int(np.argmax(tops))
+        line = -math.expm1(self.count[: tops.size].sum() * math.log1p(-special.erfc(math.sqrt(0.5 * tops[top]))))
+        return p, np.append(edge, ratio[worst]), line, float(self.largest[1, top])
+
     def start(self) -> Array:
         """Return v of which every component alone is half of what the powers of neighbouring bins allow."""
         first = np.arange(0, self.count.size, 8)
-        level = np.add.reduceat(self.square, first) / np.add.reduceat(self.count * self.basis, first, axis=1)
+        level = np.add.reduceat(self.products[0], first) / np.add.reduceat(self.count * self.basis, first, axis=1)
         out: Array = 0.5 * level.min(axis=1)
         return out

@@ -1,0 +1,106 @@
+"""A rate record of any length, as the fit of noise coefficients takes it: stretches, or their means and a spectrum.
+
+Up to WHOLE samples the stretches are kept as they are.  Longer ones become means of BLOCK samples, and the powers of
+the cosine transform of each block, summed up over the blocks: what is faster than the means.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+Array = NDArray[np.float64]
+WHOLE = 1 << 21  # samples kept as they are
+BLOCK = 512  # short ones would let the errors of the angles at their ends hide the white noise
+SHORTEST = 40  # samples of a stretch that is used
+STRETCHES = 200  # used, the longest
+LOST = 16  # samples in a row that are filled
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Stretches of means over ``block`` samples; of the blocks their number, sums (BLOCK - 1,) and sums of squares of
+    the ordinates 1 .. of their cosine transforms (zero for block 1).
+    """
+
+    stretches: list[Array]
+    block: int
+    blocks: int
+    total: Array
+    square: Array
+
+
+class LongRecord:
+    """Rates that come in blocks; NaN for a sample that is lost."""
+
+    def __init__(self) -> None:
+        self._raw: list[list[Array]] = [[]]
+        self._means: list[list[Array]] = []
+        self._waiting, self._blocks, self._open = 0, 0, False
+        self._sums = np.zeros((2, BLOCK - 1))
+
+    def add(self, rate: Array) -> None:
+        """Add rates (n,)."""
+        x = np.array(rate, dtype=float)
+        self._raw[-1].append(x)
+        self._waiting += x.size
+        if self._waiting > WHOLE:
+            self._condense()
+
+    def gap(self) -> None:
+        """End a stretch: the time to what follows is not known."""
+        self._raw.append([])
+
+    def condensed(self) -> Condensed:
+        """End the record and return it."""
+        if self._means:
+            self._condense()
+            stretches, block = [np.concatenate(parts) for parts in self._means], BLOCK
+        else:
+            stretches = [x for parts in self._raw if parts for x in present(np.concatenate(parts))]
+            block = 1
+        stretches = sorted((x for x in stretches if x.size >= SHORTEST), key=lambda x: -x.size)[:STRETCHES]
+        return Condensed(stretches, block, self._blocks, *self._sums)
+
+    def _condense(self) -> None:
+        rest: list[Array] = []
+        for i, parts in enumerate(self._raw):
+            pieces = present(np.concatenate(parts), 1) if parts else []
+            for j, x in enumerate(pieces):
+                runs_on = i == len(self._raw) - 1 and j == len(pieces) - 1 and bool(np.isfinite(parts[-1][-1]))
+                n = (x.size - runs_on) // BLOCK
+                if runs_on:
+                    rest = [x[n * BLOCK :]]
+                blocks = x[: n * BLOCK].reshape(n, BLOCK)
+                if not (self._open and i == j == 0):
+                    self._means.append([])
+                self._means[-1].append(blocks.mean(axis=1))
+                if n:
+                    c = fft.dct(blocks, norm="ortho", axis=1)[:, 1:]
+                    self._sums += c.sum(axis=0), (c * c).sum(axis=0)
+                    self._blocks += n
+        self._open, self._raw = bool(rest), [rest]
+        self._waiting = sum(x.size for x in rest)
+
+
+def present(x: Array, shortest: int = SHORTEST) -> list[Array]:
+    """Return the parts between gaps; up to LOST samples in a row are filled with those before, if it is 1 % at most.
+
+    Filled samples repeat the noise of their neighbours, so that its level is kept; the joints raise Q^2 by about one
+    part in as many as there are samples from one joint to the next.
+    """
+    there = np.isfinite(x)
+    if there.all():
+        return [x] if x.size >= shortest else []
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], there.astype(np.int8), [1]]))).reshape(-1, 2)
+    short = [(a, b) for a, b in edges if b - a <= min(LOST, a) and b < x.size]
+    if sum(b - a for a, b in short) <= 0.01 * x.size:
+        x = x.copy()
+        for a, b in short:
+            x[a:b] = x[2 * a - b : a]
+    there = np.isfinite(x)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]]))).reshape(-1, 2)
+    return [x[a:b] for a, b in edges if b - a >= shortest]
