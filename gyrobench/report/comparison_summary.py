@@ -37,7 +37,8 @@ def sentences(doc: Mapping[str, Any], letters: Sequence[str]) -> list[str]:
         verb = "difference exceeds its" if alone == 1 else "differences exceed their"
         text.append(f"{alone} more {verb} own U; of {len(known)} about {by_chance} do so by chance.")
     text.append(_settings([row["what"] for row in doc["differing"]]))
-    return [*text, *_order(doc, names)]
+    order = _order(doc, names)  # first where a test ranks for purposes: that is what it is made for
+    return [*order, *text] if doc["purposes"] else [*text, *order]
 
 
 def _differs(doc: Mapping[str, Any], run: int, name: str, base: str) -> str:
@@ -82,8 +83,8 @@ def _order(doc: Mapping[str, Any], names: Sequence[str]) -> list[str]:
 def _first_of(ranked: Json, names: Sequence[str]) -> str:
     """Return who has the smallest value of a measure, and how many ranks can be told apart."""
     first = [e for e in ranked["order"] if e["place"] == 1]
-    measure = f"{ranked['name']} ({ranked['meaning']})"
     purpose = f"{ranked['purpose']}: " if "purpose" in ranked else ""
+    measure = str(ranked["name"]) if purpose else f"{ranked['name']} ({ranked['meaning']})"
     if len(first) == len(ranked["order"]):
         return f"{purpose}{'no' if purpose else 'No'} order by {measure}: the runs cannot be told apart."
     best = ", ".join(names[e["run"]] for e in first)

@@ -89,7 +89,8 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
         f"Ranking by {ranked['name']}: {ranked['meaning']}; the smallest value ranks first, runs that cannot be told "
         "apart (=) share a rank."
     )
-    blocks: list[Any] = [_table(doc, ("ranking",), caption, letters), Text(NOTE, quiet=True)]
+    blocks: list[Any] = [_places(doc, letters)] if doc["purposes"] else []
+    blocks += [_table(doc, ("ranking",), caption, letters), Text(NOTE, quiet=True)]
     for k, other in enumerate(doc["purposes"]):
         caption = f"{other['purpose']}: ranking by {other['name']}, {other['meaning']}."
         blocks.append(_table(doc, ("purposes", k), caption, letters))
@@ -99,10 +100,23 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
     return Section("Ranking", "ranking", blocks)
 
 
+def _places(doc: Json, letters: Sequence[str]) -> Table:
+    """Return the rank of each run by each measure."""
+    rows = []
+    for ranked in (doc["ranking"], *doc["purposes"]):
+        places = {e["run"]: place_text(ranked, e) for e in ranked["order"]}
+        shown = [places.get(k, "–") for k in range(len(letters))]
+        cells = [text_cell(x, "strong" if x in ("1", "1 =") else "") for x in shown]
+        rows.append(Row([text_cell(ranked.get("purpose", "")), text_cell(ranked["name"]), *cells]))
+    columns = [Column("purpose", wide=True), Column("measure"), *(Column(x) for x in letters)]
+    return Table(columns, rows, "Ranks of all runs by all measures, 1: the smallest value; =: shared.")
+
+
 def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequence[str]) -> Table:
     ranked = doc
     for key in path:
         ranked = ranked[key]  # type: ignore[index]
+    several = len({run["instrument"] for run in doc["runs"]}) > 1
     rows = []
     for index, entry in enumerate(ranked["order"]):
         run, at = doc["runs"][entry["run"]], (*path, "order", index)
@@ -112,7 +126,7 @@ def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequen
                     text_cell(place_text(ranked, entry), "strong"),
                     text_cell(letters[entry["run"]]),
                     text_cell(run["name"]),
-                    text_cell(run["instrument"]),
+                    *([text_cell(run["instrument"])] if several else []),
                     number_cell(doc, (*at, "value"), entry["u"]),
                     number_cell(doc, (*at, "u"), entry["u"]),
                     number_cell(doc, (*at, "over_best"), significant=3),
@@ -122,14 +136,15 @@ def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequen
         )
     for entry in ranked["void"]:
         run = doc["runs"][entry["run"]]
-        known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"]), text_cell(run["instrument"])]
+        known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"])]
+        known += [text_cell(run["instrument"])] if several else []
         rows.append(Row([*known, text_cell("void", "void"), *(text_cell("–") for _ in range(3))]))
     unit = ranked["unit"] if ranked["unit"] != "1" else ""
     columns = [
         Column("rank"),
         Column(""),
         Column("run", wide=True),
-        Column("instrument"),
+        *([Column("instrument")] if several else []),
         Column(ranked["name"], unit),
     ]
     columns += [Column("u"), Column("ratio to the smallest"), Column("probability")]

@@ -90,12 +90,14 @@ class OnRequest:
     """Slots that a system has only where they are asked for: a part is put into the first, or a parameter of it is set.
 
     Without them the system is the one it was: no FMU, no wire, no column more.  columns: further ones of the windows.
+    instead_of: the line of the system's wires that theirs replace.
     """
 
     slots: Mapping[str, Slot]
     wires: str
     columns: Mapping[str, str] = field(default_factory=dict)
     channels: tuple[str, ...] = ()
+    instead_of: str = ""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,7 @@ class System(Configurable):
             return
         more: dict[str, Any] = {
             "slots": {**self.slots, **wanted.slots},
-            "wires": f"{self.wires}\n{wanted.wires}",
+            "wires": f"{_without(self.wires, wanted.instead_of)}\n{wanted.wires}",
             "channels": (*self.channels, *wanted.channels),
         }
         if self.windows is not None:
@@ -280,6 +282,10 @@ class System(Configurable):
         for name, value in self.parameters(parts).items():
             found.update(flatten(name, value))
         return found
+
+
+def _without(wires: str, line: str) -> str:
+    return "\n".join(x for x in wires.splitlines() if not line or x.split() != line.split())
 
 
 def load_system(name: str, bench: Path | None = None) -> System:

@@ -7,32 +7,18 @@ import math
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.estimator_metrics import UncertainValue, rms
-from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.loops.estimator_metrics import rms
+from gyrobench.reduction.loops.loop_measures import Gate, Point
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins, told
 from gyrobench.result import LoopResult, Specification
 
 from .budget import ride_budget
+from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, period
 
 MRAD = 1e-3
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
-
-
-def jitter(y: np.ndarray, n: int) -> np.ndarray:
-    """y less its running mean over n samples, without the ends: the wander of the gyro is no error of the loop."""
-    slow = np.convolve(y, np.full(n, 1.0 / n), "valid")
-    first = (n - 1) // 2
-    return np.asarray(y[first : first + slow.size] - slow)
-
-
-def level(y: np.ndarray, stretches: int = 10) -> UncertainValue:
-    """Root mean square of a ride by a sine, with noise.  u from the scatter of the mean squares of ten stretches."""
-    squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
-    whole = math.sqrt(float(np.mean(y * y)))
-    u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0
-    return UncertainValue(whole, u, stretches - 1)
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
@@ -41,13 +27,17 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     swings = _ride(found)
     _steps(found)
     found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
-    found.ratio(
-        "attitude over base angle", "motion", 1, ANGLE, "exciter.motion_angle[1]",
-        caption="Isolation: how much of the base's angle the platform takes over.",
-    )  # fmt: skip
+    lag(found, _estimator(found))
+    bending(found)
+    disturbed(found)
+    if any(g.label.startswith("base") for g in found.gates):
+        found.ratio(
+            "attitude over base angle", "motion", 1, ANGLE, "exciter.motion_angle[1]",
+            caption="Isolation: how much of the base's angle the platform takes over.",
+        )  # fmt: skip
     _drift(found)
     _saturated(found)
-    return found.result(
+    result = found.result(
         title="Stabilized platform on one axis",
         method="Disturbance step, command step, sine sweeps, ride and drift of a loop with a floated gyro in rebalance",
         sources=["PLATFORM-1AXIS, GYRO-REBALANCE; Xia 2008, section 4.1, fig. 4.1.1 (rebuilt), corrected by EX3"],
@@ -66,6 +56,8 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ranked_by="platform error",
         specification=specification,
     )
+    result.purposes = {name: purpose for name, purpose in PURPOSES.items() if name in result.names}
+    return result
 
 
 def _ride(found: LoopFindings) -> str:
@@ -73,17 +65,18 @@ def _ride(found: LoopFindings) -> str:
     ride = next((g for g in found.gates if g.label == "ride"), None)
     if ride is None:
         return ""
-    two = round(2.0 / (ride.f or SLOW) / float(ride.t[1] - ride.t[0]))
+    two = round(2.0 / (ride.f or SLOW) / period(ride))
     size = level if ride.f else rms  # a recorded motion is random
     error, rate = size(jitter(ride[ANGLE], two)), size(ride[RATE] - ride[RATE].mean())
     meaning = "attitude in the ride, rms about its running mean over two periods or 20 s"
     found.measure("platform error", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
     found.measure("rate error", "rate in the ride, rms", "mrad/s", rate.value / MRAD, rate.u / MRAD)
     sources = ride_budget(found, ride, ANGLE, two)
+    effort(found, ride)
     p = found.record.run.parameters
     k = p.get("gyro.k") or (1.0 / p["stabilizer.K_u"] if p.get("stabilizer.K_u") else None)  # or what the design took
     if k is not None:
-        _estimator(found, ride, float(k))
+        _reading(found, ride, float(k))
     base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
     limit = max(sources, key=lambda name: sources[name], default="")
     by = f"; the largest part is {limit}, {sources[limit] / ARCSEC:.3g}″" if limit else ""
@@ -94,11 +87,8 @@ def _load(found: LoopFindings) -> str:
     return next((f"{abs(g.amplitude):g} N·m" for g in found.of("torque", shape="step")), "")
 
 
-def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:
-    """Its reading and its estimate against the true rate, in the ride; noise reduction and distortion together.
-
-    The closed loop leaves little of the rate, so gain and phase of the estimator are taken in the sines of the base.
-    """
+def _reading(found: LoopFindings, ride: Gate, k: float) -> None:
+    """Add the errors of reading and estimate against the true rate, in the ride."""
     truth = ride[RATE] / k
     raw, left = rms(ride["rebalance.i_read"] - truth), rms(ride["estimator.estimate"] - truth)
     unit = "mA"
@@ -107,7 +97,11 @@ def _estimator(found: LoopFindings, ride: Gate, k: float) -> None:
     if "estimator.latency" in ride.channels:  # an estimator need not state it
         latency = float(ride["estimator.latency"][-1])
         found.measure("latency", "delay that the estimator states", "ms", 1e3 * latency)
-    found.ratio(
+
+
+def _estimator(found: LoopFindings) -> list[Point]:
+    """Add the response of the estimator at the test sines; the closed loop leaves little of the rate in the ride."""
+    return found.ratio(
         "estimate over reading", "test", 1, "estimator.estimate", "rebalance.i_read",
         caption="What the estimator does to the signal of the loop: gain and phase at the test sines.",
     )  # fmt: skip

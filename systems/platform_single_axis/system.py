@@ -8,7 +8,9 @@ from typing import Any
 from gyrobench.system.families.loop_test import PROFILE, OneAxisTest, data_sheet, noises, stabilizer
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot
+from gyrobench.system.system import OnRequest, Option, Slot
+
+from .contest import BRACKET, CHANNEL, Contest
 
 PICKOFF_NOISE = 5e-8  # V/sqrt(Hz)
 REBALANCE = 100.0  # Hz, bandwidth of the rebalance loop: the float follows with 2 pi this
@@ -41,6 +43,27 @@ class PlatformSingleAxisLoop(OneAxisTest):
         estimator.estimate -> stabilizer.u
         platform.i_motor -> stabilizer.i_motor
     """  # fmt: skip
+    on_request = {
+        "channel": OnRequest(
+            {"channel": Slot(CHANNEL, "reading_channel")},
+            """
+            rebalance.i_read -> channel.z
+            exciter.phase -> channel.phase
+            channel.y -> estimator.z
+            channel.valid -> estimator.valid
+            """,
+            instead_of="rebalance.i_read -> estimator.z",
+        ),
+        "bracket": OnRequest(
+            {"bracket": Slot(BRACKET, "gyro_bracket")},
+            """
+            platform.f -> gyro.f
+            platform.omega -> bracket.omega
+            bracket.omega_gyro -> gyro.omega
+            """,
+            instead_of="platform -> gyro: omega f",
+        ),
+    }
     options = {
         "crossover": Option(10.0, "Hz", "crossover for which the gain of the stabilizer is set", 0.5, 20.0),
         "load_step": Option(1.0, "N.m", "disturbance torque of the step"),
@@ -50,8 +73,9 @@ class PlatformSingleAxisLoop(OneAxisTest):
         "hold": Option(60.0, "s", "time of ride, and of the drift hold", 10.0, 3600.0),
         "reading_noise": Option(1e-5, "A/sqrt(Hz)", "noise density of the current that is read", 0.0),
         **PROFILE,
+        "contest": Option(False, bool, "the plan that compares estimators: bending, line, noise, gaps, wild readings"),
     }
-    noises = (*noises(), "rebalance.meter")
+    noises = (*noises(), "rebalance.meter", "channel.white")
     step = 5e-4
     channels = (
         *OneAxisTest.channels, "platform.saturated", "rebalance.i_read", "rebalance.saturated", "estimator.estimate",
@@ -63,9 +87,17 @@ class PlatformSingleAxisLoop(OneAxisTest):
     )  # fmt: skip
     channel_period = 1e-3
 
+    def set(self, name: str, value: Any) -> None:
+        super().set(name, value)
+        if self["contest"]:
+            self.request("channel")
+            self.request("bracket")
+
     def phases(self) -> list[LoopPhase]:
         """Step of torque, step of commanded rate, test sines for the loop, sines of the base, ride, drift."""
         fc = self["crossover"]
+        if self["contest"]:
+            return self.contest().phases()
         return [
             LoopPhase("load step", "torque", "step", amplitude=self["load_step"], settle=2.0, dwell=4.0),
             LoopPhase("command step", "command", "step", amplitude=self["command"], settle=6.0, dwell=2.0),
@@ -74,6 +106,15 @@ class PlatformSingleAxisLoop(OneAxisTest):
             LoopPhase("ride", "motion", "sine", 1, self["base"], self["ride"], 2.0 / self["ride"], self._whole()),
             LoopPhase("drift", "hold", settle=5.0, dwell=self["hold"]),
         ]
+
+    def check(self) -> list[str]:
+        if self["contest"] and self["profile"]:
+            return ["contest and profile: a recorded motion is one ride; leave out one of the two"]
+        return []
+
+    def contest(self) -> Contest:
+        """Return the rides that compare estimators."""
+        return Contest(self["crossover"], self["base"], self["ride"], self._whole(), self["reading_noise"])
 
     def amplitude(self, f: float) -> float:
         """Of the base, rad: falls with the square of the frequency above the ride's."""
@@ -120,4 +161,5 @@ class PlatformSingleAxisLoop(OneAxisTest):
             "estimator.sigma?": math.sqrt(variance),
             **{f"stabilizer.{name}?": x for name, x in stabilizer.items()},
             "stabilizer.K_u?": 1.0 / k,
+            **(self.contest().parameters() if self["contest"] else {}),
         }
