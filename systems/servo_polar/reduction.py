@@ -32,7 +32,7 @@ from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
-from . import closed, refusals
+from . import closed, live, refusals
 from .model import Model
 
 Array = NDArray[np.float64]
@@ -100,6 +100,7 @@ def _examined(record: Record, specification: Specification | None = None) -> Dri
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)
+    live_tables = live.tables(windows, labels, float(options.get("wanted", 0.0)))
     statistics = _composite(found, labels, phase, held, site)
     together = {n: model.words(n, book=True) for n in model.fitted}
     warnings = refusals.unseen(route, mounts, which)
@@ -136,13 +137,14 @@ def _examined(record: Record, specification: Specification | None = None) -> Dri
             *turns.table(),
             *_turn_differences(found, turns, labels, phase),
             *composite.tables(statistics, DPH, "°/h"),
+            *live_tables,
         ],
         harmonics=turns.harmonics(fits),
         repeatability=turns.repeatability(),
         warnings=warnings,
         robust=bool(options.get("robust", False)),
     )  # fmt: skip
-    result.summary = _summary(result, statistics, found)
+    result.summary = [*_summary(result, statistics, found), *live.sentence(live_tables)]
     return run_metadata.finish(result, record)
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES
 from gyrobench.system.families.servo_test import Hold, ServoTest
-from gyrobench.system.system import Option
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.system import OnRequest, Option
 
+from . import live
 from .measured import MEASURED
 
 TURN = 2.0 * math.pi
@@ -37,11 +39,13 @@ class ServoPolar(ServoTest):
             "window": Option(600.0, "s", "length of a window", 1e-3),
             "dwell": Option(3600.0, "s", "length of each of the two dwells with the input axis east"),
             "route": Option("dwells", str, "how R and K_zx are told apart: dwells, equal (K_zx = K_xz) or combination"),
+            "wanted": Option("0.001deg/h", "rad/s", "with the slot coefficients: wanted u of mean and harmonics", 0.0),
             "terms": Option(9, int, "terms of the model: 4 (low grades), 8 (Hu 1981), 9 (with D_O)", 4, 9),
         }
         | CORRECTIONS
         | NUISANCES
     )
+    on_request: ClassVar[Mapping[str, OnRequest]] = {**ServoTest.on_request, live.SLOT: live.ON_REQUEST}
     shorter = "give that time, or turns=0 for as much of a turn as the time gives, or turns=1"
     measured_data = MEASURED
     channel_period = 60.0
@@ -67,6 +71,17 @@ class ServoPolar(ServoTest):
             )
             angle += travel if mount == "polar S" else -travel
         return holds
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        """The live estimator is told the noise of the gyro in the slot, and the readings' quantum."""
+        found = super().parameters(parts)
+        if live.SLOT not in self.slots:
+            return found
+        told = {"tau": "gyro.markov_tau", "rms": "gyro.markov", "white": "gyro.white"}
+        found |= {f"{live.SLOT}.{name}?": parts[source] for name, source in told.items() if source in parts}
+        if "table.quantum" in parts:
+            found[f"{live.SLOT}.sigma?"] = float(parts["table.quantum"]) / math.sqrt(12.0)
+        return found | {f"{live.SLOT}.wanted[{k}]?": self["wanted"] for k in range(1, 6)}
 
     def check(self) -> list[str]:
         from .refusals import option_problems

@@ -1,0 +1,97 @@
+"""The live estimate of the drift over the angle, and the hours that it would have saved.  [EST-KF-COEFF]"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.attitudes import POLAR
+from gyrobench.system.system import OnRequest, Slot
+
+Array = NDArray[np.float64]
+SLOT = "coefficients"
+DPH = units.factor("deg/h")
+NAMES = ("A0", "A1", "B1", "A2", "B2")  # mean, cos, sin, cos 2, sin 2
+VALUES, DEVIATIONS = ([f"live_{kind}_{n}" for n in NAMES] for kind in ("value", "sd"))
+MAY_STOP, NIS, CONSISTENT = "live_may_stop", "live_mean_nis", "live_consistent"
+
+#: the slot, what it takes of the windows, and what the record keeps of it
+ON_REQUEST = OnRequest(
+    {SLOT: Slot("CoefficientEstimator", "estimator_coefficients")},
+    f"""
+    sampler -> {SLOT}: count window_phase angle_start angle_end t_start t_end
+    stand.omega[1] -> {SLOT}.omega_E
+    """,
+    {
+        **{column: f"{SLOT}.A[{k}]" for k, column in enumerate(VALUES, 1)},
+        **{column: f"{SLOT}.sd[{k}]" for k, column in enumerate(DEVIATIONS, 1)},
+        MAY_STOP: f"{SLOT}.may_stop",
+        NIS: f"{SLOT}.mean_nis",
+        CONSISTENT: f"{SLOT}.consistent",
+    },
+)
+
+
+def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: float) -> list[dict[str, Any]]:
+    """Return the tables of the live estimate; none for a record without it.
+
+    windows: columns of the record.  labels: phase -> attitude.  wanted: standard deviation asked for, rad/s.
+    """
+    if MAY_STOP not in windows:
+        return []
+    stops, values = [], []
+    for p, label in labels.items():
+        rows = np.flatnonzero(np.asarray(windows["phase"]) == p)
+        if label not in POLAR or rows.size == 0:
+            continue
+        end, stop = rows[-1], stopped(windows, rows)
+        begun = float(windows["t_start"][rows[0]])
+        whole = (float(windows["t_end"][end]) - begun) / 3600.0
+        until = None if stop is None else (float(windows["t_end"][stop]) - begun) / 3600.0
+        known = "yes" if windows[CONSISTENT][end] > 0.5 else "no"
+        saved = None if until is None else whole - until
+        stops.append([label, rows.size, whole, until, saved, float(windows[NIS][end]), known])
+        for name, column, deviation in zip(NAMES, VALUES, DEVIATIONS, strict=True):
+            then, last = (
+                [None, None] if k is None else [float(windows[c][k]) / DPH for c in (column, deviation)]
+                for k in (stop, end)
+            )
+            values.append([label, name, *then, *last])
+    asked = f"Wanted of the mean and of each harmonic: a standard deviation of {wanted / DPH:.3g} °/h."
+    model = "Type A only, for the noise that the estimator is told; NIS is 1 on average where that is right."
+    return [
+        {
+            "title": "Live estimate: time to the wanted uncertainty",
+            "caption": f"{asked} {model}",
+            "columns": ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"],
+            "rows": stops,
+        },
+        {
+            "title": "Live estimate: drift over the angle",
+            "caption": "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, "
+            "and at the end (generalized least squares over all windows)",
+            "columns": ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
+            "rows": values,
+        },
+    ]
+
+
+def stopped(windows: Mapping[str, Array], rows: NDArray[np.int_]) -> int | None:
+    """Return the row of the first window after which the mount could have been left; None where there is none."""
+    ready = rows[np.asarray(windows[MAY_STOP])[rows] > 0.5]
+    return int(ready[0]) if ready.size else None
+
+
+def sentence(tables: list[dict[str, Any]]) -> list[str]:
+    """Return what the summary says of it: hours saved of those planned, or that the uncertainty was not reached."""
+    if not tables:
+        return []
+    rows = tables[0]["rows"]
+    late = [row[0] for row in rows if row[4] is None]
+    saved, planned = sum(row[4] or 0.0 for row in rows), sum(row[2] for row in rows)
+    words = f"The live estimate would have saved {saved:.1f} h of {planned:.1f} h"
+    return [f"{words}; the wanted uncertainty was not reached in {', '.join(late)}." if late else f"{words}."]

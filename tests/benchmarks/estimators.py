@@ -1,0 +1,165 @@
+"""NEES and NIS of every Kalman filter of the bench on series drawn from its own model, 1,000 runs of each.
+
+    python tests/benchmarks/estimators.py            # all; half a minute
+    python tests/benchmarks/estimators.py --runs 200 lti coefficients
+
+NEES: mean of error' P^-1 error at the end of a run over its degrees of freedom; NIS: of all innovations of all runs.
+Each should be 1; the bounds of 99 % are those of chi-square.  Rows "wrong: ..." are told a wrong model.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import linalg, stats
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import polar_drift
+from estimating import AR3, SIGMA2, autoregressive, companion, kalman_of_many, padded, play, rate_model
+from polar_drift import DPH, PRIOR, Day, Noise
+
+from gyrobench.packaging.instance import make
+
+Array = np.ndarray[Any, Any]
+#: NEES of each run, its degrees of freedom, sum of NIS of each run, their number
+Count = tuple[Array, int, Array, int]
+SIGMA, T, STEPS = 1.643e-3, 1e-3, 120
+
+
+def scalar(part: str, runs: int, draw: Callable[[], tuple[Array, Array]], skip: int = 40, **told: Any) -> Count:
+    """A filter of one estimate; NIS without the first readings, so that the start is forgotten."""
+    one, nees, nis = make(f"estimator_{part}", "native"), [], []
+    for _ in range(runs):
+        x, z = draw()
+        found = play(f"estimator_{part}", z, ["estimate", "variance", "nis"], instance=one, **told)
+        nees.append((found[-1, 0] - x[-1]) ** 2 / found[-1, 1])
+        nis.append(found[skip:, 2].sum())
+    one.free()
+    return np.array(nees), 1, np.array(nis), len(found) - skip
+
+
+def slope(rng: np.random.Generator, n: int = STEPS) -> tuple[Array, Array]:
+    """Value and slope at q = 0.5, P0 = 1."""
+    F, G = rate_model(0.5, T)
+    state, root, x = rng.normal(size=2), linalg.cholesky(G, lower=True), np.empty(n)
+    for k in range(n):
+        state = F @ state + root @ rng.normal(size=2)
+        x[k] = state[0]
+    return x, x + rng.normal(size=n) * SIGMA
+
+
+def level(rng: np.random.Generator) -> tuple[Array, Array]:
+    x = rng.normal() + np.cumsum(rng.normal(size=STEPS)) * math.sqrt(1e-3) * SIGMA
+    return x, x + rng.normal(size=STEPS) * SIGMA
+
+
+def drift(rng: np.random.Generator) -> tuple[Array, Array]:
+    x = autoregressive(rng, STEPS, SIGMA2)
+    return x, x + rng.normal(size=STEPS) * math.sqrt(SIGMA2)
+
+
+def wild(rng: np.random.Generator) -> tuple[Array, Array]:
+    """The level; one reading in 20 off by 30 sigma, not the last ones."""
+    x, z = level(rng)
+    off = (rng.random(STEPS) < 0.05) & (np.arange(STEPS) < STEPS - 2)
+    return x, z + 30.0 * SIGMA * rng.choice([-1.0, 1.0], STEPS) * off
+
+
+def matrices(part: str, rng: np.random.Generator, runs: int, wrong: bool = False) -> Count:
+    """n = 3, m = 2, all matrices random; wrong: coloured noise told to be white, of the same covariance."""
+    root = {k: rng.normal(size=(n, n)) for k, n in (("W", 3), ("V", 2), ("P0", 3))}
+    A = rng.normal(size=(3, 3))
+    given = {"A": 0.98 * A / np.abs(np.linalg.eigvals(A)).max(), "C": rng.normal(size=(2, 3)), "x0": rng.normal(size=3)}
+    given |= {k: r @ r.T for k, r in root.items()}
+    psi = np.array([[0.8, 0.2], [-0.1, 0.6]]) if part == "coloured" else np.zeros((2, 2))
+    P_v, n, m = linalg.solve_discrete_lyapunov(psi, given["V"]), 3, 2
+    full = {
+        "A": linalg.block_diag(given["A"], psi), "C": np.hstack([given["C"], np.eye(m)]),
+        "W": linalg.block_diag(given["W"], given["V"]), "V": np.zeros((m, m)),
+        "x0": np.append(given["x0"], np.zeros(m)),
+        "P0": linalg.block_diag(given["P0"], P_v),
+    }  # fmt: skip
+    told = {**given, "V": P_v} if wrong else {**given, **({"psi": psi} if part == "coloured" else {})}
+    used = "lti" if wrong else part
+    steps = 30
+    P = kalman_of_many(np.zeros((steps, m)), **(told if wrong else full))[-1][1][:n, :n]
+    names = [*(f"xhat[{k}]" for k in (1, 2, 3)), "nis"]
+    one, nees, nis, stationary = make(f"estimator_{used}", "native"), [], [], np.linalg.cholesky(P_v)
+    for _ in range(runs):
+        x, v, z = given["x0"] + root["P0"] @ rng.normal(size=n), stationary @ rng.normal(size=m), np.empty((steps, m))
+        for k in range(steps):
+            x, v = given["A"] @ x + root["W"] @ rng.normal(size=n), psi @ v + root["V"] @ rng.normal(size=m)
+            z[k] = given["C"] @ x + v
+        found = play(f"estimator_{used}", z, names, n=n, m=m, instance=one, **padded(**told))
+        error = found[-1, :n] - x
+        nees.append(error @ np.linalg.solve(P, error))
+        nis.append(found[:, n].sum())
+    one.free()
+    return np.array(nees), n, np.array(nis), steps * m
+
+
+def coefficients(rng: np.random.Generator, runs: int, **wrong: float) -> Count:
+    """A day of windows of 100 s, the noise of EST-KF-COEFF; five coefficients and w (where it is believed in)."""
+    day, noise = Day.of(), Noise()
+    belief = Noise(**{**vars(noise), **wrong})
+    x, z = polar_drift.draw(day, noise, rng, runs)
+    _, P = polar_drift.least_squares(day, belief, z[0])
+    size = 5 if wrong else 6
+    names = [*(f"A[{k}]" for k in range(1, 6)), "w", "mean_nis"]
+    one = polar_drift.instance()
+    found = np.array([polar_drift.play(one, day, row, names, belief, **polar_drift.priors(PRIOR))[-1] for row in z])
+    one.free()
+    error = (found[:, :6] - x)[:, :size]
+    nees = np.sum(error * np.linalg.solve(P[:size, :size], error.T).T, axis=1)
+    return nees, size, found[:, 6] * day.t0.size, day.t0.size
+
+
+def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Count]]]:
+    level_model = {"q": 0.0, "P0_slope": 0.0, "walk": 1e-3 * SIGMA**2 / T, "R": SIGMA**2}
+    F, G = companion(AR3, SIGMA2)
+    start = float(linalg.solve_discrete_lyapunov(F, G)[0, 0])
+    husa = {"R0": SIGMA**2, "q": 0.5, "b": 0.99, "skip": 1500}  # form 1 starts at y2 - P0 and takes ever so long
+    yield "kalman_ar", lambda rng: scalar("kalman_ar", runs, lambda: drift(rng), P0=start)
+    yield "kalman_rate, slope", lambda rng: scalar("kalman_rate", runs, lambda: slope(rng))
+    yield "kalman_rate, level", lambda rng: scalar("kalman_rate", runs, lambda: level(rng), **level_model)
+    yield "kalman_robust, level", lambda rng: scalar("kalman_robust", runs, lambda: level(rng), **level_model)
+    yield "kalman_robust, wild", lambda rng: scalar("kalman_robust", runs, lambda: wild(rng), **level_model)
+    yield "wrong: kalman_rate, wild", lambda rng: scalar("kalman_rate", runs, lambda: wild(rng), **level_model)
+    yield "sage_husa, form 1", lambda rng: scalar("sage_husa", runs, lambda: slope(rng, 2000), form=1, **husa)
+    yield "sage_husa, form 2", lambda rng: scalar("sage_husa", runs, lambda: slope(rng, 2000), form=2, **husa)
+    yield "lti", lambda rng: matrices("lti", rng, runs)
+    yield "coloured", lambda rng: matrices("coloured", rng, runs)
+    yield "wrong: coloured as white", lambda rng: matrices("coloured", rng, runs, wrong=True)
+    yield "coefficients", lambda rng: coefficients(rng, runs)
+    yield "wrong: coefficients, w white", lambda rng: coefficients(rng, runs, rms=0.0, white=0.05 * DPH)
+    yield "wrong: coefficients, tau / 2", lambda rng: coefficients(rng, runs, tau=900.0)
+    yield "wrong: coefficients, tau x 2", lambda rng: coefficients(rng, runs, tau=3600.0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="only the rows with one of these words")
+    parser.add_argument("--runs", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    print(f"{'filter':30s} {'NEES':>7s} {'99 % of':>9s} {'chi-sq.':>7s} {'NIS':>7s} {'99 % of':>9s} {'chi-sq.':>7s}")
+    for name, count in cases(given.runs):
+        if given.names and not any(word in name for word in given.names):
+            continue
+        nees, dof, nis, readings = count(np.random.default_rng(given.seed))
+        line = f"{name:30s}"
+        for values, k in ((nees, dof), (nis, readings)):
+            low, high = stats.chi2.ppf([0.005, 0.995], k * values.size) / (k * values.size)
+            line += f" {values.mean() / k:7.3f} {low:9.3f} {high:7.3f}"
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

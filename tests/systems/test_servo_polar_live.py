@@ -1,0 +1,144 @@
+"""The polar servo test with the live estimator: its end is least squares over the record; the hours saved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from polar_drift import Day, Noise
+from servoing import DAY50, DPH, held
+
+from gyrobench import frames
+from gyrobench.engine.session import Session
+from gyrobench.system.system import load_system
+
+NAME = "servo_polar"
+LIVE = {
+    **DAY50, "route": "combination", "nuisances": "none", "wanted": 0.002 * DPH,
+    "gyro.markov_tau": 60.0, "gyro.markov": 0.004 * DPH,
+    # pickoff noise of 5e-8 V/sqrt(Hz) over 10 V/rad, through the loop: what the mean NIS of a noise-free drift asks for
+    "coefficients.sigma": 9.5e-8,
+}  # fmt: skip
+WIDE = np.full(5, 20.0 * DPH)
+COLUMNS = [f"live_{kind}_{n}" for kind in ("value", "sd") for n in ("A0", "A1", "B1", "A2", "B2")]
+
+
+@pytest.fixture(scope="module")
+def live() -> Any:
+    """Record and result of a day of 1723 s, S and N, with the standard noise of the gyro."""
+    system = load_system(NAME)
+    system.request("coefficients")
+    with Session(system) as session:
+        record = session.run(LIVE, seed=3)
+    return record, system.with_values(LIVE).reduce(record)
+
+
+def of(result: Any, title: str) -> list[dict[str, Any]]:
+    table = next(t for t in result.tables if t["title"].startswith(f"Live estimate: {title}"))
+    return [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
+
+
+def test_end_values_are_generalized_least_squares_over_the_record(live: Any) -> None:
+    """Of each mount by itself, all windows at once, with the noise of the gyro: to 1e-5 of the standard deviations."""
+    record, _ = live
+    windows, rows = held(record)
+    z = windows.rate + earth(record)
+    noise = Noise(tau=60.0, rms=0.004 * DPH, white=0.0178 * DPH, sigma=9.5e-8)
+    phases = record.windows["phase"][rows]
+    for phase in np.unique(phases):
+        mine = phases == phase
+        start, end = windows.angle_start[mine], windows.angle_end[mine]
+        X = np.column_stack([np.ones(start.size), *(mean(f, k, start, end) for k in (1, 2) for f in (np.cos, np.sin))])
+        R = Day(windows.t_start[mine], windows.t_end[mine]).covariance(noise)
+        P = np.linalg.inv(X.T @ np.linalg.solve(R, X) + np.diag(WIDE**-2.0))
+        expected, sd = P @ (X.T @ np.linalg.solve(R, z[mine])), np.sqrt(np.diag(P))
+        last = {c: record.windows[c][rows][mine][-1] for c in COLUMNS}
+        found = np.array(list(last.values()))
+        assert (np.abs(found[:5] - expected) / sd).max() < 1e-5
+        assert found[5:] == pytest.approx(sd, rel=1e-5)
+
+
+def earth(record: Any) -> np.ndarray:
+    """Earth rate along the table axis: -W in mount S, +W in N."""
+    labels = {r.phase: r.label for r in record.run.plan}
+    _, rows = held(record)
+    W = record.run.parameters["site.earth_rate"]
+    return np.array([-W if labels[p] == "polar S" else W for p in record.windows["phase"][rows].tolist()])
+
+
+def mean(f: Any, k: int, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Of f(k angle) over an even turn, by eight points."""
+    x, weight = np.polynomial.legendre.leggauss(8)
+    return np.asarray(f(k * ((start + end)[:, None] + (end - start)[:, None] * x) / 2.0) @ weight / 2.0)
+
+
+def test_truth_is_within_the_stated_deviations(live: Any) -> None:
+    """Mount S: X = g s, Y = g c sin, Z = g c cos of the angle, so A1 = D_S g c + D_IS g2 s c, A2 = D_SS g2 c2/2 ..."""
+    record, result = live
+    p, latitude = record.run.parameters, record.run.options["latitude"]
+    D = {n: p[f"gyro.D_{n}"] / DPH for n in ("F", "I", "O", "S", "II", "SS", "IO", "OS", "IS")}
+    g = frames.normal_gravity(latitude) / frames.G0
+    for mount, m in (("polar S", 1.0), ("polar N", -1.0)):
+        s, c = m * g * np.sin(latitude), m * g * np.cos(latitude)
+        true = {
+            "A0": D["F"] + D["I"] * s + D["II"] * s * s + D["SS"] * c * c / 2.0,
+            "A1": D["S"] * c + D["IS"] * s * c,
+            "B1": D["O"] * c + D["IO"] * s * c,
+            "A2": D["SS"] * c * c / 2.0,
+            "B2": D["OS"] * c * c / 2.0,
+        }
+        for row in of(result, "drift over the angle"):
+            if row["mount"] == mount:
+                for when in ("then", "end"):
+                    off = row[f"{when} / (°/h)"] - true[row["term"]]
+                    assert abs(off) < 4.0 * row[f"u {when} / (°/h)"], (mount, row["term"], when)
+
+
+def test_hours_saved_are_those_of_the_record(live: Any) -> None:
+    """The first window with all five at 0.002 deg/h or below; the rest of the mount's plan is saved."""
+    record, result = live
+    _, rows = held(record)
+    w = {n: x[rows] for n, x in record.windows.items()}
+    total = 0.0
+    for row in of(result, "time to"):
+        phase = next(r.phase for r in record.run.plan if r.label == row["mount"])
+        mine = w["phase"] == phase
+        ready = np.all([w[c][mine] <= 0.002 * DPH for c in COLUMNS[5:]], axis=0)
+        t = w["t_end"][mine] - w["t_start"][mine][0]
+        assert 0 < np.argmax(ready) < ready.size - 1
+        assert row["reached after / h"] == pytest.approx(t[np.argmax(ready)] / 3600.0)
+        assert row["saved / h"] == pytest.approx((t[-1] - t[np.argmax(ready)]) / 3600.0)
+        assert row["consistent"] == "yes" and 0.6 < row["mean NIS"] < 1.5
+        total += row["saved / h"]
+    assert any(f"would have saved {total:.1f} h of" in s for s in result.summary)
+
+
+def test_what_is_not_reached_is_said(live: Any) -> None:
+    """may_stop never set in mount N: nothing is saved there, and the summary names it."""
+    record, _ = live
+    phase = next(r.phase for r in record.run.plan if r.label == "polar N")
+    windows = {**record.windows, "live_may_stop": record.windows["live_may_stop"] * (record.windows["phase"] != phase)}
+    result = load_system(NAME).with_values(LIVE_OPTIONS).reduce(type(record)(windows, {}, record.run))
+    north = next(r for r in of(result, "time to") if r["mount"] == "polar N")
+    assert north["saved / h"] is None and north["reached after / h"] is None
+    assert any("the wanted uncertainty was not reached in polar N" in s for s in result.summary)
+
+
+LIVE_OPTIONS = {n: v for n, v in LIVE.items() if "." not in n and n != "nuisances"}
+
+
+def test_without_the_slot_nothing_is_said(live: Any) -> None:
+    record, result = live
+    windows = {n: x for n, x in record.windows.items() if not n.startswith("live_")}
+    plain = load_system(NAME).reduce(type(record)(windows, {}, record.run))
+    assert not [t for t in plain.tables if t["title"].startswith("Live")]
+    assert not [s for s in plain.summary if "live" in s]
+    assert [c.estimate for c in plain.coefficients] == [c.estimate for c in result.coefficients]
+
+
+def test_the_estimator_is_told_the_noise_of_the_gyro(live: Any) -> None:
+    p = live[0].run.parameters
+    assert p["coefficients.tau"] == p["gyro.markov_tau"] == 60.0 and p["coefficients.rms"] == p["gyro.markov"]
+    assert p["coefficients.white"] == p["gyro.white"] and p["coefficients.wanted"] == [0.002 * DPH] * 5
+    assert not [n for n in live[0].run.notes if "coefficients" in n]
