@@ -1,7 +1,6 @@
 """Correlation time of a drift: Gauss-Markov process, with or without white noise, by restricted maximum likelihood.
 
-    y_k = m + x_k + v_k,   x_{k+1} = exp(-dt/tau) x_k + w_k,   rms x = sigma,   var v = N^2/dt for a density N
-    (two-sided)
+    y_k = m + x_k + v_k,   x_{k+1} = exp(-dt/tau) x_k + w_k,   rms x = sigma,   var v = N^2/dt (N two-sided)
 
 The likelihood is exact (tridiagonal factors) and restricted: the mean m is integrated out, which takes away the bias
 of phi = exp(-dt/tau) that the mean causes.  The interval of tau is that of the likelihood ratio, 3.84, at the best
