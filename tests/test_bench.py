@@ -102,7 +102,7 @@ def test_init_refuses(tmp_path: Path) -> None:
         init_bench(tmp_path / "full", [])
     with pytest.raises(BenchError, match="exists and is not empty"):
         init_bench(tmp_path / "full" / "file", [])
-    with pytest.raises(BenchError, match=r"--copy gyro: no such part or system; did you mean .*floated_gyro"):
+    with pytest.raises(BenchError, match=r"--copy gyro: no such part or system; did you mean .*gyro"):
         init_bench(tmp_path / "new", ["gyro"])
     assert not (tmp_path / "new").exists()
 

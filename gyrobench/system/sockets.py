@@ -13,6 +13,7 @@ from __future__ import annotations
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, limit_flag, out
 from gyrobench.system.loop_sockets import LOOPS
+from gyrobench.system.north_sockets import NORTH
 from gyrobench.system.table_sockets import TABLES
 
 __all__ = ["SOCKETS", "Connector", "Shape", "Socket", "element_names", "socket"]
@@ -258,6 +259,7 @@ SOCKETS: dict[str, Socket] = {
         ),
         *LOOPS,
         *TABLES,
+        *NORTH,
     )
 }
 

@@ -1,0 +1,224 @@
+"""Finding north by the Earth rate: a gyro on a turning head, or two gyros at rest, with an estimator of the heading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
+from gyrobench.system.families.table_test import Array, TableTest, on_table, sampled
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import Plan
+from gyrobench.system.system import Option, Slot, Windows
+
+from . import plans
+from .measured import MEASURED
+
+FACES = {plans.FACE: np.eye(3).tolist()}
+#: moving bases: parameters of ground_motion, tilts about E, N, U.  Sizes are our own assumptions of a typical case.
+BASES: dict[str, dict[str, Any]] = {
+    "rest": {},
+    "bus": {
+        "site.period": [0.67, 0.083], "site.phase": [0.0, 1.0],
+        "site.tilt_amplitude": [[2e-5, 1e-5, 1e-5], [5e-6, 5e-6, 2e-6]], "site.local_e": 0.01, "site.local_n": 0.01,
+    },
+    "ship at pier": {
+        "site.period": [6.1, 8.3, 23.0], "site.phase": [0.0, 1.0, 2.0],
+        "site.tilt_amplitude": [[1e-3, 0.0, 0.0], [0.0, 4e-3, 0.0], [0.0, 0.0, 5e-4]],
+    },
+}  # fmt: skip
+
+
+class NorthFinder(TableTest):
+    """The heading of a head from the horizontal Earth rate: two, four or several positions, continuous rotation, with
+    the tilt measured, or strapdown.  The method is the estimator in the slot finder, and its plan.
+
+    [NORTH-COMMON, NORTH-2POS, NORTH-4POS, NORTH-CONT, NORTH-TILT, NORTH-STRAPDOWN; GSP ch. 5, section 5.3.2]
+    """
+
+    title = "North finding by gyro"
+    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN")
+    reduction = "reduction"
+    slots = {
+        **on_table(
+            table=Slot("Table", "table_rate"),
+            gyro=Slot("RateGyro", "gyro_rate"),
+            accelerometers=Slot("Accelerometers", "accelerometer_triad"),
+            finder=Slot("NorthFinder", "northfinder_four_position"),
+        ),
+        "sampler_x": Slot("Sampler", "sampler"),
+        "level_x": Slot("Sampler", "sampler"),
+        "level_y": Slot("Sampler", "sampler"),
+    }
+    wires = f"""
+        {TableTest.wires}
+        {sampled("sampler_x")}
+        {sampled("level_x")}
+        {sampled("level_y")}
+        table -> gyro: omega
+        table -> accelerometers: f
+        gyro.rate -> finder.rate
+        accelerometers -> finder: f_read=f
+        table -> finder: angle_read=angle
+        sequencer -> finder: gate phase done=finished
+        gyro.rate[2] -> sampler.x
+        gyro.rate[1] -> sampler_x.x
+        accelerometers.f_read[1] -> level_x.x
+        accelerometers.f_read[2] -> level_y.x
+    """
+    options = (
+        {
+            "method": Option("four", str, f"{', '.join(plans.PARTS)}, or auto: the shortest that reaches `wanted`"),
+            "time": Option(300.0, "s", "total time: moves, settling, readings", 2.0),
+            "wanted": Option(0.0, "rad", "standard deviation of the heading wanted (method auto)", 0.0),
+            "rough": Option("90deg", "rad", "rough heading, known beforehand", -math.pi, math.pi),
+            "level": Option(True, bool, "the head is levelled: methods that take it for level may be chosen (auto)"),
+            "axes": Option(1, int, "axes of the gyro (method auto)", 1, 2),
+            "positions": Option(12, int, "positions a turn (method several)", 3, 36),
+            "back": Option(False, bool, "positions forwards, then backwards: a linear drift of the bias cancels"),
+            "turns": Option(5.0, "1", "turns of the head (methods continuous, tilt)", 0.5, 100.0),
+            "settle": Option(0.5, "s", "wait after each move", 0.0),
+            "windows": Option(32, int, "averaging windows of all positions together", 8, 1000),
+            "heading": Option("40deg", "rad", "true heading of the head (simulated)", -math.pi, math.pi),
+            "pitch": Option(0.0, "rad", "true pitch, up positive (simulated)", -1.5, 1.5),
+            "roll": Option(0.0, "rad", "true roll, right side down positive (simulated)", -1.5, 1.5),
+            "base": Option("rest", str, f"what the head stands on (simulated): {', '.join(BASES)}"),
+            "density": Option(0.0, "rad/s/sqrt(Hz)", "white noise of the gyro; 0: of the gyro in the slot", 0.0),
+        }
+        | SITE
+        | NUISANCES
+        | type_b("latitude")
+        | {
+            "u_angle": Option(0.0, "rad", "standard uncertainty of the zero of the head against the reference", 0.0),
+            "u_level": Option(0.0, "rad", "std. unc. of the level of the head about each axis, not read", 0.0),
+            "u_accelerometer": Option(0.0, "m/s2", "standard uncertainty of the bias of an accelerometer", 0.0),
+            "u_bias": Option(0.0, "rad/s", "std. unc. of the bias of a gyro (strapdown, one position)", 0.0),
+        }
+    )  # fmt: skip
+    noises = (
+        "gyro.turn_on_x", "gyro.turn_on_y", "gyro.markov_x", "gyro.markov_y", "gyro.white_x", "gyro.white_y",
+        "accelerometers.white_x", "accelerometers.white_y", "accelerometers.white_z",
+    )  # fmt: skip
+    assumed = ("gyro.mount", "gyro.scale", "accelerometers.mount", "accelerometers.scale", "accelerometers.bias")
+    measured_data = MEASURED
+    windows = Windows.of(
+        "sampler", mean_x="sampler_x.mean", f_x="level_x.mean", f_y="level_y.mean", std_x="sampler_x.std"
+    )
+    done = "finder.done"
+    channels = ("finder.heading", "finder.sigma", "finder.status", "finder.horizontal", "table.angle")
+    channel_period = 1.0
+    shown = ("finder.heading", "finder.sigma", "finder.horizontal")
+
+    def set(self, name: str, value: Any) -> None:
+        """Set an option; the method puts its estimator, a moving base its ground into the slots."""
+        super().set(name, value)
+        if name in ("method", "base", "wanted", "density", "latitude", "rough", "level", "axes", "settle"):
+            part = plans.PARTS.get(self.chosen, self.slots["finder"].part)
+            moving = "site" if self["base"] == "rest" else "ground_motion"
+            vars(self)["slots"] = {
+                **self.slots,
+                "finder": replace(self.slots["finder"], part=part),
+                "site": replace(self.slots["site"], part=moving),
+            }
+
+    @property
+    def chosen(self) -> str:
+        """The method; of auto the shortest."""
+        if self["method"] != "auto":
+            return str(self["method"])
+        if not self["wanted"] > 0.0 or not self["density"] > 0.0:
+            return "four"  # check() says what is missing
+        return self._shortest().method
+
+    def _shortest(self) -> plans.Choice:
+        return plans.shortest(
+            self["wanted"], self["density"], self["latitude"], self["rough"], self["level"], self["axes"],
+            self["settle"], self.step,
+        )  # fmt: skip
+
+    @property
+    def total(self) -> float:
+        """Total time, s: the option, or what the method auto needs."""
+        auto = self["method"] == "auto" and self["wanted"] > 0.0 and self["density"] > 0.0
+        return self._shortest().time if auto else float(self["time"])
+
+    def plan(self) -> Plan:
+        if self.chosen not in plans.PARTS:
+            return Plan()  # check() says why
+        found = plans.phases(
+            self.chosen, self.total, self["positions"], self["back"], self["turns"], self["settle"], self["windows"],
+            self.step,
+        )  # fmt: skip
+        return Plan(found, FACES)
+
+    def base(self) -> Array:
+        """Axes of the head at table angle 0: heading, then pitch about x, then roll about y.  [NORTH-COMMON]"""
+        R = [
+            frames.rotation(axis, angle).T
+            for axis, angle in ((frames.N, self["roll"]), (frames.E, self["pitch"]), (frames.U, -self["heading"]))
+        ]
+        out: Array = R[0] @ R[1] @ R[2]
+        return out
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        gravity = self["gravity"] or frames.normal_gravity(self["latitude"], self["height"])
+        finder = {
+            "finder.latitude?": self["latitude"],
+            "finder.gravity?": gravity,
+            "finder.density?": self["density"] or parts.get("gyro.white_y", 0.0) or 1e-9,
+        }
+        if self.chosen == "two":
+            finder["finder.rough?"] = self["rough"]
+        moved = {"table.acceleration": plans.ACCELERATION, "table.index_rate": plans.RATE}
+        return {**super().parameters(parts), **moved, **BASES.get(self["base"], {}), **finder}
+
+    def check(self) -> list[str]:
+        problems = super().check()
+        known = [*plans.PARTS, "auto"]
+        if self["method"] not in known:
+            return [*problems, f"method = {self['method']}: must be one of {', '.join(known)}"]
+        if self["base"] not in BASES:
+            problems.append(f"base = {self['base']}: must be one of {', '.join(BASES)}")
+        if self["method"] == "auto" and not (self["wanted"] > 0.0 and self["density"] > 0.0):
+            problems.append("method = auto: give what is wanted and the noise of the gyro: wanted=1arcmin, "
+                            "density=0.3deg/h/sqrt(Hz)")  # fmt: skip
+        if abs(self["latitude"]) > math.radians(85.0):
+            problems.append(
+                f"latitude = {math.degrees(self['latitude']):.4g}°: within 5° of a pole the horizontal Earth rate is "
+                "below 9 % of that at the equator; no north finder by Earth rate"
+            )
+        lost = plans.overhead(self.chosen, self["positions"], self["back"], self["settle"], self.step)
+        least = 5.0 * self.step * (self["windows"] + self["positions"])
+        if self.total - lost <= least:
+            problems.append(
+                f"time = {self.total:.4g} s: moves and settling take {lost:.4g} s, the readings need {least:.3g} s more"
+            )
+        if self.chosen in ("two", "strapdown two") and self["back"]:
+            problems.append(f"back: the method {self.chosen} has two positions only; a drift cancels with four")
+        return problems
+
+    def warnings(self) -> list[str]:
+        found = []
+        if abs(self["latitude"]) > math.radians(80.0):
+            factor = math.cos(math.radians(40.0)) / math.cos(self["latitude"])
+            found.append(f"Latitude above 80°: the error of the heading is {factor:.2g} times that at 40°.")
+        near = min(abs(self["rough"]), math.pi - abs(self["rough"]))
+        if self.chosen == "two" and near < plans.MARGIN:
+            found.append("Two positions near north or south: the heading is ill-conditioned; take four.")
+        tilted = max(abs(self["pitch"]), abs(self["roll"]))
+        if tilted > 1e-5 and self.chosen in ("two", "four", "several", "continuous"):
+            found.append(
+                f"The head is tilted by up to {math.degrees(tilted):.3g}°, the method {self.chosen} takes it for "
+                "level: the heading is wrong by the tilt about north times tan(latitude); take tilt or strapdown."
+            )
+        if tilted > 0.02 and self.chosen == "tilt":
+            off = math.degrees(tilted**2 / 4.0) * 60.0
+            found.append(
+                f"Tilt of {math.degrees(tilted):.3g}°: the method tilt is right to first order, its heading wrong by "
+                f"up to {off:.2g}′; take strapdown two."
+            )
+        return found
