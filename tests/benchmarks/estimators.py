@@ -73,12 +73,21 @@ def wild(rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def matrices(part: str, rng: np.random.Generator, runs: int, wrong: bool = False) -> Count:
-    """n = 3, m = 2, all matrices random; wrong: coloured noise told to be white, of the same covariance."""
-    root = {k: rng.normal(size=(n, n)) for k, n in (("W", 3), ("V", 2), ("P0", 3))}
-    A = rng.normal(size=(3, 3))
-    given = {"A": 0.98 * A / np.abs(np.linalg.eigvals(A)).max(), "C": rng.normal(size=(2, 3)), "x0": rng.normal(size=3)}
-    given |= {k: r @ r.T for k, r in root.items()}
-    psi = np.array([[0.8, 0.2], [-0.1, 0.6]]) if part == "coloured" else np.zeros((2, 2))
+    """n = 3, m = 2, the model of EST-KF-COLOURED (drawn once); wrong: coloured noise told to be white, of the same
+    covariance.
+    """
+    fixed = np.random.default_rng(20240623)
+    A, drive, C = (
+        0.8 * np.eye(3) + 0.15 * fixed.normal(size=(3, 3)),
+        fixed.normal(size=(3, 2)),
+        fixed.normal(size=(2, 3)),
+    )
+    root = {
+        "W": drive @ np.diag(np.sqrt([0.5, 0.3])), "V": np.linalg.cholesky([[0.4, 0.1], [0.1, 0.3]]),
+        "P0": math.sqrt(2.0) * np.eye(3),
+    }  # fmt: skip
+    given = {"A": A, "C": C, "x0": fixed.normal(size=3), **{k: r @ r.T for k, r in root.items()}}
+    psi = np.array([[0.7, 0.1], [0.0, 0.5]]) if part == "coloured" else np.zeros((2, 2))
     P_v, n, m = linalg.solve_discrete_lyapunov(psi, given["V"]), 3, 2
     full = {
         "A": linalg.block_diag(given["A"], psi), "C": np.hstack([given["C"], np.eye(m)]),
@@ -95,7 +104,7 @@ def matrices(part: str, rng: np.random.Generator, runs: int, wrong: bool = False
     for _ in range(runs):
         x, v, z = given["x0"] + root["P0"] @ rng.normal(size=n), stationary @ rng.normal(size=m), np.empty((steps, m))
         for k in range(steps):
-            x, v = given["A"] @ x + root["W"] @ rng.normal(size=n), psi @ v + root["V"] @ rng.normal(size=m)
+            x, v = given["A"] @ x + root["W"] @ rng.normal(size=2), psi @ v + root["V"] @ rng.normal(size=m)
             z[k] = given["C"] @ x + v
         found = play(f"estimator_{used}", z, names, n=n, m=m, instance=one, **padded(**told))
         error = found[-1, :n] - x
@@ -121,6 +130,25 @@ def coefficients(rng: np.random.Generator, runs: int, **wrong: float) -> Count:
     return nees, size, found[:, 6] * day.t0.size, day.t0.size
 
 
+def at_the_stop(rng: np.random.Generator, runs: int) -> Count:
+    """The five coefficients when the filter first says that the test may stop, 0.003 deg/h wanted: a chosen moment."""
+    day, noise = Day.of(), Noise()
+    x, z = polar_drift.draw(day, noise, rng, runs)
+    names, wanted = [*(f"A[{k}]" for k in range(1, 6)), "may_stop"], {f"wanted[{k}]": 0.003 * DPH for k in range(1, 6)}
+    one, covariances, nees = polar_drift.instance(), {}, []
+    for true, row in zip(x, z, strict=True):
+        found = polar_drift.play(one, day, row, names, noise, **polar_drift.priors(PRIOR), **wanted)
+        if found[:, 5].any():
+            k = int(np.argmax(found[:, 5])) + 1
+            if k not in covariances:
+                covariances[k] = polar_drift.least_squares(Day(day.t0[:k], day.t1[:k]), noise, row[:k])[1][:5, :5]
+            error = found[k - 1, :5] - true[:5]
+            nees.append(error @ np.linalg.solve(covariances[k], error))
+    one.free()
+    print(f"  stopped in {len(nees)} of {runs} runs, after {min(covariances)} to {max(covariances)} windows of 864")
+    return np.array(nees), 5, np.zeros(0), 0
+
+
 def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Count]]]:
     level_model = {"q": 0.0, "P0_slope": 0.0, "walk": 1e-3 * SIGMA**2 / T, "R": SIGMA**2}
     F, G = companion(AR3, SIGMA2)
@@ -138,6 +166,7 @@ def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Coun
     yield "coloured", lambda rng: matrices("coloured", rng, runs)
     yield "wrong: coloured as white", lambda rng: matrices("coloured", rng, runs, wrong=True)
     yield "coefficients", lambda rng: coefficients(rng, runs)
+    yield "coefficients, at the stop", lambda rng: at_the_stop(rng, runs)
     yield "wrong: coefficients, w white", lambda rng: coefficients(rng, runs, rms=0.0, white=0.05 * DPH)
     yield "wrong: coefficients, tau / 2", lambda rng: coefficients(rng, runs, tau=900.0)
     yield "wrong: coefficients, tau x 2", lambda rng: coefficients(rng, runs, tau=3600.0)
@@ -156,6 +185,8 @@ def main() -> None:
         nees, dof, nis, readings = count(np.random.default_rng(given.seed))
         line = f"{name:30s}"
         for values, k in ((nees, dof), (nis, readings)):
+            if not values.size:
+                continue
             low, high = stats.chi2.ppf([0.005, 0.995], k * values.size) / (k * values.size)
             line += f" {values.mean() / k:7.3f} {low:9.3f} {high:7.3f}"
         print(line, flush=True)

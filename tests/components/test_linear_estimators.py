@@ -286,6 +286,37 @@ def test_a_change_of_the_signal_is_followed_and_counted() -> None:
     assert never[-1, 1] == 0.0 and abs(never[330, 0] - z[330]) > 30.0 * SIGMA
 
 
+# ------------------------------------------------------------------------------------- statsmodels
+def statsmodels_filter(z: Array, given: dict[str, Array]) -> tuple[Array, Array]:
+    """Filtered states and variances (k, n) of statsmodels; NaN marks missing readings."""
+    from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
+
+    n, m = len(given["A"]), len(given["C"])
+    kf = KalmanFilter(k_endog=m, k_states=n, design=given["C"], obs_cov=given["V"], transition=given["A"],
+                      selection=np.eye(n), state_cov=given["W"])  # fmt: skip
+    kf.bind(np.ascontiguousarray(z))
+    A = given["A"]  # statsmodels begins with the prediction of the first reading
+    kf.initialize_known(A @ given["x0"], A @ given["P0"] @ A.T + given["W"])
+    found = kf.filter()
+    return found.filtered_state.T, np.array([np.diag(P) for P in np.moveaxis(found.filtered_state_cov, 2, 0)])
+
+
+def test_against_statsmodels() -> None:
+    """estimator_lti with readings missing one by one; estimator_coloured with the noise among the states there."""
+    rng = np.random.default_rng(31)
+    z, valid = 2.0 * rng.normal(size=(60, 2)), rng.random(size=(60, 2)) > 0.2
+    given = model(rng, 3, 2)
+    states, variances = statsmodels_filter(np.where(valid, z, np.nan), given)
+    found = play("estimator_lti", z, STATES, valid=valid, n=3, m=2, **padded(**given))
+    assert found[:, :3] == pytest.approx(states, abs=1e-11) and found[:, 6:9] == pytest.approx(variances, rel=1e-10)
+    valid[:, 1] = valid[:, 0]
+    given = coloured(rng)
+    states, variances = statsmodels_filter(np.where(valid, z, np.nan), augmented(given))
+    found = play("estimator_coloured", z, STATES, valid=valid, n=3, m=2, **padded(**given))
+    assert found[:, :3] == pytest.approx(states[:, :3], abs=1e-10)
+    assert found[:, 6:9] == pytest.approx(variances[:, :3], rel=1e-8)
+
+
 # -------------------------------------------------------------------------------------- consistency
 @pytest.mark.parametrize("part", ["lti", "coloured"])
 def test_nees_and_nis_of_the_state(part: str) -> None:
