@@ -32,7 +32,7 @@ from gyrobench.result import Coefficient, LoopResult, Series, Specification
 Array = NDArray[np.float64]
 ARCSEC = math.pi / 648000.0
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
-JITTER = 0.04  # of the variance of a rounding is left where the loop moves the table by a count while it is read
+JITTER = 0.005  # of the variance of a rounding is left where the loop moves the table by a count while it is read
 HEADS = ("reader", "reader_2")
 NEEDED = ("level_x", "level_y", "tracking", "second")
 
@@ -85,18 +85,14 @@ class Readings:
 
 @dataclass(frozen=True)
 class Fit:
-    """Estimates with their standard uncertainties (type A) and degrees of freedom."""
+    """Estimates with their standard uncertainties (type A) and degrees of freedom, of each value."""
 
     value: Array
     u: Array
-    dof: float
+    dof: Array
     residual: Array
     gain: Array  # value = gain y
     V: Array  # covariance of y
-
-    @property
-    def k(self) -> float:
-        return float(stats.t.ppf(0.975, self.dof))
 
 
 def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
@@ -137,14 +133,15 @@ def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
 
 
 def least_squares(
-    X: Array, y: Array, groups: Sequence[slice], place: NDArray[np.int64], dof: float, floors: Sequence[float] = ()
+    X: Array, y: Array, groups: Sequence[slice], place: NDArray[np.int64], floors: Sequence[float] = ()
 ) -> Fit:
     """Return the generalized least squares solution with two variances for each group of rows.
 
     Readings differ from visit to visit, and by an error that returns at each place (rounding of the counts, what the
     harmonics leave): V = s2 I + t2 (same place).  Both follow from the residuals r: their squares within and between
     the places have expectations linear in the variances.  floors: least t2 of each group; rounding of counts distorts a
-    wave of a few counts in its own harmonics too, which the residuals do not show.
+    wave of a few counts in its own harmonics too, which the residuals do not show.  The degrees of freedom of a value
+    are those of the variances that make its u (Welch and Satterthwaite); a floor is known.
     """
     n = y.size
     parts = []  # of V, and what is squared in r to estimate them: within the places, between them
@@ -177,9 +174,15 @@ def least_squares(
     V = sum((v * p for v, (p, _) in zip(variances, parts, strict=True)), 1e-12 * np.eye(n)) * scale
     W = np.linalg.inv(V)
     covariance = np.linalg.inv(X.T @ W @ X)
-    value = covariance @ X.T @ W @ y
+    gain = covariance @ X.T @ W
+    M = np.eye(n) - X @ gain
+    parted = zip(variances, parts, strict=True)
+    shares = np.array([v * scale * np.sum((gain @ p) * gain, axis=1) for v, (p, _) in parted])
+    free = np.array([max(float(np.sum(q * M.T)), 1.0) for _, q in parts])
+    found = variances > least
     u = np.sqrt(np.diag(covariance))
-    return Fit(np.asarray(value), u, dof, y - X @ value, covariance @ X.T @ W, V)
+    dof = u**4 / np.maximum(np.sum(shares[found] ** 2 / free[found, None], axis=0), 1e-4 * u**4)
+    return Fit(np.asarray(gain @ y), u, np.maximum(dof, 3.0), y - X @ gain @ y, gain, V)
 
 
 def position_fit(r: Readings) -> tuple[Fit, list[int]]:
@@ -208,8 +211,7 @@ def position_fit(r: Readings) -> tuple[Fit, list[int]]:
             f"{np.unique(place).size} positions do not determine {len(orders)} harmonics and the errors of "
             f"{r.seen.size} faces: take more positions or mounts, or fewer orders"
         )
-    dof = max(2.0 * np.unique(place).size - own.shape[1] - 2.0, 3.0)  # an error that returns at a place counts once
-    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, dof, (0.0, r.rounding)), orders
+    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, (0.0, r.rounding)), orders
 
 
 def level_fit(r: Readings) -> tuple[Fit, list[str]]:
@@ -222,7 +224,7 @@ def level_fit(r: Readings) -> tuple[Fit, list[str]]:
     real = np.block([[X.real, -X.imag], [X.imag, X.real]])
     y = np.concatenate([r.level.real, r.level.imag])
     place = np.arange(y.size)
-    return least_squares(real, y, [slice(0, y.size)], place, float(y.size - real.shape[1])), list(columns)
+    return least_squares(real, y, [slice(0, y.size)], place), list(columns)
 
 
 def scale_truth(p: Mapping[str, Any], n: int) -> tuple[float, float] | None:
@@ -242,14 +244,16 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
     level, terms = level_fit(r)
     found: list[Coefficient] = []
 
-    def add(name: str, meaning: str, value: float, u: float, k: float, truth: Any = None, none: str = "") -> None:
+    def add(name: str, meaning: str, value: float, u: float, dof: float, truth: Any = None, none: str = "",
+            at_once: int = 1) -> None:  # fmt: skip
+        k = float(stats.t.ppf(1.0 - 0.025 / at_once, dof))
         x, size = (math.nan, math.nan) if none else (value / ARCSEC, u / ARCSEC)
         true = None if truth is None or none else float(truth) / ARCSEC
         limit = limits.get(name)
         found.append(
             Coefficient(
                 name, meaning, "arcsec", x, size, k, (x - k * size, x + k * size), u_a=size, truth=true,
-                z=(x - true) / size if true is not None and size > 0.0 else None, limit=limit, dof=fit.dof,
+                z=(x - true) / size if true is not None and size > 0.0 else None, limit=limit, dof=dof,
                 verdict=uncertainty.assess_conformity(x, k * size, limit), no_value=none,
             )
         )  # fmt: skip
@@ -270,20 +274,21 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
     if r.true is not None:
         mean = np.array([float(np.mean(r.true[r.place == x])) for x in visited])
         true = mean - np.mean(mean)
-    at_once = float(stats.t.ppf(1.0 - 0.025 / visited.size, fit.dof))  # for all positions
+    least = float(np.min(fit.dof))
     add("accuracy", f"position error of the largest magnitude, at {where:g}°", at[worst],
-        _u_place(r, fit, worst, zeros), at_once, None if true is None else true[worst])  # fmt: skip
+        _u_place(r, fit, worst, zeros), least, None if true is None else true[worst],
+        at_once=visited.size)  # fmt: skip
     for n in range(1, r.orders + 1):
         truth = scale_truth(p, n)
         none = "" if n in orders else f"order {n} is the same in all mounts and at both heads: take another mount"
         for j, part in enumerate(("cos", "sin")):
             k = 2 * orders.index(n) + j if n in orders else 0
-            add(f"E{n} {part}", f"position error, {part} {n if n > 1 else ''}θ", fit.value[k], fit.u[k], fit.k,
+            add(f"E{n} {part}", f"position error, {part} {n if n > 1 else ''}θ", fit.value[k], fit.u[k], float(fit.dof[k]),
                 None if truth is None else truth[j], none)  # fmt: skip
     if zeros > 2 * len(orders):
         add("lost motion", "position on the way up less that on the way back", fit.value[zeros - 1], fit.u[zeros - 1],
-            fit.k)  # fmt: skip
-    add("repeatability", "standard deviation of a position", spread, spread / math.sqrt(2.0 * r.theta.size), fit.k)
+            float(fit.dof[zeros - 1]))  # fmt: skip
+    add("repeatability", "standard deviation of a position", spread, spread / math.sqrt(2.0 * r.theta.size), least)
     _level_terms(level, terms, p, add)
     errors = p.get("reference.errors")
     tables = [_polygon(polygon, fit, zeros + mounts + 1, None if errors is None else np.asarray(errors))]
@@ -309,7 +314,7 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         ],
         coefficients=found,
         series=series,
-        dof=fit.dof,
+        dof=least,
         residual_std=spread / ARCSEC,
         residual_unit="arcsec",
         tables=tables,
@@ -356,22 +361,22 @@ def _level_terms(level: Fit, terms: Sequence[str], p: Mapping[str, Any], add: An
     z = {n: complex(level.value[i], level.value[half + i]) for i, n in enumerate(terms)}
     u = {n: (level.u[i], level.u[half + i]) for i, n in enumerate(terms)}
     tilt = p.get("body.tilt")
-    k = level.k
-    add("tilt 1", "tilt of the axis about the first axis of the base", z["axis"].imag, u["axis"][1], k,
+    dof = float(np.min(level.dof))
+    add("tilt 1", "tilt of the axis about the first axis of the base", z["axis"].imag, u["axis"][1], dof,
         None if tilt is None else tilt[0])  # fmt: skip
-    add("tilt 2", "tilt of the axis about the second axis of the base", -z["axis"].real, u["axis"][0], k,
+    add("tilt 2", "tilt of the axis about the second axis of the base", -z["axis"].real, u["axis"][0], dof,
         None if tilt is None else tilt[1])  # fmt: skip
     known = p.get("wobble.order") == 2.0 and "wobble.amplitude" in p
     size, phase = (float(p["wobble.amplitude"]), float(p["wobble.phase"])) if known else (0.0, 0.0)
-    add("wobble cos", "wobble twice a turn, A cos φ", z["wobble"].imag, u["wobble"][1], k,
+    add("wobble cos", "wobble twice a turn, A cos φ", z["wobble"].imag, u["wobble"][1], dof,
         size * math.cos(phase) if known else None)  # fmt: skip
-    add("wobble sin", "wobble twice a turn, A sin φ", -z["wobble"].real, u["wobble"][0], k,
+    add("wobble sin", "wobble twice a turn, A sin φ", -z["wobble"].real, u["wobble"][0], dof,
         size * math.sin(phase) if known else None)  # fmt: skip
     plate, none = p.get("reference.plate"), "" if "plate" in terms else "one mount: not told from the level's zero"
     for j, axis in enumerate("xy"):
         value = (z["plate"].real, z["plate"].imag)[j] if "plate" in terms else 0.0
         add(f"squareness {axis}", f"tilt of the plate against the axis, {axis}", value,
-            u["plate"][j] if "plate" in terms else 0.0, k, None if plate is None else plate[j], none)  # fmt: skip
+            u["plate"][j] if "plate" in terms else 0.0, dof, None if plate is None else plate[j], none)  # fmt: skip
 
 
 def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> dict[str, Any]:

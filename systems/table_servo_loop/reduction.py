@@ -31,7 +31,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     if COMMAND in record.channels and RATE in record.channels:
         error = record.channels[COMMAND] - record.channels[RATE]
         record = replace(record, channels={**record.channels, ERROR: error})
-    found = LoopFindings(record)
+    found = LoopFindings(record, by_neighbours=True)
     p, options = record.run.parameters, record.run.options
     loop, shaper = loop_of(p), bool(options.get("shaper", True))
     damped = int(options.get("network", 2)) in (1, 2)

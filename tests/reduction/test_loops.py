@@ -235,3 +235,23 @@ def test_drift_intervals_hold_with_reading_errors_and_slow_drift() -> None:
         largest = max(largest, abs(found.rate) / found.u)
     assert 0.93 <= held / 150 <= 0.987
     assert largest < 5.0
+
+
+def test_noise_of_other_frequencies_is_not_taken_for_that_at_a_sine() -> None:
+    """Noise that rises with the frequency, as that of a rate in a position loop: it reaches into short segments.
+
+    100 records of 20 periods: u by the lines beside the sine against the rms of the errors, and that by segments.
+    """
+    rng = np.random.default_rng(8)
+    t = np.arange(0.0, 5.0, 5e-3)
+    x = np.sin(2 * np.pi * 4.0 * t)
+    found = []
+    for _ in range(100):
+        y = 0.5 * x + np.diff(rng.standard_normal(t.size + 1))
+        found.append([response(t, x, y, 4.0, by_neighbours=b) for b in (True, False)])
+    true = math.sqrt(np.mean([abs(p.value - 0.5) ** 2 for p, _ in found]) / 2.0)
+    beside, segments = (math.sqrt(np.mean([(p[k].u or 0.0) ** 2 for p in found])) * 0.5 for k in (0, 1))
+    assert true < beside < 1.45 * true  # 1.11 for the 12 numbers, and what leaks
+    assert segments > 1.5 * true
+    inside = np.mean([abs((p.value - 0.5).real) < 1.96 * 0.5 * (p.u or 0.0) for p, _ in found])
+    assert inside > 0.9

@@ -17,10 +17,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
@@ -131,11 +133,12 @@ def phasor(t: Array, y: Array, f: float) -> complex:
     return complex(a, -b)
 
 
-def response(t: Array, x: Array, y: Array, f: float) -> Point:
+def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False) -> Point:
     """y over x at f Hz from a record of some whole periods.
 
     The record is cut into up to 8 segments of whole periods; their scatter gives the uncertainty (type A, independent
-    segments) and the coherence |sum Y X*|^2 / (sum |X|^2 sum |Y|^2).  Raises ReductionError for less than a period, for
+    segments) and the coherence |sum Y X*|^2 / (sum |X|^2 sum |Y|^2).  by_neighbours: the uncertainty is that of y at
+    the lines beside f instead, for an x without noise.  Raises ReductionError for less than a period, for
     samples too coarse for the frequency (less than 4 a period), and for an x without that sine.
     """
     dt = float(t[1] - t[0])
@@ -155,7 +158,25 @@ def response(t: Array, x: Array, y: Array, f: float) -> Point:
     power = float(np.sum(np.abs(xs) ** 2) * np.sum(np.abs(ys) ** 2))
     coherence = float(np.abs(np.sum(ys * np.conj(xs))) ** 2) / power if power > 0.0 else 0.0
     scatter = float(np.sum(np.abs(ys / xs - value) ** 2)) / (2.0 * n * (n - 1))
-    return Point(f, value, math.sqrt(scatter) / abs(value) if value else None, coherence)
+    noise = neighbour_noise(t, y, f) if by_neighbours else None
+    own = noise / abs(whole) if noise is not None else math.sqrt(scatter)
+    return Point(f, value, own / abs(value) if value else None, coherence)
+
+
+def neighbour_noise(t: Array, y: Array, f: float) -> float | None:
+    """Return the standard deviation that noise gives each part of the phasor of y at f Hz, None for too short a record.
+
+    From the phasors 2 to 4 lines of the record to either side, where its sine of whole periods has none; 12 numbers,
+    so it is half of a 95 % interval over 1.96.  Noise that is larger at other frequencies reaches into short segments,
+    whose scatter is too large then, and much less into these lines.
+    """
+    lines = [f + k / (t[-1] - t[0] + t[1] - t[0]) for k in (-4, -3, -2, 2, 3, 4)]
+    if lines[0] < 0.5 * f:
+        return None
+    own = phasor(t, y, f)
+    rest = y - (own * np.exp(2j * np.pi * f * t)).real  # the record may be a sample longer than whole periods
+    power = float(np.mean([abs(phasor(t, rest, x)) ** 2 for x in lines])) / 2.0
+    return float(stats.t.ppf(0.975, 2 * len(lines))) / NORMAL * math.sqrt(power)
 
 
 def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.complex128]]:

@@ -59,11 +59,13 @@ NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, cont
 class LoopFindings:
     """Collects what was found in one record; see the module.
 
-    record: gyrobench.record.record.Record.  slot: the exciter's.  Raises ReductionError, as :func:`loops.gates`.
+    record: gyrobench.record.record.Record.  slot: the exciter's.  by_neighbours: u of sines from the lines beside them,
+    for noise that is larger at other frequencies (loop_measures.neighbour_noise).  Raises ReductionError, as
+    :func:`loops.gates`.
     """
 
-    def __init__(self, record: Record, slot: str = "exciter") -> None:
-        self.record, self.slot = record, slot
+    def __init__(self, record: Record, slot: str = "exciter", by_neighbours: bool = False) -> None:
+        self.record, self.slot, self.by_neighbours = record, slot, by_neighbours
         self.gates = gates(record, slot)
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
         self.coefficients: list[Coefficient] = []
@@ -156,7 +158,9 @@ class LoopFindings:
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
-        points, counts = map(list, zip(*(open_loop_point(g, inside, test) for g in sines), strict=True))
+        points, counts = map(
+            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours) for g in sines), strict=True)
+        )
         counts = [c and not self.unstable for c in counts]
         sure = [p for p, c in zip(points, counts, strict=True) if c]
         title = name or f"open loop, {loop}"
@@ -269,7 +273,8 @@ class LoopFindings:
         def signal(g: Gate) -> Array:
             return g[output] + (g[plus] if plus else 0.0)
 
-        points = [response(g.t, g[reference], signal(g), g.f) for g in self.of(kind, axis, "sine") if g.amplitude]
+        sines = [g for g in self.of(kind, axis, "sine") if g.amplitude]
+        points = [response(g.t, g[reference], signal(g), g.f, self.by_neighbours) for g in sines]
         if not points:
             return []
         points.sort(key=lambda p: p.f)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -165,7 +165,7 @@ def measured_values(points: Sequence[Point], excluded: Sequence[float] = ()) -> 
     ``excluded``, at which a measurement did not count, lies beside the limit.
 
     The uncertainty holds that of the points (as far as the gain cannot be told from 1 within 1.96 u the crossover may
-    lie, and the phase turns over that range) and the difference of two interpolations between them.
+    lie, and the phase turns over that range; limits: propagated) and the difference of two interpolations between them.
     """
     if len(points) < 4:
         return {}
@@ -191,10 +191,25 @@ def measured_values(points: Sequence[Point], excluded: Sequence[float] = ()) -> 
         inside = _undecided(f, beyond, u, at)
         if _bounded(inside, points, excluded, at):
             same = min(other.gains, key=lambda g: abs(g[0] - at), default=(at, factor))
-            own = math.hypot(float(np.interp(at, f, u)), _spread(f, size, inside, at))
-            values[name] = factor, math.hypot(factor * own, same[1] - factor)
-            values[f"f_{name}"] = at, math.hypot(_spread(f, f, inside, at), same[0] - at)
+            u_f, u_factor = _propagated(points, f, at, factor)
+            values[name] = factor, math.hypot(u_factor, same[1] - factor)
+            values[f"f_{name}"] = at, math.hypot(u_f, same[0] - at)
     return values
+
+
+def _propagated(points: Sequence[Point], f: Array, at: float, factor: float) -> tuple[float, float]:
+    """Return the u of the frequency and of the factor of a limit: each neighbouring point moved by its u, in gain and
+    in phase; the interpolation is local, two points to either side.
+    """
+    squares = np.zeros(2)
+    for k in sorted(range(len(points)), key=lambda k: abs(math.log(points[k].f / at)))[:4]:
+        for part in (1.0, 1j):
+            moved = list(points)
+            moved[k] = replace(points[k], value=points[k].value * cmath.exp(part * (points[k].u or 0.0)))
+            gains = margins(f, interpolate_response(moved, f)).gains
+            same = min(gains, key=lambda g: abs(math.log(g[0] / at)), default=(at, factor))
+            squares += np.square([same[0] - at, same[1] - factor])
+    return float(math.sqrt(squares[0])), float(math.sqrt(squares[1]))
 
 
 def unity_range(points: Sequence[Point]) -> tuple[float, float] | None:

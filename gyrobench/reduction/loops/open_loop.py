@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel, RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_measures import Gate, Point, response, segment_phasors
+from gyrobench.reduction.loops.loop_measures import Gate, Point, neighbour_noise, phasor, response, segment_phasors
 from gyrobench.reduction.loops.margins import Margins, measured_margins, unity_range
 
 Value = tuple[float, float]  # estimate and standard uncertainty
@@ -38,8 +38,8 @@ def coherence_limit(segments: int) -> float:
     return max(COHERENCE, 1.0 - CHANCE ** (1.0 / (segments - 1))) if segments > 1 else 0.0
 
 
-def open_loop_point(gate: Gate, inside: str, test: str) -> tuple[Point, bool]:
-    """Return L = (r - e)/e at the sine of a phase, and whether it counts.
+def open_loop_point(gate: Gate, inside: str, test: str, by_neighbours: bool = False) -> tuple[Point, bool]:
+    """Return L = (r - e)/e at the sine of a phase, and whether it counts.  by_neighbours: as loop_measures.response.
 
     u is that of S = e/r, which is linear in the noise: |dL/L| = |dS| / |S (1 - S)|.  coherence: the smaller one
     of those of e and of r - e with r.  Raises as loop_measures.response.
@@ -52,6 +52,8 @@ def open_loop_point(gate: Gate, inside: str, test: str) -> tuple[Point, bool]:
     n = rs.size
     S = complex(1.0 / (1.0 + loop.value))
     scatter = math.sqrt(float(np.sum(np.abs(es / rs - S) ** 2)) / (2.0 * n * (n - 1)))
+    noise = neighbour_noise(t, e, gate.f) if by_neighbours else None
+    scatter = scatter if noise is None else noise / abs(phasor(t, r, gate.f))
     coherence = min(_coherence(rs, es), _coherence(rs, rs - es))
     u = scatter / (abs(S) * abs(1.0 - S)) if S not in (0.0, 1.0) else loop.u
     return Point(loop.f, loop.value, u, coherence), coherence >= coherence_limit(n)
