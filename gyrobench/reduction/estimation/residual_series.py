@@ -6,7 +6,6 @@ Residuals come as stretches: runs of windows of equal length without a gap.  Not
 
 from __future__ import annotations
 
-import functools
 import math
 from itertools import pairwise
 from typing import Any
@@ -14,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
+
+from gyrobench.reduction.series.deviations import deviations
 
 Array = NDArray[np.float64]
 NORMAL = 1.959963984540054
@@ -135,44 +136,20 @@ def normality(x: Array) -> tuple[float, float]:
     return float(w), 1.0 if light else float(p)
 
 
-@functools.cache
-def _degrees_of_freedom(m: int, n: int) -> float:
-    """Return those of the overlapping Allan variance over m of n rates with white noise."""
-    import allantools
-
-    edf = allantools.edf_greenhall(alpha=0, d=2, m=m, N=n + 1, overlapping=True, modified=False)
-    return float(edf)
-
-
 def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
     """Overlapping Allan deviation of rate means, pooled over stretches of the most frequent window length.
 
-    tau [s], dev, lo, hi (95 %, unit of the data) by allantools (oadev, edf_greenhall for white noise, chi-squared);
-    slopes: local log-log slopes.  Empty when no stretch has ``minimum`` windows.
+    tau [s] up to a third of the longest stretch, dev, lo, hi (95 %, unit of the data), see
+    :mod:`gyrobench.reduction.series.deviations`; slopes: local log-log slopes.  Empty when no stretch has ``minimum``
+    windows.
     """
-    import allantools
-
     chosen, window = _alike(parts, minimum)
     if not chosen:
         return {}
-    longest = max(p.size for p in chosen)
-    steps = [2**k for k in range(20) if 2**k <= longest // 3]
-    tau, dev, low, high = [], [], [], []
-    for m in steps:
-        square = freedom = 0.0
-        for p in (p for p in chosen if p.size >= 3 * m):
-            _, d, _, count = allantools.oadev(p, rate=1.0 / window, data_type="freq", taus=[m * window])
-            if len(d) == 0 or count[0] < 1:
-                continue
-            edf = _degrees_of_freedom(m, p.size)
-            square += float(d[0]) ** 2 * edf
-            freedom += edf
-        if freedom > 0.0 and square > 0.0:
-            value = math.sqrt(square / freedom)
-            tau.append(m * window)
-            dev.append(value)
-            low.append(value * math.sqrt(freedom / float(special.chdtri(freedom, 0.025))))
-            high.append(value * math.sqrt(freedom / float(special.chdtri(freedom, 0.975))))
+    found = deviations(chosen, window)["allan"]
+    long = found.tau <= window * (max(p.size for p in chosen) // 3)
+    use = long & (found.deviation > 0.0)
+    tau, dev, low, high = (x[use].tolist() for x in (found.tau, found.deviation, found.low, found.high))
     slopes = [
         {"from": a, "to": b, "slope": math.log(y / x) / math.log(b / a)}
         for a, b, x, y in zip(tau, tau[1:], dev, dev[1:], strict=False)
