@@ -1,6 +1,6 @@
-"""Allan deviations of 10^7 samples against allantools, and deviations and coefficients of 10^8 samples in bounded memory.
+"""Allan deviations of 10^7 samples against allantools; deviations and coefficients of 10^8 in bounded memory.
 
-    python tests/benchmarks/deviations.py [--samples 1e7] [--long 1e8]
+python tests/benchmarks/deviations.py [--samples 1e7] [--long 1e8]
 """
 
 from __future__ import annotations
@@ -44,11 +44,15 @@ if __name__ == "__main__":
         terms.add(block)
     longest, found = curves.result()["allan"].tau[-1], terms.result().N
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"{given.long:.0e} samples in blocks: three deviations to {longest:.3g} s and coefficients, with the making of")
+    print(
+        f"{given.long:.0e} samples in blocks: three deviations to {longest:.3g} s and coefficients, with the making of"
+    )
     print(f"the noise {time.process_time() - begin:.1f} s; peak memory {peak:.0f} MB; N = {found.value:.5f}, truth 0.1")
 
     x = rng.standard_normal(round(given.samples))
     ours, all_three = seconds(lambda: deviations(x, 0.01)), seconds(lambda: deviations(x, 0.01, KINDS))
     peer = seconds(lambda: allantools.oadev(x, rate=100.0, data_type="freq", taus="octave"))
-    print(f"{x.size} samples, octaves: Allan with intervals {ours:.2f} s, with modified and Hadamard {all_three:.2f} s,")
+    print(
+        f"{x.size} samples, octaves: Allan with intervals {ours:.2f} s, with modified and Hadamard {all_three:.2f} s,"
+    )
     print(f"allantools.oadev without intervals {peer:.2f} s: {peer / ours:.1f} times as long")

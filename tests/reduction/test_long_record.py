@@ -1,4 +1,4 @@
-"""Records of any length: blocks of 512 samples, lost samples, gaps; the coefficients are those of the whole record."""
+"""Records of any length: means of 512 samples, lost samples, gaps; the coefficients are those of the whole record."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy import fft
 
-from gyrobench.reduction.estimation.noise import process_covariance
-from gyrobench.reduction.series import long_record, noise_likelihood
-from gyrobench.reduction.series.long_record import BLOCK, LongRecord, present
+from gyrobench.reduction.series import long_record
+from gyrobench.reduction.series.long_record import LongRecord, present
 from gyrobench.reduction.series.noise_coefficients import CoefficientAccumulator, fit
+from gyrobench.reduction.series.noise_spectra import FastPowers
 
 
 def test_lost_samples_are_filled_by_those_before() -> None:
@@ -25,8 +24,8 @@ def test_lost_samples_are_filled_by_those_before() -> None:
     assert present(x) == []
 
 
-def test_blocks_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Means and powers of blocks do not depend on how the record comes; a gap begins new blocks."""
+def test_means_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Means of blocks do not depend on how the record comes; a gap begins new ones."""
     monkeypatch.setattr(long_record, "WHOLE", 1000)
     monkeypatch.setattr(long_record, "BLOCK", 64)
     x = np.random.default_rng(0).normal(size=10000)
@@ -36,25 +35,29 @@ def test_blocks_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     record.gap()
     record.add(x[7000:])
     found = record.condensed()
-    stretches = [y[: y.size // 64 * 64].reshape(-1, 64) for y in (x[:7000], x[7000:])]
-    assert [s.size for s in found.stretches] == [109, 46] and found.blocks == 155
-    for mean, blocks in zip(found.stretches, stretches, strict=True):
-        assert mean == pytest.approx(blocks.mean(axis=1))
-    c = fft.dct(np.concatenate(stretches), norm="ortho", axis=1)[:, 1:]
-    assert found.square == pytest.approx((c**2).sum(axis=0)) and found.total == pytest.approx(c.sum(axis=0), abs=1e-9)
+    assert [s.size for s in found.stretches] == [109, 46] and found.block == 64
+    for mean, y in zip(found.stretches, (x[:7000], x[7000:]), strict=True):
+        assert mean == pytest.approx(y[: y.size // 64 * 64].reshape(-1, 64).mean(axis=1))
 
 
-def test_variances_of_blocks() -> None:
-    """Of a block: random walk, angles (var 2, neighbours -1) and flicker, many relaxations, by their covariance."""
-    i = np.arange(BLOCK)
-    basis = noise_likelihood._basis_of_blocks(BLOCK)
-    walk = np.minimum(i[:, None], i) + 0.5 - np.eye(BLOCK) / 6.0
-    angle = 2.0 * np.eye(BLOCK) - np.eye(BLOCK, k=1) - np.eye(BLOCK, k=-1)
-    edge = np.arange(BLOCK + 1.0)
-    relax = sum(process_covariance(edge[:-1], edge[1:], math.exp(0.5 * j)) for j in range(-16, 35)) * 0.5 / np.pi
-    for cov, row in ((walk, 2), (angle, 3)):
-        assert np.diag(fft.dctn(cov, norm="ortho"))[1:] == pytest.approx(basis[row], rel=1e-9)
-    assert np.diag(fft.dctn(relax, norm="ortho"))[1:] == pytest.approx(basis[1], rel=5e-3)
+def test_fast_powers() -> None:
+    """Of records written from the model, stretches of 4096 and 6000 samples: powers are those of the variances, every
+    ordinate above the lowest frequency is counted, and a ramp adds nothing.
+    """
+    rng = np.random.default_rng(1)
+    powers = FastPowers(1.0 / 128.0)
+    for n in [4096] * 30 + [6000] * 30:
+        white, walk, angle = rng.normal(size=n), rng.normal(size=(2, n)), rng.normal(size=n + 1)
+        slow = np.cumsum(walk[0]) - walk[0] / 2.0 + walk[1] / math.sqrt(12.0)
+        powers.add(white + 0.1 * slow + 0.5 * np.diff(angle) + 10.0 * np.arange(n))
+    count, square, variance, frequency = powers.sums[0], powers.sums[1], powers.sums[2:6], powers.sums[6]
+    assert count.sum() == 30 * (4096 - 64) + 30 * (6000 - 94)  # k / 2n >= 1/128: k >= 64, 93.75
+    f = frequency / count
+    assert np.all(np.diff(f) > 0.0) and f[0] > 1.0 / 128.0 and f[-1] < 0.5
+    ratio = square / (np.array([1.0, 0.0, 0.01, 0.25]) @ variance)
+    assert np.max(np.abs(ratio - 1.0) * np.sqrt(count / 2.0)) < 4.5 and ratio @ count / count.sum() == pytest.approx(
+        1.0, abs=0.01
+    )
 
 
 def test_blocks_give_the_coefficients_of_the_record(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 from scipy import fft
 
 from gyrobench.reduction.estimation.noise import process_covariance
-from gyrobench.reduction.series import deviations, noise_likelihood
+from gyrobench.reduction.series import deviations, noise_likelihood, noise_spectra
 from gyrobench.reduction.series.long_record import Condensed
 from gyrobench.reduction.series.noise_coefficients import NoiseCoefficients, fit, slopes
 
@@ -30,7 +30,7 @@ def test_ordinates_of_random_walk_and_quantization_by_hand() -> None:
     """
     i = np.arange(N)
     k = np.arange(1.0, N)
-    basis = noise_likelihood._basis(k, N)
+    basis = noise_spectra.basis(k, N)
     walk = ordinates(np.minimum(i[:, None], i) + 0.5 - np.eye(N) / 6.0)
     assert walk == pytest.approx(np.diag(basis[2]), abs=1e-9)
     angle = ordinates(2.0 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
@@ -45,20 +45,20 @@ def test_ordinates_of_flicker_are_those_of_many_relaxations() -> None:
     cov = sum(h / np.pi * process_covariance(edge[:-1], edge[1:], math.exp(h * j)) for j in range(-16, 31))
     found = ordinates(cov)
     k = np.arange(1.0, n)
-    assert np.diag(found) == pytest.approx(noise_likelihood._basis(k, n)[1], rel=5e-3)
+    assert np.diag(found) == pytest.approx(noise_spectra.basis(k, n)[1], rel=5e-3)
     size = np.sqrt(np.diag(found))
     part = slice(0, 2 * noise_likelihood.LOW)
     correlation = (found / np.outer(size, size))[part, part]
-    assert correlation == pytest.approx(noise_likelihood._flicker()[1][part, part], abs=1e-3)
+    assert correlation == pytest.approx(noise_spectra.flicker()[1][part, part], abs=1e-3)
 
 
 def test_likelihood_of_a_short_record_is_that_of_its_covariance() -> None:
     """-2 log likelihood of the ordinates by their complete covariance, the ramp eliminated: equal up to a constant."""
     x = np.random.default_rng(0).normal(size=N)
-    f = noise_likelihood.Likelihood(Condensed([x], 1, 0, np.zeros(63), np.zeros(63)))
+    f = noise_likelihood.Likelihood(Condensed([x], 1, np.zeros((7, 0))))
     c, ramp = (fft.dct(y - y.mean(), norm="ortho")[1:] for y in (x, np.arange(N)))
     k = np.arange(1.0, N)
-    basis, (_, correlation) = noise_likelihood._basis(k, N), noise_likelihood._flicker()
+    basis, (_, correlation) = noise_spectra.basis(k, N), noise_spectra.flicker()
     low = np.arange(N - 1) < 2 * noise_likelihood.LOW
     pattern = np.eye(N - 1)
     pattern[np.ix_(low, low)] = correlation[: low.sum(), : low.sum()]

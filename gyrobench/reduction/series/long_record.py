@@ -1,7 +1,7 @@
-"""A rate record of any length, as the fit of noise coefficients takes it: stretches, or their means and a spectrum.
+"""A rate record of any length, as the fit of noise coefficients takes it.
 
 Up to WHOLE samples the stretches are kept as they are.  Longer ones become means of BLOCK samples, and the powers of
-the cosine transform of each block, summed up over the blocks: what is faster than the means.
+what is faster than the means, from cosine transforms of parts of some WHOLE samples.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+
+from gyrobench.reduction.series.noise_spectra import FastPowers
 
 Array = NDArray[np.float64]
 WHOLE = 1 << 21  # samples kept as they are
-BLOCK = 512  # short ones would let the errors of the angles at their ends hide the white noise
+BLOCK = 512
+LEAST = 8  # blocks of a part whose transform is used
 SHORTEST = 40  # samples of a stretch that is used
 STRETCHES = 200  # used, the longest
 LOST = 16  # samples in a row that are filled
@@ -22,15 +24,11 @@ LOST = 16  # samples in a row that are filled
 
 @dataclass(frozen=True)
 class Condensed:
-    """Stretches of means over ``block`` samples; of the blocks their number, sums (BLOCK - 1,) and sums of squares of
-    the ordinates 1 .. of their cosine transforms (zero for block 1).
-    """
+    """Stretches of means over ``block`` samples, and sums of powers as of :class:`FastPowers` (7, 0 or more bins)."""
 
     stretches: list[Array]
     block: int
-    blocks: int
-    total: Array
-    square: Array
+    fast: Array
 
 
 class LongRecord:
@@ -39,8 +37,8 @@ class LongRecord:
     def __init__(self) -> None:
         self._raw: list[list[Array]] = [[]]
         self._means: list[list[Array]] = []
-        self._waiting, self._blocks, self._open = 0, 0, False
-        self._sums = np.zeros((2, BLOCK - 1))
+        self._waiting, self._open = 0, False
+        self._fast = FastPowers(0.5 / BLOCK)
 
     def add(self, rate: Array) -> None:
         """Add rates (n,)."""
@@ -58,12 +56,12 @@ class LongRecord:
         """End the record and return it."""
         if self._means:
             self._condense()
-            stretches, block = [np.concatenate(parts) for parts in self._means], BLOCK
+            stretches, block, fast = [np.concatenate(parts) for parts in self._means], BLOCK, self._fast.sums
         else:
             stretches = [x for parts in self._raw if parts for x in present(np.concatenate(parts))]
-            block = 1
+            block, fast = 1, np.zeros((7, 0))
         stretches = sorted((x for x in stretches if x.size >= SHORTEST), key=lambda x: -x.size)[:STRETCHES]
-        return Condensed(stretches, block, self._blocks, *self._sums)
+        return Condensed(stretches, block, fast)
 
     def _condense(self) -> None:
         rest: list[Array] = []
@@ -78,10 +76,8 @@ class LongRecord:
                 if not (self._open and i == j == 0):
                     self._means.append([])
                 self._means[-1].append(blocks.mean(axis=1))
-                if n:
-                    c = fft.dct(blocks, norm="ortho", axis=1)[:, 1:]
-                    self._sums += c.sum(axis=0), (c * c).sum(axis=0)
-                    self._blocks += n
+                if n >= LEAST:
+                    self._fast.add(x[: n * BLOCK])
         self._open, self._raw = bool(rest), [rest]
         self._waiting = sum(x.size for x in rest)
 

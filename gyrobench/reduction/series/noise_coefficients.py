@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, optimize, special
+from scipy import optimize, special
 
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.long_record import SHORTEST, Condensed, LongRecord
@@ -229,11 +229,9 @@ def _without_ramp(record: Condensed, size: float) -> tuple[Condensed, float]:
     parts = [p / size for p in record.stretches]
     times = [(np.arange(p.size) - 0.5 * (p.size - 1)) * record.block for p in parts]
     slope = sum(float(t @ p) for t, p in zip(times, parts, strict=True)) / sum(float(t @ t) for t in times)
-    n = record.total.size + 1
-    line = fft.dct(slope * np.arange(n), norm="ortho")[1:]
-    square = record.square / size**2 - 2.0 * line * record.total / size + record.blocks * line**2
     level = [p - slope * t for t, p in zip(times, parts, strict=True)]
-    return Condensed(level, record.block, record.blocks, record.total, square), slope
+    fast = record.fast * np.array([1.0, size**-2.0, 1.0, 1.0, 1.0, 1.0, 1.0])[:, None]
+    return Condensed(level, record.block, fast), slope
 
 
 def _coefficients(record: Condensed, line: float, size: float, tau0: float) -> NoiseCoefficients:

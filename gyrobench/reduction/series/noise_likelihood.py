@@ -1,22 +1,12 @@
 """Likelihood of the variances of white, flicker, random-walk and quantization noise in a rate record.
 
-The cosine transform (DCT of type 2) of a stretch of n samples, without its mean, has ordinates k = 1 .. n-1 that are
-uncorrelated for N and K, for Q but for the errors of the first and last angle, which are kept as two effects of their
-own, and nearly for B (correlations up to 0.12 among the first, kept for k <= 2 LOW).  Variances per sample of
-
-    N^2/tau0     1
-    B^2          c_k sin^2(pi nu) [zeta(3, nu) + zeta(3, 1 - nu)]/(2 pi^3)
-    K^2 tau0     (2 + cos phi)/(12 sin^2(phi/2))
-    (Q/tau0)^2   4 sin^2(phi/2)
-
-with phi = pi k/n, nu = k/2n: averaging over tau0 and aliasing are exact.  c_k = 1 - 2/(pi^2 k), the first ones from the
-covariance of flicker.  R is a mean of the odd ordinates, eliminated as in restricted maximum likelihood.
+The likelihood is that of the ordinates of the cosine transform of each stretch, see :mod:`noise_spectra`: the first
+ones singly, the others in bins.  The ramp, a mean of the odd ones, is eliminated as in restricted maximum likelihood.
 [DRIFT-COEFFICIENTS; own derivation]
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
@@ -24,53 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
-from gyrobench.reduction.series.long_record import BLOCK, Condensed
+from gyrobench.reduction.series import noise_spectra
+from gyrobench.reduction.series.long_record import Condensed
 
 Array = NDArray[np.float64]
 LOW = 16  # first ordinates of each parity whose correlations by flicker are kept
-WIDTH = 0.02  # of a bin of ordinates, of the logarithm of k
 BAND = 1.5  # frequencies of a band of the check
 FLOOR = 1e-14  # of a variance, where that of the first differences of the record is 1
-
-
-@functools.cache
-def _flicker(n: int = 1024, low: int = 64) -> tuple[Array, Array]:
-    """Variance over that of the folded spectrum and correlation matrix of the first ordinates of flicker, k = 1 .. low.
-
-    From the generalized covariance of means over unit time, -(second difference of t^2 log t)/(2 pi).  They do not
-    depend on n (to 1e-4 from n = 1024 on).
-    """
-    t = np.arange(n + 1.0)
-    g = t * t * np.log(np.maximum(t, 1.0))
-    gram = np.concatenate([[2.0 * g[1] - 2.0 * g[0]], g[2:] - 2.0 * g[1:-1] + g[:-2]]) / (-2.0 * np.pi)
-    index = np.arange(n)
-    cov = fft.dctn(gram[np.abs(index[:, None] - index)], norm="ortho")[1 : low + 1, 1 : low + 1]
-    variance = np.diag(cov)
-    return variance / _folded(np.arange(1.0, low + 1.0) / (2 * n)), cov / np.sqrt(np.outer(variance, variance))
-
-
-def _folded(nu: Array) -> Array:
-    """Spectrum of means of flicker of S = 1/(2 pi f) over unit time, sampled at unit time, at 0 < nu <= 1/2."""
-    out: Array = np.sin(np.pi * nu) ** 2 / (2.0 * np.pi**3) * (special.zeta(3.0, nu) + special.zeta(3.0, 1.0 - nu))
-    return out
-
-
-def _basis(k: Array, n: int) -> Array:
-    """Variances (4, len(k)) of ordinates k for unit N^2/tau0, B^2, K^2 tau0, (Q/tau0)^2."""
-    ratio = _flicker()[0]
-    whole = np.minimum(k, ratio.size).astype(int)
-    share = np.where(k <= ratio.size, ratio[whole - 1], 1.0 - 2.0 / np.pi**2 / k)
-    sine = 4.0 * np.sin(np.pi * k / (2 * n)) ** 2
-    return np.array([np.ones_like(k), share * _folded(k / (2 * n)), (1.0 - sine / 6.0) / sine, sine])
-
-
-def _basis_of_blocks(n: int) -> Array:
-    """Variances (4, n - 1) of all ordinates of short blocks, with what the angles at their ends add."""
-    k = np.arange(1.0, n)
-    out = _basis(k, n)
-    out[1] = _flicker(n, n - 1)[0] * _folded(k / (2 * n))
-    out[3] += 4.0 / n * np.cos(np.pi * k / (2 * n)) ** 2
-    return out
 
 
 @dataclass(frozen=True)
@@ -95,9 +45,9 @@ def _ordinates(rate: Array, block: int) -> list[_Ordinates]:
     """Both parities of a stretch of means over ``block`` samples, odd ordinates first."""
     n = rate.size
     c = fft.dct(rate - rate.mean(), norm="ortho")
-    edges = list(range(1, int(2.0 / WIDTH)))
+    edges = list(range(1, int(2.0 / noise_spectra.WIDTH)))
     while edges[-1] < n:
-        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
+        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + noise_spectra.WIDTH))))
     out = []
     for parity in (1, 0):
         k = np.arange(2 - parity, n, 2)
@@ -112,10 +62,10 @@ def _ordinates(rate: Array, block: int) -> list[_Ordinates]:
         u = math.sqrt(2.0 / n) * np.cos(half)
         r = -u / (2.0 * np.sin(half) ** 2) if parity else np.zeros_like(u)
         # in the units of single samples
-        basis = _basis(middle, n) * np.array([[1.0 / block], [1.0], [block], [block**-2.0]])
+        basis = noise_spectra.basis(middle, n) * np.array([[1.0 / block], [1.0], [block], [block**-2.0]])
         u, r = u / block, r * block
         size = np.sqrt(basis[1, :LOW])
-        flicker = _flicker()[1][1 - parity :: 2, 1 - parity :: 2][:LOW, :LOW] * np.outer(size, size)
+        flicker = noise_spectra.flicker()[1][1 - parity :: 2, 1 - parity :: 2][:LOW, :LOW] * np.outer(size, size)
         products = np.array([square, total * u, total * r, count * u * u, count * u * r, count * r * r])
         largest = np.maximum.reduceat(x * x, start)
         at = np.flatnonzero(x * x == np.repeat(largest, count.astype(int)))
@@ -140,22 +90,22 @@ class Likelihood:
         products = [p.products for p in parts]
         starts = np.cumsum([0] + [c.size - LOW for c in count])[: len(parts)]
         high = [slice(LOW, None)] * len(parts)
-        if record.blocks:  # their powers are one more group, without the parts of u and r
-            basis.append(_basis_of_blocks(BLOCK))
-            count.append(np.full(BLOCK - 1, float(record.blocks)))
-            products.append(np.concatenate([record.square[None], np.zeros((5, BLOCK - 1))]))
+        fast = record.fast[:, record.fast[0] > 0.0]
+        if fast.size:  # one more group, without the parts of u and r
+            basis.append(fast[2:6] / fast[0])
+            count.append(fast[0])
+            products.append(np.concatenate([fast[1:2], np.zeros((5, fast.shape[1]))]))
             high.append(slice(None))
             starts = np.append(starts, sum(c.size - LOW for c in count[:-1]))
         self.basis, self.count = np.concatenate(basis, axis=1), np.concatenate(count)
         self.products = np.concatenate(products, axis=1)
         self.frequency = np.concatenate([p.frequency for p in parts])
         self.largest = np.concatenate([p.largest for p in parts], axis=1)
-        if record.blocks:
-            self.frequency = np.append(self.frequency, np.arange(1, BLOCK) / (2.0 * BLOCK))
+        self.frequency = np.append(self.frequency, fast[6] / fast[0])
         self._high = np.concatenate([b[:, s] for b, s in zip(basis, high, strict=True)], axis=1)
         self._counts = np.concatenate([c[s] for c, s in zip(count, high, strict=True)])
-        fast = np.concatenate([p[:, s] for p, s in zip(products, high, strict=True)], axis=1)
-        self._sums = np.concatenate([fast, (fast[:, None] * self._high).reshape(24, -1)])
+        sums = np.concatenate([p[:, s] for p, s in zip(products, high, strict=True)], axis=1)
+        self._sums = np.concatenate([sums, (sums[:, None] * self._high).reshape(24, -1)])
         self._starts, self._sizes = starts, [c.size for c in count]
 
     def _forms(self, v: Array) -> tuple[float, Array, Array, Array]:
