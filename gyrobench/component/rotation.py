@@ -18,8 +18,8 @@ class Rotation(Block):
     suffixes = {"matrix": ""}
     matrix = Parameter(IDENTITY, "1", "rotation matrix")
 
-    def __init__(self, doc: str) -> None:
-        super().__init__(matrix=Parameter(IDENTITY, "1", doc))
+    def __init__(self, doc: str, start: list[list[float]] = IDENTITY) -> None:
+        super().__init__(matrix=Parameter(start, "1", doc))
 
     def start(self) -> None:
         for i in range(3):
