@@ -25,9 +25,10 @@ TERMS: Mapping[str, tuple[str, float, str]] = {
     "R": ("°/h²", DPH / 3600.0, "rate ramp"),
     "Q": ("″", units.factor("arcsec"), "angle noise of a reading"),
 }
+SLOW = ("B", "K")  # what a fit takes a part of
 RESIDUAL = (
-    "From the residuals of the fit: drift that its terms take up, of the period of the turn and longer, is missing "
-    "here; K and R, and B of a short test, may be too small and their intervals too narrow"
+    "From the residuals of the fit: drift that its terms take up, of the period of a turn and longer, is missing here: "
+    "B and K may be larger and have no upper end, a ramp is not seen"
 )
 
 
@@ -48,10 +49,13 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         return []  # constant, or a gap after each window
     rows: list[list[Any]] = []
     for name, (unit, si, meaning) in TERMS.items():
+        if residual and name == "R":
+            continue
         e = getattr(found, name)
         value = e.value / si if e.determined else None
+        high = None if residual and name in SLOW else float(e.high) / si
         finding = "" if e.determined else "not determined: the interval holds 0"
-        rows.append([f"{name}, {meaning}", value, float(e.low) / si, float(e.high) / si, unit, finding])
+        rows.append([f"{name}, {meaning}", value, float(e.low) / si, high, unit, finding])
     count = sum(int(np.isfinite(x).sum()) for x in stretches)
     caption = (
         f"IEEE 952, from {count} means of {length:g} s by maximum likelihood. Gauss-Markov drift is not among the five "

@@ -405,4 +405,4 @@ def test_noise_coefficients_of_the_residuals(day: Any, monkeypatch: pytest.Monke
     assert len(day.windows["t_start"]) < module.LEAST and tables() == []
     monkeypatch.setattr(module, "LEAST", 64)
     (table,) = tables()
-    assert module.RESIDUAL in table["caption"] and [row[0][0] for row in table["rows"]] == list("NBKRQ")
+    assert module.RESIDUAL in table["caption"] and [row[0][0] for row in table["rows"]] == list("NBKQ")
