@@ -9,7 +9,7 @@ from gyrobench.component.blocks.attitude import (
     quaternion_of,
     wrapped,
 )
-from gyrobench.component.math import Number, exp, index, sqrt, vector
+from gyrobench.component.math import Number, cos, exp, index, sin, sqrt, vector
 
 
 class AttitudeKalman(AttitudeEstimator):
@@ -90,10 +90,20 @@ class AttitudeKalman(AttitudeEstimator):
 
     def outputs(self) -> None:
         self.angle = vector([wrapped(self.a[0]), wrapped(self.a[1]), wrapped(self.a[2])])
-        for j in range(3):
-            self.covariance[j][j] = self.P[j][0]
-            self.covariance[j + 3][j + 3] = self.P[j][1]
-            self.covariance[j][j + 3] = self.P[j][2]
-            self.covariance[j + 3][j] = self.P[j][2]
+        # rotation about x, y, z by errors of pitch, roll, heading: columns of T
+        sp = sin(self.a[0])
+        cp = cos(self.a[0])
+        sr = sin(self.a[1])
+        cr = cos(self.a[1])
+        T = [[cr, 0.0, -sr * cp], [0.0, 1.0, sp], [sr, 0.0, cr * cp]]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total = total + T[i][k] * self.P[k][0] * T[j][k]
+                self.covariance[i][j] = total
+                self.covariance[i][j + 3] = T[i][j] * self.P[j][2]
+                self.covariance[j + 3][i] = T[i][j] * self.P[j][2]
+                self.covariance[i + 3][j + 3] = self.P[i][1] if i == j else 0.0
         self.nis = self.e
         self.used = self.n

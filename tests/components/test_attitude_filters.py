@@ -144,9 +144,13 @@ def test_kalman_filter_in_matrices():
         assert rows[k][0] == pytest.approx(x[::2], abs=1e-6)
         assert rows[k][1] == pytest.approx(x[1::2], abs=1e-7)
         order = [0, 2, 4, 1, 3, 5]
-        scale = np.sqrt(np.diag(P)[order])
-        unit = np.outer(scale, scale)
-        assert rows[k][2] / unit == pytest.approx(P[np.ix_(order, order)] / unit, abs=5e-4)
+        # rotation by an error of each angle, by differences of the matrices
+        C = matrix(*x[::2])
+        turned = [Rotation.from_matrix(C @ matrix(*(x[::2] + 1e-6 * d)).T).as_rotvec() / 1e-6 for d in np.eye(3)]
+        T = block_diag(np.array(turned).T, np.eye(3))
+        P_vehicle = T @ P[np.ix_(order, order)] @ T.T
+        scale = np.sqrt(np.diag(P_vehicle))
+        assert rows[k][2] / np.outer(scale, scale) == pytest.approx(P_vehicle / np.outer(scale, scale), abs=5e-4)
         assert rows[k][3] == pytest.approx(nis, rel=1e-3, abs=1e-6)
 
 
