@@ -107,7 +107,7 @@ def _places(doc: Json, letters: Sequence[str]) -> Table:
         places = {e["run"]: place_text(ranked, e) for e in ranked["order"]}
         shown = [places.get(k, "–") for k in range(len(letters))]
         cells = [text_cell(x, "strong" if x in ("1", "1 =") else "") for x in shown]
-        rows.append(Row([text_cell(ranked.get("purpose", "")), text_cell(ranked["name"]), *cells]))
+        rows.append(Row([text_cell(ranked.get("purpose", "First measure")), text_cell(ranked["name"]), *cells]))
     columns = [Column("purpose", wide=True), Column("measure"), *(Column(x) for x in letters)]
     return Table(columns, rows, "Ranks of all runs by all measures, 1: the smallest value; =: shared.")
 
