@@ -9,7 +9,7 @@ from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, data_sheet, three
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot
+from gyrobench.system.system import OnRequest, Option, Slot
 
 DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
@@ -20,6 +20,7 @@ MOUNTS = {
     "gyro_z": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
 }
 GYROS = tuple(MOUNTS)
+ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
 GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2}  # of this test [GYRO-SDF-EOM]
 COMMAND = 1e-3  # rad/s, of the command step
 MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current: 1 N.m a volt, no back EMF
@@ -56,6 +57,15 @@ class PlatformThreeAxis(ThreeAxisTest):
         """
         for k, gyro in enumerate(GYROS, 1)
     )  # fmt: skip
+    on_request = {
+        slot: OnRequest(
+            {slot: Slot("Estimator", "estimator_none")},
+            f"{gyro}.u -> {slot}.z\n{slot}.estimate -> decoupler.u[{k}]",
+            channels=(f"{gyro}.u", f"{slot}.estimate"),
+            instead_of=f"{gyro}.u -> decoupler.u[{k}]",
+        )
+        for k, (slot, gyro) in enumerate(ESTIMATORS.items(), 1)
+    }
     factors = COMMANDS
     options = {
         "pitch": Option("20deg", "rad", "joint angle of the middle gimbal at the start", -80 * DEG, 80 * DEG),
@@ -131,4 +141,14 @@ class PlatformThreeAxis(ThreeAxisTest):
             motor = found["platform.k_t"][k] / found["platform.R"][k]
             stabilizer = self.stabilizer(neutral_inertia(parts)[k], motor, gyro)
             found |= {f"{axis}.{n}?": x for n, x in stabilizer.items()}
+        for slot in (n for n in ESTIMATORS if n in self.slots):
+            found |= self.estimator(slot, parts[f"{ESTIMATORS[slot]}.pickoff"] ** 2 / self.step)
         return found
+
+    def estimator(self, slot: str, variance: float) -> dict[str, float]:
+        """Return what an estimator of a gyro's signal is set to: the variance of a reading, and a band five times the
+        crossover, which costs the loop a degree of phase at most.
+        """
+        values = {"R": variance, "R0": variance, "sigma": math.sqrt(variance), "Ts": self.step}
+        values["q"] = (2.0 * math.pi * 5.0 * self["crossover"]) ** 4 * variance * self.step
+        return {f"{slot}.{name}?": x for name, x in values.items()}
