@@ -15,6 +15,7 @@ from gyrobench.system.plan import LIMIT, Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
 from . import harmonics
+from .measured import MEASURED
 
 FACE = "table"
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -41,6 +42,7 @@ class AngleSystemTest(TableTest):
     title = "Angle system test"
     spec = ("ANGLE-INDUCTOSYN", "READOUT-RATE")
     reduction = "reduction"
+    measured_data = MEASURED
     slots = on_table(
         table=Slot("Table", "table_rate"),
         reader=Slot("AngleReader", "inductosyn"),
@@ -72,6 +74,8 @@ class AngleSystemTest(TableTest):
         "noise": Option("0.02arcsec", "rad", "standard deviation of a reading before it is counted", 0.0, sets=NOISE),
         "reference_zero": Option("70.7deg", "rad", "angle at which the reference is mounted", sets="reference.head"),
         "u_rate": Option(0.0, "1", "relative standard uncertainty of the table's rate", 0.0),
+        "quantum": Option(0.0, "rad", "angle of a count of the reader, of measured data; 0: of the part", 0.0),
+        "reference_quantum": Option(0.0, "rad", "of the reference, of measured data; 0: that of the reader", 0.0),
     }
     assumed = ("table.base",)
     open = ("table.face",)

@@ -283,7 +283,8 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         none = "" if n in orders else f"order {n} is the same in all mounts and at both heads: take another mount"
         for j, part in enumerate(("cos", "sin")):
             k = 2 * orders.index(n) + j if n in orders else 0
-            add(f"E{n} {part}", f"position error, {part} {n if n > 1 else ''}θ", fit.value[k], fit.u[k], float(fit.dof[k]),
+            meaning = f"position error, {part} {n if n > 1 else ''}θ"
+            add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], float(fit.dof[k]),
                 None if truth is None else truth[j], none)  # fmt: skip
     if zeros > 2 * len(orders):
         add("lost motion", "position on the way up less that on the way back", fit.value[zeros - 1], fit.u[zeros - 1],
@@ -325,7 +326,7 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         ],
         decision_rule=uncertainty.DECISION_RULE,
         verdict=uncertainty.worst_verdict(c.verdict for c in found),
-        instrument=run.parts["body"].name if "body" in run.parts else "",
+        instrument=run.parts["body"].name if "body" in run.parts else run.instrument,
         ranked_by="accuracy",
         responses=[],
         simulated=not run.measured,

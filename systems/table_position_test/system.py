@@ -19,6 +19,8 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.table_program import Program, read_program
 from gyrobench.system.values import InvalidValueError
 
+from .measured import MEASURED
+
 REFERENCE = Socket(
     "PositionReference",
     "reference of a position test: table angle in, deviation from the nominal position and level out",
@@ -62,6 +64,7 @@ class TablePositionTest(System):
     title = "Position test of a table"
     spec = ("TABLE-POSITION", "TABLE-PROGRAM", "ANGLE-INDUCTOSYN")
     reduction = "reduction"
+    measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
@@ -110,6 +113,7 @@ class TablePositionTest(System):
         "program": Option("", str, "CSV or JSON file with a program of positions, for --part sequencer=table_program"),
         "settle": Option(2.0, "s", "wait after each move", 0.0),
         "dwell": Option(2.0, "s", "time averaged at each position", 0.01),
+        "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the readers", 0.0),
     }
     windows = Windows.of("sampler", **{n: f"{n}.mean" for n in SAMPLED if n != "sampler"})
     done = "sequencer.done"

@@ -187,14 +187,15 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
                 t.tolist(), "time", "s", (e / ARCSEC).tolist(), "tracking error", "arcsec", curves=curves,
             )
         )  # fmt: skip
-    else:
+    elif not run.measured:
         warnings.append(
             "The channels are further apart than a sample of the controller: the torque at the changes of rate is not "
             "evaluated."
         )
-    responses.insert(0, _tracking(record))
+    if "controller.e" in record.channels:
+        responses.insert(0, _tracking(record))
     worst = max(readings, key=lambda r: abs(r.mean) + 2.0 * r.ripple)
-    name = run.parts["controller"].name if "controller" in run.parts else ""
+    name = run.parts["controller"].name if "controller" in run.parts else run.instrument
     return LoopResult(
         system=run.system,
         title="Rate test of a table",

@@ -14,6 +14,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import InvalidValueError
 
 from .closed_form import SampledLoop
+from .measured import MEASURED
 
 ERU = 7.2921159e-5  # rad/s
 ARCSEC = math.pi / 648000.0
@@ -30,6 +31,7 @@ class TableRateTest(System):
     title = "Rate test of a table"
     spec = ("TABLE-RATE", "READOUT-RATE", "CTRL-SAMPLED", "TABLE-TACHO")
     reduction = "reduction"
+    measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
@@ -78,6 +80,7 @@ class TableRateTest(System):
         "u_angle1": Option(0.3 * ARCSEC, "rad", "error of the readings once a turn, std. unc. of its amplitude", 0.0),
         "u_angle2": Option(0.15 * ARCSEC, "rad", "error of the readings twice a turn, std. unc. of its amplitude", 0.0),
         "u_cycle": Option(0.1 * ARCSEC, "rad", "error twice in a cycle of the scale, std. unc. of its amplitude", 0.0),
+        "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }
     windows = Windows.of(
         "sampler",

@@ -1,0 +1,203 @@
+"""A laboratory's records of the tests of a table: written from the equations, reduced, the values come back; errors."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gyrobench as gb
+from gyrobench.system.system import load_system
+
+ARCSEC = math.pi / 648000
+ERU = 7.2921159e-5
+Q = 0.18 * ARCSEC
+
+
+def template(name: str) -> str:
+    measured = load_system(name).measured_data
+    assert measured is not None
+    return measured.template
+
+
+def counted(x: np.ndarray) -> np.ndarray:
+    return Q * np.round(x / Q)
+
+
+def write(path: Path, head: str, rows: list[list[float]], swap: tuple[str, str] = ("", "")) -> Path:
+    text = head + "\n".join(",".join(f"{x:.12g}" for x in row) for row in rows) + "\n"
+    path.write_text(text.replace(*swap) if swap[0] else text, encoding="utf-8")
+    return path
+
+
+# ------------------------------------------------------------------------------------------- rates
+def rate_rows(clock: float = 8e-6) -> list[list[float]]:
+    """Counts of a table that turns faster by `clock`, errors of the scale 0.3 and 0.15 arcsec once and twice a turn."""
+    rng, rows, t0 = np.random.default_rng(2), [], 0.0
+    for phase, rate in enumerate((20.0, -20.0, 500.0, -500.0), 1):
+        t = t0 + 2.0 + 6.0 * np.arange(11)
+        angle = rate * ERU * (1.0 + clock) * (t - t0) + 0.1 * ARCSEC * rng.standard_normal(t.size)
+        read = counted(angle + ARCSEC * (0.3 * np.sin(angle + 1.0) + 0.15 * np.sin(2.0 * angle)))
+        rows += [
+            [phase, t[k], t[k + 1], rate, *np.degrees(read[k : k + 2]), 0.02, 0.1 + 0.01 * rng.standard_normal()]
+            for k in range(10)
+        ]
+        t0 = t[-1]
+    return rows
+
+
+def test_rates_of_a_laboratory(tmp_path: Path) -> None:
+    file = write(tmp_path / "rates.csv", template("table_rate_test"), rate_rows())
+    result = gb.reduce("table_rate_test", file).result
+    assert not result.simulated
+    clock = result["time base"]
+    assert abs(clock.estimate - 8.0) < 4.0 * clock.u and clock.u < 1.0
+    for rate in (20, 500):  # both senses; the fast one over an angle of 125 deg
+        c = result[f"error {rate} ERU"]
+        assert abs(c.estimate - 8.0) < 4.0 * c.u and c.u < {20: 30.0, 500: 1.2}[rate]
+        assert result[f"ripple {rate} ERU"].estimate == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("swap", "text"),
+    [
+        (("# quantum = 0.18arcsec", "#"), "'quantum' is not given"),
+        (
+            ("rate [ERU]", "rate [deg/s]"),
+            "the angles turn at 19.9992 ERU and not at 4786.89 ERU; check units and sense",
+        ),
+        (("rate [ERU]", "rate [ERU/s]"), "unit"),
+        (("\n2,64,", "\n1,64,"), "phase 1: one rate that is not 0 is expected"),
+    ],
+)
+def test_errors_of_rates(tmp_path: Path, swap: tuple[str, str], text: str) -> None:
+    file = write(tmp_path / "rates.csv", template("table_rate_test"), rate_rows(), swap)
+    with pytest.raises(gb.GyrobenchError, match=text):
+        gb.reduce("table_rate_test", file)
+
+
+# ------------------------------------------------------------------------------------------- positions
+def position_rows() -> list[list[float]]:
+    """y + e = E - p_k + z + h/2, y2 + e = E(x) - E(x + 180 deg), level P e^-jb + T e^-j(x+b) + W e^j(x-b); arcsec."""
+    rng, rows, t = np.random.default_rng(4), [], 0.0
+    polygon = rng.standard_normal(12)
+    polygon -= polygon.mean()
+
+    def E(x: float) -> float:
+        return 0.7 * math.cos(x) - 0.4 * math.sin(2 * x) + 0.2 * math.cos(3 * x)
+
+    for b, zero in ((0, 3.0), (30, -2.0), (180, 1.0)):
+        for k in [*range(12), *range(12, -1, -1)]:
+            x, sense = math.radians(30 * k), 1.0 if len(rows) % 25 < 12 else -1.0
+            jb = math.radians(b)
+            level = (2.0 - 1.0j) + 3.0 * np.exp(-1j * x) + 0.5j * np.exp(1j * x)
+            level = level * np.exp(-1j * jb) + 4.0
+            track, noise = 0.02 * rng.standard_normal(), 0.03 * rng.standard_normal(4)
+            y = E(x) - polygon[(k + b // 30) % 12] + zero + 0.05 * sense - track + noise[0]
+            second = E(x) - E(x + math.pi) + 7.0 - track + noise[1]
+            rows.append([t, t + 2.0, b, 30 * k, y, track, 30 * k + second / 3600.0, level.real + noise[2],
+                         level.imag + noise[3]])  # fmt: skip
+            t += 5.0
+    return rows
+
+
+def test_positions_of_a_laboratory(tmp_path: Path) -> None:
+    file = write(tmp_path / "positions.csv", template("table_position_test"), position_rows())
+    result = gb.reduce("table_position_test", file).result
+    wanted = {"E1 cos": 0.7, "E1 sin": 0.0, "E2 cos": 0.0, "E2 sin": -0.4, "E3 cos": 0.2, "lost motion": 0.1,
+              "squareness x": 2.0, "squareness y": -1.0, "tilt 2": -3.0, "tilt 1": 0.0, "wobble cos": 0.5}  # fmt: skip
+    for name, value in wanted.items():
+        c = result[name]
+        assert abs(c.estimate - value) < 4.0 * c.u and c.u < 0.05, name
+
+
+@pytest.mark.parametrize(
+    ("swap", "text"),
+    [
+        (("# positions = 12\n", ""), "'positions' is not given"),
+        (("# positions = 12\n", "# positions = 8\n"), "position: 30 deg in row 2 of .* is not a whole face of 45 deg"),
+        (("deviation [arcsec]", "deviation [deg]"), "deviation: .* readings are more than 0.57 deg"),
+        (("# orders = 3", "# orders = 6"), "orders = 6: at most 5 follow"),
+        ((",second [deg]", ",third [deg]"), "column 'second"),
+    ],
+)
+def test_errors_of_positions(tmp_path: Path, swap: tuple[str, str], text: str) -> None:
+    file = write(tmp_path / "positions.csv", template("table_position_test"), position_rows(), swap)
+    with pytest.raises(gb.GyrobenchError, match=text):
+        gb.reduce("table_position_test", file)
+
+
+# ------------------------------------------------------------------------------------------- angles
+HEAD = math.radians(50.1)
+SCALE = {1: (0.3, -0.2), 2: (0.1, 0.15)}  # cos, sin, arcsec
+
+
+def scale(x: np.ndarray) -> np.ndarray:
+    return ARCSEC * sum(a * np.cos(k * x) + b * np.sin(k * x) for k, (a, b) in SCALE.items())
+
+
+def angle_rows(reversal: bool = False) -> list[list[float]]:
+    """Positions all around read by one or two heads, the reference with 0.25 cos; rates with a lag of 40 us."""
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    rows: list[list[float]] = []
+    for turned in (False, True) if reversal else (False,):
+        x = 2 * math.pi * (np.arange(60) + (np.arange(60) * golden + 0.3 * turned) % 1.0) / 60
+        reference = counted(x + 0.25 * ARCSEC * np.cos(x) + 0.4)
+        one, two = counted(x + scale(x)), counted(x + scale(x + HEAD) + 0.1)
+        for k in range(60):
+            read = [two[k] if turned else one[k]] if reversal else [one[k], two[k]]
+            cells = [len(rows) + 1, 10.0 * len(rows), 10.0 * len(rows) + 0.1, 0.0, math.degrees(x[k]), float(turned)]
+            rows.append([*cells, *np.degrees([*read, reference[k]])])
+    for n, rate in enumerate((500.0, -500.0)):
+        t = rows[-1][2] + 3.0 + np.arange(40)
+        x = rate * ERU * (t - t[0])
+        late = x - 40e-6 * rate * ERU
+        reads = [counted(late + scale(late))] + ([] if reversal else [counted(late + scale(late + HEAD) + 0.1)])
+        reads.append(counted(x + 0.25 * ARCSEC * np.cos(x) + 0.4))
+        phase = 121 if reversal else 61
+        rows += [[phase + n, t[k] - 0.1, t[k], rate, 0.0, 0.0, *np.degrees([r[k] for r in reads])] for k in range(40)]
+    return rows
+
+
+@pytest.mark.parametrize("reversal", [False, True], ids=["two heads", "reversal"])
+def test_angles_of_a_laboratory(tmp_path: Path, reversal: bool) -> None:
+    head = template("angle_system_test")
+    if reversal:
+        head = head.replace("method = two_heads", "method = reversal").replace(",reading_2 [deg]", "")
+    result = gb.reduce("angle_system_test", write(tmp_path / "angles.csv", head, angle_rows(reversal))).result
+    for k, parts in SCALE.items():
+        for name, value in zip((f"cos_{k}", f"sin_{k}"), parts, strict=True):
+            c = result[name]
+            assert abs(c.estimate - value) < 4.0 * c.u and c.u < 0.05, name
+    assert abs(result["ref_cos_1"].estimate - 0.25) < 4.0 * result["ref_cos_1"].u
+    assert abs(result["delay"].estimate - 40.0) < 4.0 * result["delay"].u < 20.0
+
+
+@pytest.mark.parametrize(
+    ("swap", "text"),
+    [
+        (("# head = 50.1deg", "#"), "'head' is not given"),
+        ((",reading_2 [deg]", ",other [deg]"), "reading_2"),
+        (("\n2,10,", "\n1,10,"), "phase 1: its rows have several rates or positions"),
+        (("method = two_heads", "method = reversal"), "positions with turned = 0 and with turned = 1"),
+        (("method = two_heads", "method = three"), "method = three: two_heads or reversal"),
+        (
+            ("reading_2 [deg],", "reading_2 [rad],"),
+            "reading_2: does not follow the position",
+        ),
+    ],
+)
+def test_errors_of_angles(tmp_path: Path, swap: tuple[str, str], text: str) -> None:
+    file = write(tmp_path / "angles.csv", template("angle_system_test"), angle_rows(), swap)
+    with pytest.raises(gb.GyrobenchError, match=text):
+        gb.reduce("angle_system_test", file)
+
+
+@pytest.mark.parametrize("name", ["table_rate_test", "table_position_test", "angle_system_test"])
+def test_an_empty_template(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "empty.csv"
+    file.write_text(template(name), encoding="utf-8")
+    with pytest.raises(gb.GyrobenchError, match="no rows"):
+        gb.reduce(name, file)
