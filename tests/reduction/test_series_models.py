@@ -16,7 +16,7 @@ from gyrobench.reduction.series.autoregression import covariance_of, fit_ar, fro
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.gauss_markov import check_length, gauss_markov
-from gyrobench.reduction.series.moving_average import fit_arma
+from gyrobench.reduction.series.moving_average import Arma, fit_arma
 from gyrobench.reduction.series.orders import criteria, order_table
 from gyrobench.reduction.series.whiteness import ljung_box
 
@@ -210,6 +210,40 @@ def test_arma_is_that_of_statsmodels_and_its_intervals_that_of_the_information()
         fit_arma(x[:99], 2, 1)
     with pytest.raises(SeriesError, match="average blocks first"):
         fit_arma(np.tile(x, 60), 1, 1)
+
+
+def test_theory_of_a_model() -> None:
+    """phi = (1.2, -0.5), theta_Hu = (0.4, -0.3, 0.2), variance 1.7: lambda_K = s^2 sum psi_j psi_{j+K} (4-106), the
+    recursion beyond q (4-126) with lambda_xa(-j) = s^2 psi_j below (4-124), the spectrum as |psi|^2 (4-109), MA (4-121);
+    psi_j = sum K_i G_i^j of an AR.
+    """
+    phi, theta, v = np.array([1.2, -0.5]), -np.array([0.4, -0.3, 0.2]), 1.7
+    none = np.zeros(0)
+    model = Arma(phi, theta, none, none, none, v, 0.0, 1000, 0.0, none, True)
+    psi = model.weights(400)
+    ours = np.array([v * np.sum(psi[: 400 - k] * psi[k:]) for k in range(20)])
+    assert model.autocovariance(19) == pytest.approx(ours, abs=1e-13)
+    moving = np.r_[1.0, theta]
+    for k in range(8):
+        after = v * sum(moving[j] * psi[j - k] for j in range(k, 4))  # nothing of the moving average beyond lag 3
+        assert ours[k] == pytest.approx(phi[0] * ours[abs(k - 1)] + phi[1] * ours[abs(k - 2)] + after, abs=1e-12)
+    f = np.array([0.11])
+    whole = np.array([v * np.sum(psi[: 400 - k] * psi[k:]) for k in range(300)])
+    series = whole[0] + 2 * sum(c * math.cos(2 * math.pi * 0.11 * k) for k, c in enumerate(whole[1:], 1))
+    assert model.density(f, 1.0)[0] == pytest.approx(2 * series, rel=1e-12)
+    average = Arma(none, theta, none, none, none, v, 0.0, 1000, 0.0, none, True)
+    by_hand = [v * float(moving[: 4 - k] @ moving[k:]) for k in range(4)]
+    assert average.autocovariance(4) == pytest.approx([*by_hand, 0.0], abs=1e-14)
+    (pair,) = autoregression.modes((1.2, -0.5), 2.0)
+    G = 0.6 + 1j * math.sqrt(0.5 - 0.36)
+    assert pair.frequency == pytest.approx(np.angle(G) / (2 * math.pi * 2.0))
+    assert pair.tau == pytest.approx(-2.0 / math.log(math.sqrt(0.5)))
+    ar = signal.lfilter([1.0], [1.0, -1.2, 0.5], np.r_[1.0, np.zeros(9)])
+    assert 2 * np.real(pair.weight * G ** np.arange(10)) == pytest.approx(ar, abs=1e-13)
+    with pytest.raises(SeriesError, match="two roots are equal"):
+        autoregression.modes((1.0, -0.25), 1.0)
+    with pytest.raises(SeriesError, match="inside the circle"):
+        autoregression.modes((1.0, 0.5), 1.0)
 
 
 def test_one_difference_too_many_has_no_interval() -> None:

@@ -4,13 +4,14 @@
     x_t - m + sum_i a_i (x_{t-i} - m) = w_t,  a = -phi (MATLAB's arburg and aryule, spectrum.arburg)
 
 A list of a used as phi is another model, often an explosive one: :func:`from_coefficients` wants the convention named.
+:func:`modes` reads a model as decay times and frequencies.
 Burg minimizes the forward and backward errors from p + 1 on; Yule-Walker takes the biased autocovariances, which
 shrinks sharp resonances in short records (60 samples, poles at 0.97: six times Burg's error).
 
-Intervals: both estimators are biased by about (order + 3)/n towards slower decay being missed.  The bias is found by
-simulation of the fitted model (300 records, fixed seed) and taken off before phi_c -+ 1.96 u, u^2 from
-sigma^2 Gamma^-1/n at phi_c.  They cover where the record is longer than some 20 correlation times; the result says if
-not.
+Intervals: both estimators are biased by about (order + 3)/n towards faster decay, and their variance exceeds the
+large-sample sigma^2 Gamma^-1/n by terms in 1/n^2.  Both are found by simulation of the fitted model (30 to 500 records,
+fixed seed).  The interval holds the values whose own 1.96 u reaches the estimate less its bias.  It covers where the
+record is longer than some 20 correlation times; the result says if not.
 [DRIFT-AR-YW, DRIFT-AR-BURG, RED-ARMA; Xia 2008, eq. 3.4.11, 3.4.12 with EX13, EX14; Hu 1981, eq. 4-102..4-112]
 """
 
@@ -26,8 +27,9 @@ from scipy import linalg, signal
 from gyrobench.reduction.series.checks import NORMAL, Array, SeriesError, checked, checked_step
 
 Method = Literal["burg", "yule-walker"]
-RECORDS, LENGTH = 300, 2000  # of the simulation of the bias
+RECORDS, FEWEST, LENGTH = 500, 30, 2000  # of the simulation of bias and variance
 NEGLIGIBLE = 0.01  # bias over u that needs no simulation
+EQUAL = 1e-6  # distance of two roots that count as one
 ENOUGH_TIMES = 20.0  # correlation times in a record
 
 
@@ -53,6 +55,36 @@ def from_coefficients(values: Sequence[float], convention: Literal["phi", "a"]) 
 
 
 @dataclass(frozen=True)
+class Mode:
+    """One root G of the model: psi_j = sum K G^j, decaying within ``tau`` s, at ``frequency`` Hz (0: without turning)."""
+
+    tau: float
+    frequency: float
+    weight: complex  # K
+
+
+def modes(phi: Sequence[float], dt: float) -> tuple[Mode, ...]:
+    """Return the modes of an autoregression, slowest first; of a conjugate pair the one of positive frequency.
+
+    K_i = 1/prod_{j != i}(1 - G_j/G_i) holds for distinct roots only.  Raises SeriesError for equal ones, for a zero root
+    (last coefficient 0) and for a model that is not stationary.
+    """
+    dt, G = checked_step(dt), np.roots(np.concatenate([[1.0], -np.asarray(phi, dtype=float)]))
+    if np.abs(G).max(initial=0.0) >= 1.0 or np.abs(G).min(initial=1.0) == 0.0 or G.size != len(phi):
+        raise SeriesError("modes: the roots must lie inside the circle, none at zero")
+    apart = np.abs(G[:, None] - G) + 2.0 * np.eye(G.size)
+    if apart.min() < EQUAL:
+        raise SeriesError("modes: two roots are equal; the partial fractions hold for distinct roots only")
+    ratio = 1.0 - G / G[:, None] + np.eye(G.size)
+    out = [
+        Mode(float(-dt / np.log(abs(g))), float(np.angle(g) / (2.0 * np.pi * dt)), complex(1.0 / np.prod(row)))
+        for g, row in zip(G, ratio, strict=True)
+        if g.imag >= 0.0
+    ]
+    return tuple(sorted(out, key=lambda mode: -mode.tau))
+
+
+@dataclass(frozen=True)
 class Autoregression:
     """One fitted model; arrays over the coefficients 1..p."""
 
@@ -74,6 +106,10 @@ class Autoregression:
         """The same model in arburg's convention."""
         out: Array = -self.phi
         return out
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        return modes(tuple(self.phi), self.dt)
 
     @property
     def long_enough(self) -> bool:
@@ -112,20 +148,17 @@ def fit_ar(x: Any, dt: float, order: int, method: Method = "burg") -> Autoregres
         raise SeriesError(
             f"autoregression of order {order} by {method}: spectral radius {radius:.6f}; difference first"
         )
-    u = _standard(phi, n)
-    bias = np.zeros(order)
-    if (order + 3.0) / n > NEGLIGIBLE * u.min():
-        bias = _bias(phi, n, method)
-        shrink = phi - bias
-        if spectral_radius(shrink) < 1.0:
-            u = _standard(shrink, n)
-        else:
-            bias = np.zeros(order)
+    bias, extra = np.zeros(order), np.zeros(order)
+    if (order + 3.0) / n > NEGLIGIBLE * _standard(phi, n).min():
+        found = _higher_order(phi, n, method)
+        if spectral_radius(phi - found[0]) < 1.0:
+            bias, extra = found
     centre = phi - bias
     largest = spectral_radius(centre)
     times = n * -np.log(largest) if largest > 0.0 else float(n)
+    u = _standard(centre, n, extra)
     return Autoregression(
-        method, phi, bias, u, centre - NORMAL * u, centre + NORMAL * u, variance, mean, n, dt, radius, float(times)
+        method, phi, bias, u, *_interval(centre, n, extra), variance, mean, n, dt, radius, float(times)
     )
 
 
@@ -155,41 +188,63 @@ def covariance_of(phi: Array, n: int) -> Array:
     return out
 
 
-def _standard(phi: Array, n: int) -> Array:
-    out: Array = np.sqrt(np.maximum(np.diag(covariance_of(phi, n)), 1e-300))
+def _standard(phi: Array, n: int, extra: Array | float = 0.0) -> Array:
+    out: Array = np.sqrt(np.maximum(np.diag(covariance_of(phi, n)) + extra, 1e-300))
     return out
 
 
-def _bias(phi: Array, n: int, method: Method) -> Array:
-    """Return the bias at n values: of RECORDS simulated ones, shorter where n is large and scaled (it goes as 1/n)."""
+def _interval(phi: Array, n: int, extra: Array) -> tuple[Array, Array]:
+    """Return the values of each coefficient that 1.96 of the u that they themselves imply would reach ``phi`` from.
+
+    The other coefficients move with it as their covariance has it.  u at the estimate would be too small where the
+    estimate is too near the circle, and too large at the other end.
+    """
+    covariance = covariance_of(phi, n)
+    ends = np.zeros((2, phi.size))
+    for k in range(phi.size):
+        along = covariance[k] / covariance[k, k]
+        for row, side in enumerate((-1.0, 1.0)):
+            half = NORMAL * float(np.sqrt(covariance[k, k]))
+            for _ in range(20):
+                there = phi + side * half * along
+                if spectral_radius(there) >= 1.0:
+                    half *= 0.7
+                    continue
+                before, half = half, 0.5 * (half + NORMAL * float(_standard(there, n, extra)[k]))
+                if abs(half - before) < 1e-3 * half:
+                    break
+            ends[row, k] = phi[k] + side * half
+    return ends[0], ends[1]
+
+
+def _higher_order(phi: Array, n: int, method: Method) -> tuple[Array, Array]:
+    """Return what n values add to the large-sample law: the bias (as 1/n) and a part of the variance (as 1/n^2).
+
+    From simulated records, shorter where n is large and scaled, and fewer there: both matter less against u.  The error
+    of first order, Gamma^-1 sum_t y_{t-i} w_t/m, has a known law: it is taken off each record, which leaves bias
+    and variance with a tenth of the scatter.
+    """
     radius = spectral_radius(phi)
     slow = int(min(40.0 / max(-np.log(max(radius, 1e-9)), 1e-9), 50.0 * LENGTH))
-    m = min(n, max(LENGTH, slow))
+    m, p = min(n, max(LENGTH, slow)), phi.size
     rng = np.random.default_rng(0)
-    transient = min(slow, 5 * LENGTH)
-    a, total = np.concatenate([[1.0], -phi]), np.zeros(phi.size)
-    rows = max(1, min(RECORDS, 4_000_000 // (m + transient)))
-    done = 0
-    while done < RECORDS:
-        w = rng.standard_normal((min(rows, RECORDS - done), m + transient))
-        y = signal.lfilter([1.0], a, w, axis=1)[:, transient:]
-        total -= _linear_part(y, w[:, transient:], phi)
-        y -= y.mean(axis=1, keepdims=True)
-        total += (_burg_rows(y, phi.size) if method == "burg" else _yule_walker_rows(y, phi.size)).sum(axis=0)
+    transient = min(slow, 5 * LENGTH) + p
+    records = max(FEWEST, min(RECORDS, RECORDS * 1000 // n))
+    rows = max(1, min(records, 2_000_000 // (m + transient)))
+    a, C, done = np.concatenate([[1.0], -phi]), covariance_of(phi, m), 0
+    errors, first = [], []
+    while done < records:
+        w = rng.standard_normal((min(rows, records - done), m + transient))
+        y = signal.lfilter([1.0], a, w, axis=1)
+        before = [y[:, transient - i : -i] for i in range(1, p + 1)]
+        first.append(np.stack([np.einsum("ij,ij->i", b, w[:, transient:]) for b in before], axis=1) @ C)
+        y = y[:, transient:] - y[:, transient:].mean(axis=1, keepdims=True)
+        errors.append((_burg_rows(y, p) if method == "burg" else _yule_walker_rows(y, p)) - phi)
         done += len(w)
-    out: Array = (total / RECORDS - phi) * (m / n)
-    return out
-
-
-def _linear_part(y: Array, w: Array, phi: Array) -> Array:
-    """Return the sum over rows of Gamma^-1 sum_t y_{t-i} w_t/m: the error of first order, of mean zero.
-
-    Taken off before averaging it leaves the bias with a tenth of the scatter.
-    """
-    p, m = phi.size, y.shape[1]
-    gradient = np.array([np.einsum("ij,ij->", y[:, p - i : m - i], w[:, p:]) for i in range(1, p + 1)])
-    out: Array = covariance_of(phi, m) @ gradient
-    return out
+    error, linear = np.concatenate(errors), np.concatenate(first)
+    bias: Array = (error - linear).mean(axis=0) * (m / n)
+    extra: Array = np.maximum(error.var(axis=0) - linear.var(axis=0), 0.0) * (m / n) ** 2
+    return bias, extra
 
 
 def _burg_rows(y: Array, order: int) -> Array:

@@ -94,7 +94,8 @@ class _Model:
 @dataclass
 class _Fitted:
     f: float
-    c: complex  # b - i a, about the middle of the record
+    density: float  # of the noise around it
+    c: complex = 0j  # b - i a, about the middle of the record
 
 
 class _Removal:
@@ -109,8 +110,8 @@ class _Removal:
         self.lines: list[_Fitted] = []
         self.tests: list[float] = []
 
-    def start(self, f: float, false_alarm: float) -> None:
-        self.lines.append(_Fitted(f, 0j))
+    def start(self, f: float, density: float, false_alarm: float) -> None:
+        self.lines.append(_Fitted(f, density))
         self.tests.append(false_alarm)
 
     def fit(self) -> None:
@@ -119,7 +120,6 @@ class _Removal:
         for sweep in range(SWEEPS):
             mean, slope = float(r.mean()), 12.0 * float(self.time @ r) / n
             r -= mean + slope * self.time
-            noise = 2.0 * float(r @ r) / n**2  # variance of an amplitude if the residual were white
             moved = 0.0
             for line in self.lines:
                 s0, s1 = self.model.sums(self.padded, line.f)
@@ -132,9 +132,8 @@ class _Removal:
                 self.model.add(self.padded, line.f, line.c)
                 line.f, line.c = line.f + df, line.c + step
                 self.model.add(self.padded, line.f, -line.c)
-                moved = max(
-                    moved, abs(step) ** 2 / max(noise, 1e-300), (abs(line.c) * df * T) ** 2 / max(noise, 1e-300)
-                )
+                variance = max(line.density / T, 1e-300)  # of its amplitude
+                moved = max(moved, abs(step) ** 2 / variance, (abs(line.c) * df * T) ** 2 / variance)
             if not self.lines or (sweep > 1 and moved < 1e-6):
                 break
 
@@ -227,7 +226,7 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
             if all(abs(bin_ - o) > 2 and density[bin_] > density[o] / (abs(bin_ - o) - 1.0) ** 2 for o in taken):
                 taken.append(bin_)
                 if len(removal.lines) < most:
-                    removal.start(_interpolated(removal.padded[:n], bin_, dt), chance)
+                    removal.start(_interpolated(removal.padded[:n], bin_, dt), float(around[bin_]), chance)
         removal.fit()
         if len(removal.lines) >= most:
             break
@@ -279,7 +278,9 @@ def fit_line(x: Any, dt: float, frequency: float) -> Line:
             f"{2.0 / T:.4g} to {0.5 / dt:.4g} Hz"
         )
     removal = _Removal(x, dt)
-    removal.start(frequency, math.nan)
+    removal.fit()
+    around, _ = local_level(_periodogram(removal.padded[: x.size], dt))
+    removal.start(frequency, float(around[min(max(round(frequency * T), 1), around.size - 2)]), math.nan)
     removal.fit()
     line = _finished(x, dt, removal, math.nan, False).lines[0]
     if abs(line.frequency - frequency) > 1.0 / T or line.amplitude < 2.0 * NORMAL * line.u_amplitude:

@@ -52,6 +52,22 @@ class Arma:
     def order(self) -> tuple[int, int]:
         return self.phi.size, self.theta.size
 
+    def weights(self, n: int) -> Array:
+        """Return psi_0 .. psi_{n-1} of x_t - m = sum psi_j e_{t-j}."""
+        impulse = np.zeros(n)
+        impulse[0] = 1.0
+        ma, ar = np.concatenate([[1.0], self.theta]), np.concatenate([[1.0], -self.phi])
+        out: Array = signal.lfilter(ma, ar, impulse)
+        return out
+
+    def autocovariance(self, lags: int) -> Array:
+        """Return the model's autocovariances at lags 0..lags, unit^2 (statsmodels)."""
+        from statsmodels.tsa.arima_process import arma_acovf
+
+        ma, ar = np.concatenate([[1.0], self.theta]), np.concatenate([[1.0], -self.phi])
+        out: Array = np.asarray(arma_acovf(ar, ma, nobs=lags + 1, sigma2=self.variance))
+        return out
+
     def density(self, frequency: Array, dt: float) -> Array:
         """Return the one-sided density at frequencies (Hz), unit^2/Hz."""
         w = 2.0 * np.pi * np.asarray(frequency) * dt

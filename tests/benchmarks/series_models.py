@@ -1,0 +1,96 @@
+"""How often the 95 % intervals of autoregressive coefficients and of the correlation time hold the truth, and how often
+a record without lines shows one.
+
+python tests/benchmarks/series_models.py [records]      # 1000: an hour
+
+Each coefficient of three models by Burg and by Yule-Walker, 10^3 to 10^6 samples; correlation time of 20 samples
+alone, of 1/20 of the record, and of 20 samples under white noise of the same variance; false alarms at 5 %.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from gyrobench.reduction.series.autoregression import fit_ar
+from gyrobench.reduction.series.gauss_markov import gauss_markov
+from gyrobench.reduction.series.lines import find_lines
+
+MODELS = {
+    "Gauss-Markov of 20 samples": (math.exp(-1 / 20),),
+    "AR(2)": (1.2, -0.5),
+    "AR(3) of Xia 2008": (-0.7466, -0.5044, -0.2538),
+}
+
+
+def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
+    """Stationary from the start."""
+    settle = min(20_000, int(40 / -math.log(np.abs(np.roots(np.r_[1.0, -np.array(phi)])).max())) + 10)
+    return signal.lfilter([1.0], np.r_[1.0, -np.array(phi)], rng.normal(size=n + settle))[settle:]
+
+
+def coefficients(runs: int) -> None:
+    for name, phi in MODELS.items():
+        for n in (1000, 10_000, 100_000, 1_000_000):
+            rng = np.random.default_rng(n)
+            held = {"burg": np.zeros(len(phi)), "yule-walker": np.zeros(len(phi))}
+            for _ in range(runs):
+                x = record(phi, n, rng)
+                for method, count in held.items():
+                    fit = fit_ar(x, 1.0, len(phi), method)  # type: ignore[arg-type]
+                    count += (fit.low <= phi) & (phi <= fit.high)
+            each = {m: " ".join(f"{v / runs:.3f}" for v in c) for m, c in held.items()}
+            print(f"{name}, {n} samples: Burg {each['burg']}; Yule-Walker {each['yule-walker']}", flush=True)
+
+
+def times(runs: int) -> None:
+    for n in (1000, 10_000, 100_000, 1_000_000):
+        for tau in (20.0, n / 20.0):
+            rng = np.random.default_rng(n + 1)
+            phi = math.exp(-1 / tau)
+            held = 0
+            for _ in range(runs):
+                x = rng.normal(size=n)
+                x[0] /= math.sqrt(1 - phi * phi)  # stationary from the first value on
+                found = gauss_markov(signal.lfilter([1.0], [1.0, -phi], x), 1.0, white=False)
+                held += found.low <= tau <= found.high
+            print(f"correlation time {tau:g} of {n} samples alone: {held / runs:.3f}", flush=True)
+    for n, few in ((1000, runs), (10_000, runs), (100_000, runs // 10)):
+        rng, phi = np.random.default_rng(n + 2), math.exp(-1 / 20)
+        held = 0
+        for _ in range(few):
+            x = record((phi,), n, rng)
+            found = gauss_markov(x + rng.normal(size=n) / math.sqrt(1 - phi * phi), 1.0)
+            held += found.low <= 20.0 <= found.high
+        print(f"correlation time 20 of {n} samples under white noise: {held / few:.3f} of {few}", flush=True)
+
+
+def alarms(runs: int) -> None:
+    for n in (1000, 5000, 50_000):
+        rng = np.random.default_rng(n + 3)
+        seen = dict.fromkeys(
+            ("white", "Gauss-Markov", "random walk", "differenced white", "AR(2)", "white on a walk"), 0
+        )
+        for _ in range(runs):
+            w = rng.normal(size=n)
+            for name, x in {
+                "white": w,
+                "Gauss-Markov": signal.lfilter([1.0], [1.0, -0.95], w),
+                "random walk": np.cumsum(w),
+                "differenced white": np.diff(w),
+                "AR(2)": signal.lfilter([1.0], [1.0, -1.2, 0.5], w),
+                "white on a walk": 0.01 * np.cumsum(w) + rng.normal(size=n),
+            }.items():
+                seen[name] += bool(find_lines(x, 1.0, 0.05).lines)
+        print(f"lines in {n} samples without: " + ", ".join(f"{k} {v / runs:.3f}" for k, v in seen.items()), flush=True)
+
+
+if __name__ == "__main__":
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    coefficients(runs)
+    times(runs)
+    alarms(runs)
