@@ -214,8 +214,8 @@ def test_arma_is_that_of_statsmodels_and_its_intervals_that_of_the_information()
 
 def test_theory_of_a_model() -> None:
     """phi = (1.2, -0.5), theta_Hu = (0.4, -0.3, 0.2), variance 1.7: lambda_K = s^2 sum psi_j psi_{j+K} (4-106), the
-    recursion beyond q (4-126) with lambda_xa(-j) = s^2 psi_j below (4-124), the spectrum as |psi|^2 (4-109), MA (4-121);
-    psi_j = sum K_i G_i^j of an AR.
+    recursion beyond q (4-126) with lambda_xa(-j) = s^2 psi_j below (4-124), the spectrum as |psi|^2 (4-109), MA
+    (4-121); psi_j = sum K_i G_i^j of an AR.
     """
     phi, theta, v = np.array([1.2, -0.5]), -np.array([0.4, -0.3, 0.2]), 1.7
     none = np.zeros(0)

@@ -56,7 +56,7 @@ def from_coefficients(values: Sequence[float], convention: Literal["phi", "a"]) 
 
 @dataclass(frozen=True)
 class Mode:
-    """One root G of the model: psi_j = sum K G^j, decaying within ``tau`` s, at ``frequency`` Hz (0: without turning)."""
+    """One root G of the model: psi_j = sum K G^j, decay time ``tau`` s, ``frequency`` Hz (0: without turning)."""
 
     tau: float
     frequency: float
@@ -66,8 +66,8 @@ class Mode:
 def modes(phi: Sequence[float], dt: float) -> tuple[Mode, ...]:
     """Return the modes of an autoregression, slowest first; of a conjugate pair the one of positive frequency.
 
-    K_i = 1/prod_{j != i}(1 - G_j/G_i) holds for distinct roots only.  Raises SeriesError for equal ones, for a zero root
-    (last coefficient 0) and for a model that is not stationary.
+    K_i = 1/prod_{j != i}(1 - G_j/G_i) holds for distinct roots only.  Raises SeriesError for equal ones, for a zero
+    root (last coefficient 0) and for a model that is not stationary.
     """
     dt, G = checked_step(dt), np.roots(np.concatenate([[1.0], -np.asarray(phi, dtype=float)]))
     if np.abs(G).max(initial=0.0) >= 1.0 or np.abs(G).min(initial=1.0) == 0.0 or G.size != len(phi):
