@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Discrete, Output, sampled
+from gyrobench.component.blocks.angle import wrapped
 from gyrobench.component.blocks.attitude import (
     AttitudeEstimator,
     SensorNoise,
@@ -8,7 +9,6 @@ from gyrobench.component.blocks.attitude import (
     matrix_of,
     quaternion_of,
     turned,
-    wrapped,
 )
 from gyrobench.component.math import Number, Vector, cos, cross, exp, sin, vector
 

@@ -50,15 +50,15 @@ def from_record(record: Record, specification: Specification | None = None) -> L
               drift[half], "°/h", DPH)  # fmt: skip
     tests = consistency(found, np.column_stack([errors, drift]), rows)
     found.tables.append(_phases(found, errors, drift))
-    found.responses += _figures(c, errors, drift)
+    found.responses += _figures(c, errors, drift, rows)
     name = record.run.parts["estimator"].name if "estimator" in record.run.parts else ""
     result = found.result(
         title="Attitude estimation on a moving base",
         method="Estimated attitude and gyro biases against the true ones, in rest, rocking, acceleration and turn",
         sources=["EST-ATTITUDE; Mahony 2008; Markley 2014, chapter 6",
                  "GYRO-STATIC-ERR, GYRO-DYNAMIC-ERR; Xia 2008, section 2.2.2, corrected by EX4, EX5"],
-        equation='dot(bold(d)) = -bold(omega) times bold(d) - delta bold(b) - bold(n), quad '
-        'bold(C)_"true" = (1 - [bold(d) times]) hat(bold(C)), quad "NEES" = bold(e)^T bold(P)^(-1) bold(e)\\/6',
+        equation='bold(C)_"true" = (1 - [bold(d) times]) hat(bold(C)), quad bold(f) = g bold(C) bold(u) + bold(v), '
+        'quad bold(omega) = bold(omega)_"true" + bold(b) + bold(n), quad "NEES" = bold(e)^T bold(P)^(-1) bold(e)\\/6',
         conventions=[
             "C takes east, north, up to vehicle axes (x right, y forward, z up); heading counter-clockwise from above.",
             "Error: the rotation vector d by which the vehicle is turned from the estimated to the true attitude.",
@@ -72,6 +72,8 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         specification=specification,
     )  # fmt: skip
     result.tests = tests
+    result.residual_std = math.sqrt(float(np.mean(np.sum(errors[measured] ** 2, axis=1)))) / DEG
+    result.residual_unit, result.dof = "°", float(measured.size)
     result.summary = told(
         result.coefficients,
         f"{name or 'The estimator'}: attitude to {{attitude}} (rms) over all phases.",
@@ -199,25 +201,25 @@ def _phases(found: LoopFindings, errors: Array, drift: Array) -> dict[str, Any]:
     }
 
 
-def _figures(c: Mapping[str, Array], errors: Array, drift: Array) -> list[Response]:
+def _figures(c: Mapping[str, Array], errors: Array, drift: Array, calm: NDArray[np.int_]) -> list[Response]:
+    """Errors of attitude and biases; that of the attitude without acceleration, where it is small, by itself."""
     t = np.asarray(c["time"], dtype=float)
-    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
-    x = t[pick].tolist()
-
-    def curves(values: Array, scale: float, stated: int) -> list[dict[str, Any]]:
-        lines = {f"about {a}": values[:, k] for k, a in enumerate("xyz")}
+    whole = np.arange(t.size)
+    figures = [("attitude", "Error of the attitude: rotation vector in vehicle axes", errors, DEG, "°", 1, whole)]
+    if calm.size:
+        words = f"Error of the attitude in {' and '.join(CALM)}, without acceleration"
+        figures.append(("attitude, calm", words, errors, DEG, "°", 1, calm))
+    figures.append(("bias", "Error of the estimated gyro biases", drift, DPH, "°/h", 4, whole))
+    made = []
+    for name, caption, values, scale, unit, stated, rows in figures:
+        pick = rows[np.unique(np.linspace(0, rows.size - 1, min(SHOWN, rows.size)).astype(int))]
+        lines = {f"about {a}": values[pick, k] for k, a in enumerate("xyz")}
         key = f"estimator.covariance[{stated},{stated}]"
         if key in c and np.any(c[key] > 0.0):
-            lines |= {"2σ stated, x": 2.0 * np.sqrt(c[key])}
-        return [
-            {"label": n, "x": x, "y": (np.asarray(y)[pick] / scale).tolist(), "phase": []} for n, y in lines.items()
-        ]
-
-    size = np.sqrt(np.sum(errors**2, axis=1))
-    return [
-        Response("attitude", "time", "Error of the attitude: rotation vector in vehicle axes, and twice the standard "
-                 "deviation stated for x.", x, "time", "s", (size[pick] / DEG).tolist(), "error", "°",
-                 curves=curves(errors, DEG, 1)),
-        Response("bias", "time", "Error of the estimated gyro biases, and twice the standard deviation stated for x.",
-                 x, "time", "s", (drift[pick, 0] / DPH).tolist(), "error", "°/h", curves=curves(drift, DPH, 4)),
-    ]  # fmt: skip
+            sigma = 2.0 * np.sqrt(c[key][pick])
+            lines |= {"+2σ stated, x": sigma, "−2σ stated, x": -sigma}
+            caption += "; twice the standard deviation stated for x"
+        x = t[pick].tolist()
+        curves = [{"label": n, "x": x, "y": (y / scale).tolist(), "phase": []} for n, y in lines.items()]
+        made.append(Response(name, "time", f"{caption}.", x, "time", "s", curves[0]["y"], "error", unit, curves=curves))
+    return made

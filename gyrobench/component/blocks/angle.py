@@ -16,6 +16,11 @@ def nearest(x: Number) -> Number:
     return floor(x + 0.5)
 
 
+def wrapped(x: Number) -> Number:
+    """Return an angle within -pi and pi."""
+    return x - TWO_PI * floor((x + 0.5 * TWO_PI) / TWO_PI)
+
+
 def carried(fine: Number, coarse: Number, step: Number, counts: Number, cycles: Number) -> Number:
     """Return the angle in fine counts, of one turn, from a fine count and a coarse one.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block, sampled
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter
-from gyrobench.component.math import Number, Vector, asin, atan2, clip, cos, fabs, floor, pi, sin, sqrt, vector
+from gyrobench.component.math import Number, Vector, asin, atan2, clip, cos, fabs, pi, sin, sqrt, vector
 
 ZEROS = [0.0, 0.0, 0.0]
 
@@ -68,11 +68,6 @@ def turned(q: Vector, v: Vector) -> Vector:
         ]
     )
     return vector(made / sqrt(made @ made))
-
-
-def wrapped(x: Number) -> Number:
-    """Return an angle within -pi and pi."""
-    return x - 2.0 * pi * floor((x + pi) / (2.0 * pi))
 
 
 class AttitudeEstimator(Component):
