@@ -247,6 +247,15 @@ def reduce(
     spec: Spec = None,
     strict: Strict = False,
     no_report: NoReport = False,
+    fit_to: Annotated[
+        str | None,
+        typer.Option(
+            "--fit-to",
+            metavar="PART",
+            help="drift_record: write the noise of the record as values of a gyro of the bench (floated_gyro), a file "
+            "for --set @FILE.",
+        ),
+    ] = None,
     out: Out = None,
     force: Force = False,
     as_json: Json = False,
@@ -271,7 +280,7 @@ def reduce(
         echo(empty_record(test).rstrip("\n"))
         return
     formats = ("json",) if no_report else FORMATS
-    verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats)
+    verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats, fit_to)
     exit_on_fail(verdict, strict)
 
 

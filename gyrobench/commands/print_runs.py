@@ -51,23 +51,37 @@ def reduce(
     force: bool = False,
     as_json: bool = False,
     formats: Sequence[str] = FORMATS,
+    fit_to: str | None = None,
 ) -> str:
-    """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict."""
+    """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict.
+
+    fit_to: gyro of the bench that is to have the noise of the record.
+    """
     if isinstance(test, Suite):
         from gyrobench.workflow.suite_report import reduce_runs
 
+        if fit_to:
+            raise UsageError(f"--fit-to {fit_to}: {test.name} is a suite; only drift_record gives noise coefficients")
         if not data:
             raise UsageError(f"no runs named; gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
         return _print_outcome(reduce_runs(test, data, spec, out, force, formats), as_json)
+    from gyrobench.workflow.gyro_values import channels_of, write_gyro_values
     from gyrobench.workflow.measured_run import reduce_measured
 
     if not data:
         raise UsageError(f"no record named; gyrobench reduce {test.name} --data FILE.csv (--template prints its form)")
     if len(data) > 1:
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
+    if fit_to:
+        channels_of(fit_to)  # refuses another part before the work
     outcome = reduce_measured(test, data[0], values, spec, out, force, formats=formats, feedback=FEEDBACK)
-    return _print_outcome(outcome, as_json)
+    verdict = _print_outcome(outcome, as_json)
+    if fit_to and outcome.result is not None and outcome.folder is not None:
+        file = outcome.folder / f"{fit_to}.toml"
+        write_gyro_values(outcome.result, outcome.record, fit_to, file)
+        console.print_note(f"noise of the record for {fit_to}: {display_path(file)}; gyrobench run SYSTEM --set @FILE")
+    return verdict
 
 
 def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:
