@@ -1,0 +1,119 @@
+"""Noise of a record into a simulated gyro and back: the file of values, and the gyro that runs with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gyrobench.bench import UsageError
+from gyrobench.commands.arguments import read_settings
+from gyrobench.engine.session import Session
+from gyrobench.reduction.noise_coefficients_table import TERMS
+from gyrobench.reduction.series.deviations import deviations
+from gyrobench.reduction.series.gyro_noise import gyro_noise
+from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.result import Coefficient
+from gyrobench.system.system import load_system
+from gyrobench.workflow.gyro_values import write_gyro_values
+
+Array = NDArray[np.float64]
+DPH = math.pi / 648000.0
+SAMPLES = 1500  # of 1 s
+#: deg/h and s
+TRUE = {"N": 0.012, "B": 0.006, "K": 3e-4, "Q": 0.02}
+PARAMETERS = {"N": "white", "B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
+
+
+def measured(rng: np.random.Generator) -> Array:
+    """Return a rate in rad/s, from the equations: flicker by its spectrum, over a record 8 times as long."""
+    m = 8 * SAMPLES
+    f = np.fft.rfftfreq(m)
+    density = np.concatenate([[0.0], 1.0 / (2.0 * math.pi * f[1:])])
+    spectrum = np.sqrt(density * m / 2.0) * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size))
+    flicker = np.fft.irfft(spectrum, m)[:SAMPLES]
+    walk = np.cumsum(rng.normal(size=SAMPLES))
+    angle = np.diff(rng.normal(size=SAMPLES + 1))
+    rate = TRUE["N"] * rng.normal(size=SAMPLES) + TRUE["B"] * flicker + TRUE["K"] * walk + TRUE["Q"] * angle
+    out: Array = DPH * rate
+    return out
+
+
+def reported(noise: NoiseCoefficients, column: str = "") -> list[Coefficient]:
+    """Return the coefficients as the report of a drift record has them."""
+    found = []
+    for term, (unit, si, meaning) in TERMS.items():
+        e: Estimate = getattr(noise, term)
+        name, interval = f"{term} {column}".strip(), (e.low / si, e.high / si)
+        if e.determined:
+            found.append(Coefficient(name, meaning, unit, e.value / si, 0.0, 2.0, interval))
+        else:
+            found.append(Coefficient(name, meaning, unit, math.nan, math.nan, 2.0, interval, no_value="not determined"))
+    return found
+
+
+def written(path: Path, coefficients: list[Coefficient], part: str = "floated_gyro") -> Mapping[str, str]:
+    t = np.arange(float(SAMPLES))
+    run = SimpleNamespace(data=SimpleNamespace(file="gyro 7.csv"), series=None)
+    record: Any = SimpleNamespace(windows={"t_start": t, "t_end": t + 1.0}, run=run)
+    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients)
+    write_gyro_values(result, record, part, path)
+    return read_settings(path)
+
+
+def test_record_gyro_record(tmp_path: Path) -> None:
+    """The values that the gyro was given lie in the intervals of its record, and the Allan deviations agree."""
+    rate = measured(np.random.default_rng(2))
+    first = fit(rate, 1.0)
+    values = written(tmp_path / "floated_gyro.toml", reported(first))
+    system = load_system("fixed_position").with_values({"readings": SAMPLES, "dwell": SAMPLES})
+    with Session(system) as session:
+        record = session.run({**values, "rebalance.meter": 0.0}, seed=4)
+    given = record.run.parameters
+    simulated = -float(given["gyro.k"]) * np.asarray(record.windows["mean"], dtype=float)
+    again = fit(simulated, 1.0)
+    for name, parameter in PARAMETERS.items():
+        e, true = getattr(again, name), float(given[f"gyro.{parameter}"])
+        assert e.low <= true <= e.high, name
+        found = getattr(first, name)
+        assert true == pytest.approx(found.value * found.determined, rel=1e-12), name
+    assert again.B.determined and again.Q.determined
+    was, now = (deviations(x, 1.0, ("allan",))["allan"] for x in (rate, simulated))
+    assert now.deviation[:6] / was.deviation[:6] == pytest.approx(1.0, abs=0.12)  # to 32 s; 0.05 here
+
+
+def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
+    """N alone is known: the others are 0, Gauss-Markov drift and pickoff noise too; flicker lasts for the record."""
+    none, some = Estimate(0.0, 0.0, 1e-7, False), Estimate(2e-7, 1e-7, 3e-7, True)
+    noise = NoiseCoefficients(some, none, none, none, none)
+    expected = {"white": 2e-7, "flicker_tau": 1e5, "quantization_tau": 0.2, **dict.fromkeys(
+        ("flicker", "walk", "ramp", "quantization", "markov", "pickoff"), 0.0)}  # fmt: skip
+    assert gyro_noise(noise, 1.0, 1500.0) == expected
+    assert gyro_noise(noise, 10.0, 1e6) == {**expected, "flicker_tau": 1e6, "quantization_tau": 2.0}
+    text = written(tmp_path / "v.toml", reported(noise))
+    assert {n.removeprefix("gyro."): float(x) for n, x in text.items()} == pytest.approx(expected, rel=1e-12)
+    assert "# Noise of gyro 7.csv (1500 s)" in (tmp_path / "v.toml").read_text()
+
+
+def test_channels(tmp_path: Path) -> None:
+    """A gyro with two channels takes one column for both, or two in their order; one with one channel takes one."""
+    none = Estimate(0.0, 0.0, 1e-7, False)
+    a, b = (NoiseCoefficients(Estimate(x, 0.5 * x, 2.0 * x, True), none, none, none, none) for x in (1e-7, 3e-7))
+    both = written(tmp_path / "v.toml", reported(a, "p") + reported(b, "q"), "gyro_2dof")
+    assert [float(both[f"gyro.white_{c}"]) for c in "xy"] == pytest.approx([1e-7, 3e-7])
+    assert {"gyro.flicker_tau", "gyro.quantization_tau", "gyro.markov_y"} <= set(both)
+    one = written(tmp_path / "v.toml", reported(a), "gyro_2dof")
+    assert one["gyro.white_x"] == one["gyro.white_y"]
+    load_system("eight_position").with_values(both)
+    with pytest.raises(UsageError, match=r"columns p, q; floated_gyro has 1 channel: choose by --set channel=NAME"):
+        written(tmp_path / "v.toml", reported(a, "p") + reported(b, "q"))
+    with pytest.raises(UsageError, match="--fit-to site: it has no parameters white, flicker"):
+        written(tmp_path / "v.toml", reported(a), "site")
+    with pytest.raises(UsageError, match=r"drift_record gives no coefficients N, B, K, R, Q"):
+        written(tmp_path / "v.toml", reported(a)[:2])
