@@ -62,9 +62,7 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
     """
     channels, columns = channels_of(part), columns_of(result)
     if not columns:
-        raise UsageError(
-            f"--fit-to {part}: {result.system} gives no noise coefficients N, B, K, R, Q; drift_record does"
-        )
+        raise UsageError(f"--fit-to {part}: {result.system} gives no coefficients N, B, K, R, Q; drift_record does")
     if len(columns) > len(channels):
         raise UsageError(
             f"--fit-to {part}: the record has the columns {', '.join(columns)}; {part} has {len(channels)} "
