@@ -317,6 +317,30 @@ def test_correlation_time_of_a_day() -> None:
     assert np.median([m.density for m in mixed]) == pytest.approx(10.0, rel=0.1)  # sqrt(dt)
 
 
+def test_correlation_time_of_means() -> None:
+    """tau = 2.5 averaging times, from 40 instants in each: exact covariances of means (dense), intervals hold; taken as
+    instants the same records give a third too much.
+    """
+    from gyrobench.reduction.estimation.noise import process_covariance
+    from gyrobench.reduction.series.gauss_markov import _Likelihood
+
+    y = np.cumsum(np.random.default_rng(21).normal(size=30))
+    edges = np.arange(31.0)
+    W, one = np.linalg.inv(process_covariance(edges[:-1], edges[1:], 2.5)), np.ones(30)
+    rest = y @ W @ y - (one @ W @ y) ** 2 / (one @ W @ one)
+    dense = 0.5 * (np.linalg.slogdet(W)[1] - math.log(one @ W @ one) - 29 * math.log(rest))
+    value, variance, reading = _Likelihood(y, False, True).best(math.log(2.5))
+    assert (value, variance, reading) == (pytest.approx(dense, rel=1e-10), pytest.approx(rest / 29, rel=1e-9), 0.0)
+    rng = np.random.default_rng(22)
+    phi = math.exp(-1 / 100)
+    records = [autoregressive(phi, 40 * 1500, rng).reshape(-1, 40).mean(axis=1) for _ in range(40)]
+    found = [gauss_markov(x, 1.0, white=False, means=True) for x in records]
+    assert sum(m.low <= 2.5 <= m.high for m in found) >= 35
+    assert np.median([m.tau for m in found]) == pytest.approx(2.5, rel=0.05)
+    assert np.median([m.sigma for m in found]) == pytest.approx(1 / math.sqrt(1 - phi**2), rel=0.05)
+    assert np.median([gauss_markov(x, 1.0, white=False).tau for x in records]) > 1.2 * 2.5
+
+
 def test_what_a_record_cannot_say_of_its_correlation_time() -> None:
     rng = np.random.default_rng(17)
     white = gauss_markov(rng.normal(size=1000), 1.0)

@@ -10,8 +10,10 @@
 
 Block means: models have at most MODEL_SAMPLES values; of a longer record (or with ``model_dt``) they describe means
 over ``model.factor`` samples, an interval of ``model.model_dt`` s, and faster correlation is not in them (the
-spectrum has it). Every part is a function of its own in this room; a part that the record does not allow is None with
-the reason in ``refused``.  A record of 10^7 samples takes some 30 s, the fits of the models 10 s of it.
+spectrum has it).  Every part is a function of its own in this room; a part that the record does not allow is None with
+the reason in ``refused``.  Samples count as means over ``dt`` (rates from angles, averaging converters), which matters
+only where the correlation time is a few of them.  Intervals of the autoregression hold for its order as given.  A
+record of 10^7 samples takes some 30 s, the fits of the models 10 s of it.
 [DRIFT-STATS-RUNS, -TREND, DRIFT-DIFF, DRIFT-PERIODIC, DRIFT-NORMALITY, DRIFT-ACF-PACF, DRIFT-AR-YW, -BURG, RED-ARMA,
 DRIFT-ARIMA310, DRIFT-ORDER, DRIFT-WHITENESS-LB]
 """
@@ -137,10 +139,13 @@ def describe(
     burg = part("burg", lambda: fit_ar(y, step, order))
     walker = part("yule_walker", lambda: fit_ar(y, step, order, "yule-walker"))
     arma, ma = part("arma", lambda: fit_arma(y, 1, 1)), part("ma", lambda: fit_arma(y, 0, 1))
-    arima, drift = part("arima", lambda: arima310(y, step)), part("gauss_markov", lambda: markov.gauss_markov(y, step))
+    arima, drift = (
+        part("arima", lambda: arima310(y, step)),
+        part("gauss_markov", lambda: markov.gauss_markov(y, step, means=True)),
+    )
     whiteness = _whiteness(part, y, burg, arma)
     recommended, why = _recommend(whiteness, table, burg, arma, arima, root, drift)
-    sentences = [*why, *_limits(x.size, factor, step, lines, drift, burg, whole[1])]
+    sentences = [*why, *_limits(x.size, factor, step, lines, drift, burg, whole[1], whiteness.get("arma"))]
     if detrended:
         sentences.append("The slope is significant; it was taken off before the models were fitted.")
     return DriftModel(
@@ -195,7 +200,7 @@ def _recommend(
 
 def _limits(
     n: int, factor: int, step: float, lines: Lines, drift: GaussMarkov | None, burg: Autoregression | None,
-    normal: Normality | None,
+    normal: Normality | None, mixed: LjungBox | None,
 ) -> list[str]:  # fmt: skip
     out = []
     if factor > 1:
@@ -207,6 +212,11 @@ def _limits(
         out.append(f"{len(lines.lines)} lines were removed; there may be more.")
     if drift is not None and (limit := markov.check_length(drift)):
         out.append(f"Correlation time: {limit}.")
+    elif drift is not None and mixed is not None and not mixed.white:
+        out.append(
+            "The residuals of ARMA(1,1) are not white: a Gauss-Markov drift with white noise does not describe the "
+            "record, and its correlation time and interval are those of the nearest one."
+        )
     if burg is not None and not burg.long_enough:
         out.append(
             f"The record has {burg.times:.3g} correlation times of the autoregression; its intervals need 20 and may "

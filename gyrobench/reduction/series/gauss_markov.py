@@ -5,8 +5,8 @@
 The likelihood is exact (tridiagonal factors) and restricted: the mean m is integrated out, which takes away the bias
 of phi = exp(-dt/tau) that the mean causes.  The interval of tau is that of the likelihood ratio, 3.84, at the best
 share of white noise for every tau: it is unsymmetric, and open above where the record is too short.  Samples are
-taken as instants; of block means tau must be several blocks. Without a correlated part (likelihood gain below 3
-against white noise) tau is not determined.
+instants or means over dt, exactly.  Without a correlated part (likelihood gain below 3 against white noise) tau is
+not determined.
 [RED-ARMA, DRIFT-RANDOM-CLASSES; Hu 1981, eq. 4-102..4-126; restricted likelihood: own derivation]
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 from scipy import optimize
 from scipy.linalg import lapack
 
+from gyrobench.reduction.estimation import noise
 from gyrobench.reduction.series.checks import NORMAL, Array, checked, checked_step
 
 GAIN = 3.0  # of log likelihood against white noise, for two more parameters
@@ -54,8 +55,8 @@ class GaussMarkov:
 class _Likelihood:
     """Restricted log likelihood with the scale taken out."""
 
-    def __init__(self, y: Array, white: bool) -> None:
-        self.y, self.n, self.white = y, y.size, white
+    def __init__(self, y: Array, white: bool, means: bool = False) -> None:
+        self.y, self.n, self.white, self.means = y, y.size, white, means
         self.both = np.asfortranarray(np.column_stack([y, np.ones(y.size)]))
         inner = y[1:-1]
         self.sums = (
@@ -90,33 +91,45 @@ class _Likelihood:
         rest = float(square - cross * cross / ones)
         return -0.5 * (log + math.log(float(ones)) + (self.n - 1) * math.log(rest)), rest / (self.n - 1)
 
-    def best(self, phi: float) -> tuple[float, float, float]:
-        """Return the likelihood at the best share of white noise, that share s, the variance of the process."""
-        value, variance = self.alone(phi)
+    def best(self, u: float) -> tuple[float, float, float]:
+        """Return the likelihood at the best share of white noise, the variances of process and white; u = ln(tau/dt).
+
+        Means over dt have the covariances sigma^2 v and sigma^2 a^2 phi^(k-1) (gyrobench.reduction.estimation.noise):
+        those of instants of variance K = sigma^2 a^2/phi with v phi/a^2 - 1 < 0 of K added at lag 0.
+        """
+        r = math.exp(-u)
+        phi, least, unit = math.exp(-r), 0.0, 1.0
+        if self.means:
+            a, v = float(noise.mean_gain(np.array(r))), float(noise.mean_variance(np.array(r)))
+            least, unit = v * phi / a**2 - 1.0, phi / a**2
+            value, variance = self.mixed(phi, least)
+        else:
+            value, variance = self.alone(phi)
         if not self.white:
-            return value, 0.0, variance
+            return value, unit * variance, 0.0
         found = optimize.minimize_scalar(
-            lambda v: -self.mixed(phi, math.exp(v))[0], bounds=WHITE, method="bounded", options={"xatol": 1e-3}
+            lambda v: -self.mixed(phi, least + math.exp(v))[0], bounds=WHITE, method="bounded", options={"xatol": 1e-3}
         )
         if -found.fun <= value:
-            return value, 0.0, variance
-        s = math.exp(found.x)
-        return -float(found.fun), s, self.mixed(phi, s)[1]
+            return value, unit * variance, 0.0
+        share = math.exp(found.x)
+        variance = self.mixed(phi, least + share)[1]
+        return -float(found.fun), unit * variance, share * variance
 
 
-def gauss_markov(x: Any, dt: float, white: bool = True) -> GaussMarkov:
+def gauss_markov(x: Any, dt: float, white: bool = True, means: bool = False) -> GaussMarkov:
     """Return the correlation time of ``x`` (n,) sampled every ``dt`` s; trend and lines must be removed before.
 
-    white: the record may hold white noise too; without, the process alone is fitted, in constant time whatever the
-    length.
+    white: the record may hold white noise too; without it and without ``means`` the time does not grow with the length.
+    means: samples are means over dt (block means, differences of angles), not instants.
     """
     x, dt = checked(x, FEWEST), checked_step(dt)
     n = x.size
     scale = float(x.std())
-    likelihood = _Likelihood((x - x.mean()) / scale, white)
+    likelihood = _Likelihood((x - x.mean()) / scale, white, means)
 
     def profile(u: float) -> float:
-        return likelihood.best(math.exp(-math.exp(-u)))[0]
+        return likelihood.best(u)[0]
 
     low, high = math.log(SHORTEST), math.log(LONGEST * n)
     grid = np.linspace(low, high, max(8, round((high - low) / 0.7)))
@@ -126,12 +139,12 @@ def gauss_markov(x: Any, dt: float, white: bool = True) -> GaussMarkov:
     found = optimize.minimize_scalar(lambda u: -profile(u), bounds=bounds, method="bounded", options={"xatol": 1e-4})
     u, top = (float(found.x), -float(found.fun)) if -found.fun > values[k] else (float(grid[k]), values[k])
     ends = [_crossing(profile, u, top, side) for side in (low, high)]
-    value, s, variance = likelihood.best(math.exp(-math.exp(-u)))
+    value, variance, reading = likelihood.best(u)
     nothing = -0.5 * (math.log(n) + (n - 1) * math.log(float(n)))  # y has unit variance and no mean
     return GaussMarkov(
         dt * math.exp(u), dt * math.exp(ends[0]) if math.isfinite(ends[0]) else 0.0,
         dt * math.exp(ends[1]) if math.isfinite(ends[1]) else math.inf, scale * math.sqrt(variance),
-        scale * math.sqrt(variance * s * dt), value - nothing, n, dt,
+        scale * math.sqrt(reading * dt), value - nothing, n, dt,
     )  # fmt: skip
 
 
