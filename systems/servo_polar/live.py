@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.attitudes import POLAR
+from gyrobench.record.record import Record
+from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import DriftTestResult
 from gyrobench.system.system import OnRequest, Slot
 
 Array = NDArray[np.float64]
 SLOT = "coefficients"
 DPH = units.factor("deg/h")
+LEFT = "Live estimate: coefficients, had the test been left then"
 NAMES = ("A0", "A1", "B1", "A2", "B2")  # mean, cos, sin, cos 2, sin 2
 VALUES, DEVIATIONS = ([f"live_{kind}_{n}" for n in NAMES] for kind in ("value", "sd"))
 MAY_STOP, NIS, CONSISTENT = "live_may_stop", "live_mean_nis", "live_consistent"
@@ -77,6 +81,46 @@ def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: floa
             "columns": ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
             "rows": values,
         },
+    ]
+
+
+def had_it_stopped(
+    record: Record, result: DriftTestResult, reduce: Callable[[Record], DriftTestResult]
+) -> list[dict[str, Any]]:
+    """Return the coefficients of the test beside those of the same record with each mount left when it might have been.
+
+    [] for a record without the live estimate, or where no mount could have been left.
+    """
+    windows, labels = record.windows, {row.phase: row.label for row in record.run.plan if row.mode == "servo"}
+    if MAY_STOP not in windows:
+        return []
+    keep = np.ones(len(windows["phase"]), dtype=bool)
+    for p, label in labels.items():
+        rows = np.flatnonzero(np.asarray(windows["phase"]) == p)
+        stop = stopped(windows, rows) if label in POLAR else None
+        if stop is not None:
+            keep[rows[rows > stop]] = False
+    if keep.all():
+        return []
+    shorter = Record({n: np.asarray(x)[keep] for n, x in windows.items()}, {}, record.run)
+    try:
+        then = {c.name: c for c in reduce(shorter).coefficients}
+    except ReductionError as error:
+        why = "; ".join(error.problems)
+        return [{"title": LEFT, "caption": f"Not estimable: {why}", "columns": ["coefficient"], "rows": []}]
+    both = [
+        [c.name, c.unit, c.estimate, c.u, then[c.name].estimate, then[c.name].u]
+        for c in result.coefficients
+        if c.name in then
+    ]
+    return [
+        {
+            "title": LEFT,
+            "caption": "Reduction of this report over all windows, and over those until each mount could have been "
+            "left; here the noise is estimated from the windows used, there it is told",
+            "columns": ["coefficient", "unit", "whole plan", "u", "left then", "u then"],
+            "rows": both,
+        }
     ]
 
 

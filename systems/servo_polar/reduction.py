@@ -47,6 +47,7 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     """
     result = _examined(record, specification)
     result.tables += noise_coefficients_table(result, record, residual=True)
+    result.tables += live.had_it_stopped(record, result, _examined)
     return result
 
 

@@ -114,6 +114,33 @@ def test_hours_saved_are_those_of_the_record(live: Any) -> None:
     assert any(f"would have saved {total:.1f} h of" in s for s in result.summary)
 
 
+def test_coefficients_had_it_stopped(live: Any) -> None:
+    """Those of the record cut there by hand, beside those of the whole; less is known of every one."""
+    record, result = live
+    w, cut = record.windows, np.ones(record.windows["phase"].size, dtype=bool)
+    for phase in np.unique(w["phase"]):
+        rows = np.flatnonzero((w["phase"] == phase) & (np.max([w[c] for c in COLUMNS[5:]], axis=0) <= 0.002 * DPH))
+        if rows.size:
+            cut[(w["phase"] == phase) & (np.arange(cut.size) > rows[0])] = False
+    part = {n: x[cut] for n, x in w.items() if not n.startswith("live_")}
+    assert part["phase"].size < w["phase"].size - 50
+    expected = {c.name: c for c in load_system(NAME).reduce(type(record)(part, {}, record.run)).coefficients}
+    rows = of(result, "coefficients, had")
+    assert [r["coefficient"] for r in rows] == [c.name for c in result.coefficients] == list(expected)
+    for row, c in zip(rows, result.coefficients, strict=True):
+        assert (row["whole plan"], row["u"]) == (c.estimate, c.u)
+        assert row["left then"] == expected[c.name].estimate and row["u then"] == expected[c.name].u > c.u
+
+
+def test_stopped_too_early_to_be_estimable(live: Any) -> None:
+    """Left after one window (no filter says so): the table says why there is nothing to compare."""
+    record, _ = live
+    windows = {**record.windows, "live_may_stop": np.ones(record.windows["phase"].size)}
+    result = load_system(NAME).reduce(type(record)(windows, {}, record.run))
+    table = next(t for t in result.tables if "had the test been left" in t["title"])
+    assert table["rows"] == [] and "Not estimable: phase 2 (polar S) has 1 windows: at least 8" in table["caption"]
+
+
 def test_what_is_not_reached_is_said(live: Any) -> None:
     """may_stop never set in mount N: nothing is saved there, and the summary names it."""
     record, _ = live
