@@ -5,7 +5,8 @@ from gyrobench.component.math import Number, fabs, floor
 
 MODES = 5
 OFF = [0.0] * MODES
-PRESSURE, RATE, TEMPERATURE, ENCODER, SPEED, TWO = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+PRESSURE, RATE, TEMPERATURE, ENCODER, SPEED, TWO, TACHO = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+REASONS = 7
 
 
 class ModeSupervisor(Component):
@@ -24,16 +25,17 @@ class ModeSupervisor(Component):
         1 pressure of the air below pressure_min           4 encoder lost, modes 2 to 4, which it feeds
         2 rate above rate_max                              5 change of mode above rate_change (bumpless = 0)
         3 temperature above temperature_max                6 two requests at once
+        7 tachometer feedback still on in a mode of drift runs: 2 to 4, or 1 later than capture_max after its begin
 
-    1 to 4 switch a running motor off too, after `confirm` samples in a row, and stay so (`tripped`, time `t_trip`)
-    until no mode is requested and `clear` is given.  6 while running keeps the mode that is on.  Sampled every
-    `period`.
+    1 to 4 and 7 switch a running motor off too, after `confirm` samples in a row, and stay so (`tripped`, time
+    `t_trip`) until no mode is requested and `clear` is given.  6 while running keeps the mode that is on.  Sampled
+    every `period`.
 
     Not modelled: contactors, brake (a table without motor runs out on its bearing), motor current.
     Source: Hu 1981, sections 5.2..5.4, 6.1 (items 1, 6); logic: our own.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     period = Parameter(0.01, "s", "sampling period", above=0.0)
     pressure_min = Parameter(4e5, "Pa", "lowest pressure of the air bearing", above=0.0)
@@ -41,6 +43,7 @@ class ModeSupervisor(Component):
     temperature_max = Parameter(343.15, "K", "largest temperature of the motor", above=0.0)
     rate_change = Parameter(1e-3, "rad/s", "largest rate for a change of mode", above=0.0)
     bumpless = Parameter(False, bool, "1: the mode may be changed at any rate, by presets")
+    capture_max = Parameter(10.0, "s", "longest capture, in which mode 1 has tachometer feedback", min=0.0)
     confirm = Parameter(2, int, "samples in a row until the motor is switched off", min=1, max=100)
 
     request = Input(OFF, "1", "requests of the modes: servo, synchronous rate, position, program, tacho rate")
@@ -48,6 +51,7 @@ class ModeSupervisor(Component):
     rate = Input(0.0, "rad/s", "rate of the table")
     temperature = Input(293.15, "K", "temperature of the motor")
     lost = Input(0.0, "1", "other than 0: the encoder has lost its count")
+    tacho = Input(0.0, "1", "other than 0: feedback of the tachometer is on, beside the error source")
     clear = Input(0.0, "1", "other than 0: a trip is taken back, with no mode requested")
 
     mode = Output("1", "mode that is on, 0: motor off")
@@ -63,7 +67,8 @@ class ModeSupervisor(Component):
     why = Discrete(0.0, "1", "reason")
     trip = Discrete(0.0, "1", "tripped")
     when = Discrete(-1.0, "s", "time of the trip")
-    fails = Discrete([0.0] * 4, "1", "samples in a row in which an interlock was open")
+    begun = Discrete(0.0, "s", "time of the last switch")
+    fails = Discrete([0.0] * REASONS, "1", "samples in a row in which an interlock was open")
     next = Discrete(0.0, "1", "number of the next sample")
 
     def start(self) -> None:
@@ -80,6 +85,9 @@ class ModeSupervisor(Component):
             return TEMPERATURE
         if self.lost != 0.0 and mode >= 2.0 and mode <= 4.0:
             return ENCODER
+        captured = mode == 1.0 and self.on == 1.0 and self.t - self.begun > self.capture_max
+        if self.tacho != 0.0 and (captured or (mode >= 2.0 and mode <= 4.0)):
+            return TACHO
         return 0.0
 
     def follow(self) -> None:
@@ -98,7 +106,7 @@ class ModeSupervisor(Component):
             return
         if self.on != 0.0:
             open_now = self.interlock(self.on)
-            for k in range(4):
+            for k in range(REASONS):
                 self.fails[k] = self.fails[k] + 1.0 if open_now == k + 1.0 else 0.0
                 if self.fails[k] >= self.confirm:
                     self.trip = 1.0
@@ -106,7 +114,7 @@ class ModeSupervisor(Component):
                     self.when = self.t
                     self.on = 0.0
             if self.trip != 0.0:
-                for k in range(4):
+                for k in range(REASONS):
                     self.fails[k] = 0.0
                 return
         if many > 1.0:
@@ -123,6 +131,7 @@ class ModeSupervisor(Component):
             if self.why == 0.0:
                 self.on = wanted
                 self.strobe = 1.0
+                self.begun = self.t
 
     @sampled(every=1)
     def tick(self) -> None:

@@ -35,7 +35,7 @@ TEMPLATE = """\
 # head (angle between the two readings of the scale), quantum (angle of one count): needed, here or by --set.
 #   reference_quantum: of the reference, if it differs.
 # phase: number of the position or rate, from 1.  rate: 0 at a position.  position: of the table, at least 30 all
-#   around, at irregular angles; 0 at a rate.  turned: 1 at positions after the scale was turned, else 0; only in a reversal.
+#   around, at irregular angles; 0 at a rate.  turned: 1 at positions after the scale was turned, else 0.
 # reading, reading_2: of the scale.  reference: of the reference encoder.  t_reading, t_reference: when they were taken,
 #   if not at t_end.
 # gate_..., inverse_...: readouts of the rate by gates of time or by the time of a degree: number of the reading, rate,
@@ -71,8 +71,8 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     w, problems = record.windows, []
     rate, position = w.pop("rate"), w.pop("position")
     turned = w.pop("turned", np.zeros(rate.size)) != 0
-    for of in ("gate", "inverse"):
-        names = [c.name for c in READOUTS if c.name.startswith(of)]
+    for readout in ("gate", "inverse"):
+        names = [c.name for c in READOUTS if c.name.startswith(readout)]
         there = [n for n in names if n in w]
         if there and len(there) < len(names):
             problems.append(

@@ -194,7 +194,7 @@ def _at_rest(s: Setup, w: Mapping[str, Array], at_rest: NDArray[np.bool_], x: Ar
     u = noise / math.sqrt(2.0 * (n - 1))
     closed = None
     if s.pulses is not None and q > 0.0:
-        closed = 2.0 * s.pulses.current / s.pulses.f_q / s.gate * s.k / DPH
+        closed = s.pulses.clocks * s.pulses.current / s.pulses.f_q / s.gate * s.k / DPH
     found = [
         _plain(s, "resolution", f"quantum of a reading of {s.gate:g} s at rest; 0: none", "°/h", q, closed=closed),
         _plain(s, "noise", f"standard deviation of a reading of {s.gate:g} s at rest", "°/h", noise, u),

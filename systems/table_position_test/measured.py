@@ -71,8 +71,9 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
         far = np.flatnonzero(np.abs(x) > FAR[name])
         if far.size:
             problems.append(
-                f"{name}: {far.size} readings are more than {math.degrees(FAR[name]):.2g} deg from the position (first: "
-                f"row {far[0] + 1}); check the unit and that 'second' reads the position, without the angle of the head"
+                f"{name}: {far.size} readings are more than {math.degrees(FAR[name]):.2g} deg from the position "
+                f"(first: row {far[0] + 1}); check the unit, and that 'second' reads the position without the angle of "
+                "the head"
             )
     if 2 * int(system["orders"]) >= int(system["positions"]):
         problems.append(f"orders = {system['orders']}: at most {(int(system['positions']) - 1) // 2} follow")

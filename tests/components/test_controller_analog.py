@@ -126,6 +126,28 @@ def test_tachometer_loop():
     assert spread(fast[-1000:]) == pytest.approx(5e-5, abs=1e-5)
 
 
+def test_example_of_a_tachometer_loop():
+    """ET14: 2.61e4 g.cm.s2 (not g.cm2) are 2.56 kg.m2; 6000 g.cm leave M / (J w_b) = 151 deg/h at 50 Hz, all of 10 ERU.
+
+    The printed 31.6 deg/h would be 21.0 % of 10 ERU, not 21.6 %; it is not what the loop does.
+    """
+    eru = 7.2921159e-5
+    inertia = 2.61e4 * GCM  # 1 g.cm.s2 = 9.80665e-5 kg.m2, as 1 g.cm = 9.80665e-5 N.m
+    assert inertia == pytest.approx(2.56, abs=1e-3)
+    assert 31.6 * DEG / 3600.0 / (10.0 * eru) == pytest.approx(0.210, abs=5e-4)
+    part = started(loop=1, rate_K_p=inertia * 100.0 * math.pi, rate_K_i=0.0, rate_rate_least=0.0)
+    part.rate_command = 20.0 * eru
+    w = 20.0 * eru
+    for k in range(500):  # 0.1 s, 31 time constants of the loop
+        part.tacho = w
+        part.do_step(k * 2e-4, 2e-4)
+        w += 2e-4 * (part.demand - 6000.0 * GCM) / inertia
+    lost = 20.0 * eru - w
+    assert lost / DEG * 3600.0 == pytest.approx(150.9, abs=0.1)
+    assert lost == pytest.approx(6000.0 * GCM / (inertia * 100.0 * math.pi), rel=1e-9)
+    assert lost / (10.0 * eru) == pytest.approx(1.003, abs=1e-3)
+
+
 @pytest.mark.parametrize(("rate", "text"), [(1000.0, "above rate_rate_most"), (0.09, "use the synchronous rate")])
 def test_rates_of_the_tachometer_loop(rate, text):
     part = started(loop=1)

@@ -184,6 +184,29 @@ def test_interlocks_keep_the_motor_off_and_switch_it_off(fault: dict[str, float]
     assert desk.after(1, m2=1, clear=0) == [2, 1, 1, 0, 0]
 
 
+@pytest.mark.parametrize("mode", [2, 3, 4])
+def test_no_drift_run_with_tachometer_feedback(mode: int) -> None:
+    """TABLE-TACHO: it is refused, and a motor that runs is switched off, after two samples in a row."""
+    desk = Desk()
+    assert desk.after(3, tacho=1.0, **{f"m{mode}": 1}) == [0, 0, 0, 7, 0]
+    assert desk.after(1, tacho=0.0)[:3] == [mode, 1, 1]
+    assert desk.after(1, tacho=1.0) == [mode, 1, 0, 0, 0]
+    assert desk.after(1) == [0, 0, 0, 7, 1]
+
+
+def test_servo_mode_has_tachometer_feedback_while_it_captures() -> None:
+    """capture_max 0.045 s: allowed for four samples; the fifth and sixth in a row end it.  Mode 5 has it always."""
+    desk = Desk(capture_max=0.045)
+    desk.after(1)
+    assert desk.after(1, m1=1, tacho=1.0) == [1, 1, 1, 0, 0]
+    assert desk.after(5) == [1, 1, 0, 0, 0]
+    assert desk.after(1) == [0, 0, 0, 7, 1]
+    captured = Desk(capture_max=0.045)
+    captured.after(4, m1=1, tacho=1.0)
+    assert captured.after(50, tacho=0.0)[0] == 1
+    assert Desk().after(3000, m5=1, tacho=1.0)[0] == 5
+
+
 def test_servo_and_tacho_modes_do_not_need_the_encoder() -> None:
     for mode in (1, 5):
         desk = Desk()

@@ -87,6 +87,13 @@ def test_tumble_on_the_table_as_it_is_built() -> None:
     agree("tumble_single_axis", parts, values, errors, 0.05)
 
 
+def test_tumble_with_pulses_on_demand() -> None:
+    """Currents of both signs and length of the pulses; every window has pulses of one sign."""
+    values = {**SHORT, **STILL, **DRIFT, "rebalance.I": 3e-3}
+    errors = {"rebalance.dI_plus": 3e-6, "rebalance.dI_minus": -1e-6, "rebalance.dT": 2e-8}
+    agree("tumble_single_axis", {"rebalance": "rebalance_pulse"}, values, errors, 0.05)
+
+
 def test_tumble_on_two_axes() -> None:
     values = {"dwell": 10.0, "windows": 1, "inner_rate": 0.003, "settle": 3.0}
     errors = {

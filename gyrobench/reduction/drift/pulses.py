@@ -1,17 +1,21 @@
-"""A rebalance that counts pulses of constant current: what errors of its pulses do to the readings.  [REBAL-PWM]
+"""A rebalance that counts pulses of constant current: what errors of its pulses do to the readings.
 
 With d = (n+ - n-)/(n+ + n-), read as the current I d, the mean current of a binary pulse-width loop is
 
     I d + (dI_plus - dI_minus)/2 + d (dI_plus + dI_minus)/2 + (2 I + dI_plus + dI_minus) f_s (dT_1 + dT_2 d + dT_3 d2)
 
 [Hu 1981, eq. 5-74..5-76 with ET18; the product of both errors added], so the drift rate omega_IA - k I d is too large
-by k times what is beside I d.
+by k times what is beside I d.  A loop with pulses on demand has those of one sign alone while the current keeps its
+sign: of the reading x the mean current is
+
+    x + x (dI_plus + dI_minus)/(2 I) + |x| (dI_plus - dI_minus)/(2 I) + x f_q dT        and the product of the errors
+
+[REBAL-PWM, REBAL-PULSE]
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +53,10 @@ class Windows:
 
 @dataclass(frozen=True)
 class Pulses:
-    """Pulse-width rebalance of a run: current (A), data clock, saw (Hz), and the errors that are simulated (A, s)."""
+    """Pulse-width rebalance of a run: current (A), data clock, saw (Hz), and the errors that are simulated (A, s).
+
+    clocks: the resolution of a reading, in clocks of full current.
+    """
 
     current: float
     f_q: float
@@ -57,22 +64,20 @@ class Pulses:
     d_plus: float = 0.0
     d_minus: float = 0.0
     late: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    clocks: float = 2.0
 
     @classmethod
-    def of(cls, run: RunDocument, slot: str = "rebalance") -> Self | None:
-        """Return the pulses of the part in ``slot``; None where it has no saw and no clock."""
+    def of(cls, run: RunDocument, slot: str = "rebalance") -> Pulses | None:
+        """Return the pulses of the part in ``slot``, on demand where it has no saw; None where it has no clock."""
         p = run.parameters
-        if any(f"{slot}.{name}" not in p for name in ("I", "f_q", "f_s")):
+        if any(f"{slot}.{name}" not in p for name in ("I", "f_q")):
             return None
-        late = [float(x) for x in p.get(f"{slot}.dT", (0.0, 0.0, 0.0))]
-        return cls(
-            float(p[f"{slot}.I"]),
-            float(p[f"{slot}.f_q"]),
-            float(p[f"{slot}.f_s"]),
-            float(p.get(f"{slot}.dI_plus", 0.0)),
-            float(p.get(f"{slot}.dI_minus", 0.0)),
-            (late[0], late[1], late[2]),
-        )
+        current, f_q = float(p[f"{slot}.I"]), float(p[f"{slot}.f_q"])
+        plus, minus = (float(p.get(f"{slot}.dI_{sign}", 0.0)) for sign in ("plus", "minus"))
+        late = np.append(np.ravel(p.get(f"{slot}.dT", 0.0)), [0.0, 0.0]).tolist()
+        if f"{slot}.f_s" not in p:
+            return PulsesOnDemand(current, f_q, 0.0, plus, minus, (0.0, late[0], 0.0), clocks=1.0)
+        return cls(current, f_q, float(p[f"{slot}.f_s"]), plus, minus, (late[0], late[1], late[2]))
 
     def effects(
         self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float, loop: str = ""
@@ -88,7 +93,7 @@ class Pulses:
         edge = k * (2.0 * self.current + self.d_plus + self.d_minus) * self.f_s
         square = d**2 + (read.std / self.current) ** 2  # the noise of d is rectified
         asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
-        counts = np.sqrt(np.sum((fit.gain * (2.0 * k * self.current / self.f_q / read.length)) ** 2, axis=1))
+        counts = self._counts(fit, k, read)
         return [
             Effect(asymmetric, u_pulse, "A", 0.5 * k * one, "positive less negative current",
                    simulated=(asymmetry,)),
@@ -102,4 +107,32 @@ class Pulses:
                    simulated=(self.late[2],)),
             Effect(resolution, 12.0**-0.5, "1", None, "two clocks, independent from window to window",
                    values=counts),
+        ]  # fmt: skip
+
+    def _counts(self, fit: Findings, k: float, read: Windows) -> Array:
+        """Return what the resolution, in every window anew, makes of each value."""
+        each = self.clocks * k * self.current / self.f_q / read.length
+        return np.asarray(np.sqrt(np.sum((fit.gain * each) ** 2, axis=1)))
+
+
+class PulsesOnDemand(Pulses):
+    """Rebalance by pulses on demand: one clock long each, late[1] by how much longer (s)."""
+
+    def effects(
+        self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float, loop: str = ""
+    ) -> list[Effect]:
+        """Return the sources with their sensitivities, as those of pulse widths; a window has pulses of one sign."""
+        asymmetric, average, _, growing, _, resolution = sources(loop)
+        d = read.mean / self.current
+        longer = 1.0 + self.f_q * self.late[1]
+        asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
+        return [
+            Effect(asymmetric, u_pulse, "A", 0.5 * k * longer * np.abs(d), "positive less negative current",
+                   simulated=(asymmetry,)),
+            Effect(average, 0.0, "A", k * longer * d, "part of the torquer scale factor",
+                   simulated=(mean,)),
+            Effect(growing, u_switching, "s", k * self.current * self.f_q * d, "length of a pulse",
+                   simulated=(self.late[1],)),
+            Effect(resolution, 6.0**-0.5, "1", None, "a pulse at either end, independent from window to window",
+                   values=self._counts(fit, k, read)),
         ]  # fmt: skip
