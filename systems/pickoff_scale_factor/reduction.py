@@ -240,7 +240,8 @@ def _random_drift_lasts(run: RunDocument, time: float) -> bool:
     """
     noise = run_metadata.truth_of(run, ("turn_on", "markov", "markov_tau", "white")) or {}
     lasts = noise.get("markov_tau", 0.0) > noise_model.LONGEST * time
-    slow = math.hypot(noise.get("turn_on", 0.0), noise.get("markov", 0.0) * lasts)
+    flicker, walk = (float(run.parameters.get(f"gyro.{n}") or 0.0) for n in ("flicker", "walk"))
+    slow = math.hypot(noise.get("turn_on", 0.0), noise.get("markov", 0.0) * lasts, flicker, walk * math.sqrt(time))
     return slow > NEGLIGIBLE * noise.get("white", 0.0) / math.sqrt(time)
 
 

@@ -38,6 +38,7 @@ from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
 from gyrobench.reduction.loops.rides import still
+from gyrobench.reduction.series.gyro_noise import slow_density
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -51,6 +52,17 @@ WRONG = 0.2  # relative: a measured angle that differs more from the computed on
 OUTPUT_AXES = "output axes of the gyros"
 TITLE = "Error budget of the platform, by source"
 GYRO = ("H", "J", "C", "K_sg", "mount")
+NOISE = (
+    "white",
+    "pickoff",
+    "markov",
+    "markov_tau",
+    "flicker",
+    "flicker_tau",
+    "walk",
+    "quantization",
+    "quantization_tau",
+)
 PLATFORM = ("viscous", "k_t", "k_e", "R", "L", "friction", "stiction", "presliding", "I_r", "I_f", "I_a")
 
 
@@ -70,8 +82,7 @@ class Loop:
         p = found.record.run.parameters
         self.platform = {n: np.asarray(p[f"platform.{n}"], float) for n in PLATFORM}
         self.gyros = [{n: np.asarray(p[f"{gyro}.{n}"], float) for n in GYRO} for gyro in GYROS]
-        self.noise = [{n: float(p.get(f"{g}.{n}") or 0.0) for n in ("white", "markov", "markov_tau", "pickoff")}
-                      for g in GYROS]  # fmt: skip
+        self.noise = [{n: float(p.get(f"{g}.{n}") or 0.0) for n in NOISE} for g in GYROS]
 
         self.contact = _stiffness(self.platform) if slides else np.zeros((2, 3))
         self.f_noise = m.grid(LOWEST, 0.5 / model.step, POINTS)
@@ -136,8 +147,7 @@ class Loop:
         total = {"white drift of the gyros": 0.0, "slow drift of the gyros": 0.0, "noise of the pickoffs": 0.0}
         for k, (noise, g) in enumerate(zip(self.noise, self.gyros, strict=True)):
             lag = np.abs(s * (g["J"] / g["C"] * s + 1.0) * g["C"] / (g["K_sg"] * g["H"])) ** 2
-            tau = noise["markov_tau"]
-            slow = 2.0 * noise["markov"] ** 2 * tau / (1.0 + np.abs(s * tau) ** 2)
+            slow = slow_density(noise, f)
             for name, density in zip(total, (noise["white"] ** 2, slow, noise["pickoff"] ** 2 * lag), strict=True):
                 total[name] += 2.0 * float(np.trapezoid(density * ways[:, k], f))
         return {name: math.sqrt(square) for name, square in total.items() if square > 0.0}

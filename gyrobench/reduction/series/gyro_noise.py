@@ -1,9 +1,16 @@
-"""Noise parameters of a gyro of the bench that shows given noise coefficients.  [DRIFT-RANDOM-ALLAN]"""
+"""Noise parameters of a gyro of the bench from noise coefficients, and their spectrum.  [DRIFT-RANDOM-ALLAN]"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
+Array = NDArray[np.float64]
 FLICKER_TAU = 1e5  # s, or the length of the record: flicker ends at 0.46 / tau, below its first frequency
 ANGLE_TAU = 0.2  # of a sample: errors of readings one sample apart are correlated by e^-5 < 1 %
 #: noise of the part that is none of the five terms, or that the record has in them already
@@ -30,3 +37,23 @@ def gyro_noise(noise: NoiseCoefficients, interval: float, duration: float) -> di
         "quantization_tau": ANGLE_TAU * interval,
         **dict.fromkeys(OFF, 0.0),
     }
+
+
+def slow_density(noise: Mapping[str, float], f: Array) -> Array:
+    """Return the two-sided PSD of a gyro's random drift but for its white part, at frequencies f above 0 (Hz).
+
+    noise: parameters of the gyro by name, SI; one that is missing is 0.  A ramp has no PSD.
+    """
+
+    def process(rms: float, tau: float) -> Array:
+        out: Array = 2.0 * rms**2 * tau / (1.0 + (2.0 * math.pi * f * tau) ** 2)
+        return out
+
+    found = process(noise.get("markov", 0.0), noise.get("markov_tau", 0.0))
+    size, longest = noise.get("flicker", 0.0), noise.get("flicker_tau", 0.0)
+    for j in range(12 if size else 0):  # Flicker of gyrobench.component.blocks.random_drift
+        share = math.log(4.0) / math.pi * (4.0 / 3.0 if j in (0, 11) else 1.0)
+        found = found + process(size * math.sqrt(share), longest / 4.0**j)
+    angle = process(noise.get("quantization", 0.0), noise.get("quantization_tau", 0.0))
+    w = 2.0 * math.pi * f
+    return found + (noise.get("walk", 0.0) / w) ** 2 + w**2 * angle
