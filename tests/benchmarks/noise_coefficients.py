@@ -4,10 +4,10 @@
 
 Records are written from the equations, without the reduction's parts: white noise, flicker as a sum of relaxation
 processes whose means over tau0 are exact, means of a Wiener process, a ramp, errors of angles (in half of the records
-where 2 Q is less than a change of the angle, it is rounded to steps of sqrt(12) Q instead).  The length is log-uniform.
-N = 1 if present; the tau where another term equals it is log-uniform: Q 0.3 to n/10 samples, B 1 to 3 n, K 3 to 10 n,
-R n/100 to 3 n; each term is absent from one record in four, so that many are hidden or missing.  tau0 is log-uniform
-from 1 ms to 10 s.
+where the rate changes by more than them from sample to sample, the angle is rounded to steps of sqrt(12) Q instead).
+The length is log-uniform.  N = 1 if present; the tau where another term equals it is log-uniform: Q 0.3 to n/10 samples,
+B 1 to 3 n, K 3 to 10 n, R n/100 to 3 n; each term is absent from one record in four, so that many are hidden or missing.
+tau0 is log-uniform from 1 ms to 10 s.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def record(n: int, truth: dict[str, float], rounded: bool, rng: np.random.Genera
     if truth["K"]:
         step, bridge = truth["K"] * rng.standard_normal((2, n))
         rate += np.cumsum(step) - step / 2.0 + bridge / math.sqrt(12.0)
-    if rounded and 0.0 < truth["Q"] < 0.5 * rate.std():  # else its errors are not independent
+    if rounded and 0.0 < truth["Q"] < 0.35 * np.diff(rate).std():  # else its errors are not independent
         size = math.sqrt(12.0) * truth["Q"]
         angle = np.concatenate([[0.0], np.cumsum(rate)]) / size + rng.random()
         return size * np.diff(np.round(angle))
@@ -84,9 +84,9 @@ def scaled(found: NoiseCoefficients, tau0: float) -> Array:
     return np.array([(e.value * u, e.low * u, e.high * u, e.determined) for e, u in rows])
 
 
-def counts(records: int, seed: int, shortest: float, longest: float) -> tuple[Array, Array, Array, Array]:
-    """Return lengths (m,), truth (m, 5), fit (m, 5, 4) and slopes (m, 5, 4)."""
-    lengths, truths, fits, lines = [], [], [], []
+def counts(records: int, seed: int, shortest: float, longest: float) -> tuple[Array, Array, Array, Array, Array]:
+    """Return lengths (m,), truth (m, 5), fit (m, 5, 4), slopes (m, 5, 4) and p of spectrum and line (m, 2)."""
+    lengths, truths, fits, lines, checks = [], [], [], [], []
     begin = shown = time.monotonic()
     for i in range(records):
         rng = np.random.default_rng([seed, i])
@@ -95,12 +95,15 @@ def counts(records: int, seed: int, shortest: float, longest: float) -> tuple[Ar
         rate = record(n, truth, bool(rng.random() < 0.5), rng)
         lengths.append(n)
         truths.append([truth[name] for name in NAMES])
-        fits.append(scaled(fit(rate, tau0), tau0))
+        found = fit(rate, tau0)
+        assert found.check is not None
+        fits.append(scaled(found, tau0))
+        checks.append([found.check.p, found.check.line_p])
         lines.append(scaled(slopes(deviations(rate, tau0)["allan"]), tau0))
         if time.monotonic() - shown > 30.0:
             shown = time.monotonic()
             print(f"  {i + 1} of {records} records, {shown - begin:.0f} s", flush=True)
-    return np.array(lengths), np.array(truths), np.array(fits), np.array(lines)
+    return np.array(lengths), np.array(truths), np.array(fits), np.array(lines), np.array(checks)
 
 
 def covered(truth: Array, found: Array) -> Array:
@@ -108,7 +111,7 @@ def covered(truth: Array, found: Array) -> Array:
     return (found[..., 1] <= truth) & (truth <= found[..., 2])
 
 
-def table(n: Array, truth: Array, ours: Array, lines: Array) -> None:
+def table(n: Array, truth: Array, ours: Array, lines: Array, checks: Array) -> None:
     """Print coverage, errors and widths."""
     print("95 % intervals: share that hold the truth (term present, absent), share determined (present, absent)")
     print("            all    n<1e4     <1e5     <1e6   present    absent   determined, if absent   slopes  determined")
@@ -135,6 +138,8 @@ def table(n: Array, truth: Array, ours: Array, lines: Array) -> None:
             f"{np.median(wide[:, 1] / wide[:, 0]):.2f} and {np.median(s[both, 2] / s[both, 1]):.2f}, coverage "
             f"{covered(truth[both, j], e[both]).mean():.3f} and {covered(t[both], s[both]).mean():.3f}"
         )
+    shares = ", ".join(f"{a:g}: {np.mean(checks < a, axis=0).round(4).tolist()}" for a in (0.1, 0.01, 0.001))
+    print(f"share of these records with p of the spectrum and of a line below {shares}")
 
 
 if __name__ == "__main__":

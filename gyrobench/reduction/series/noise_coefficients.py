@@ -136,7 +136,7 @@ class _Fit:
             while part > 1e-6:
                 trial = np.maximum(v + part * step, 0.0)
                 value, changed = self.f(trial)
-                if value <= f - 1e-3 * part * gain:
+                if value <= f - 1e-3 * min(part * gain, 1.0):  # from far away the gain is overrated
                     break
                 part *= 0.5
             else:

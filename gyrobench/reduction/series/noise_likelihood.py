@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, special
+from scipy import fft, optimize, special
 
 from gyrobench.reduction.series import noise_spectra
 from gyrobench.reduction.series.long_record import Condensed
@@ -184,16 +184,23 @@ class Likelihood:
         number, ratio = number[used], total[used] / number[used]
         score = (np.cbrt(ratio) - 1.0 + 2.0 / (9.0 * number)) / np.sqrt(2.0 / (9.0 * number))
         p = float(special.chdtrc(max(number.size - np.count_nonzero(v), 1), score @ score))
+        p = 2.0 * min(p, 1.0 - p)  # powers too even are no noise either, but a step or a wild sample
         worst = int(np.argmax(np.abs(score)))
         edge = self.frequency.min() * BAND ** (np.flatnonzero(used)[worst] + np.arange(2.0))
-        tops = self.largest[0] / model[: self.largest.shape[1]]
+        # a single ordinate is measured against what the angles at the ends and the ramp may add, too
+        single = model + (2.0 * v[3] * uu + ramp**2 * rr) / self.count
+        tops = self.largest[0] / single[: self.largest.shape[1]]
         top = int(np.argmax(tops))
         line = -math.expm1(self.count[: tops.size].sum() * math.log1p(-special.erfc(math.sqrt(0.5 * tops[top]))))
         return p, np.append(edge, ratio[worst]), line, float(self.largest[1, top])
 
     def start(self) -> Array:
-        """Return v of which every component alone is half of what the powers of neighbouring bins allow."""
+        """Return v of the least relative squares of the powers of eight neighbouring bins each."""
         first = np.arange(0, self.count.size, 8)
-        level = np.add.reduceat(self.products[0], first) / np.add.reduceat(self.count * self.basis, first, axis=1)
-        out: Array = 0.5 * level.min(axis=1)
+        level = np.add.reduceat(self.products[0], first)
+        level = np.maximum(level, 1e-12 * level.max())
+        share = np.add.reduceat(self.count * self.basis, first, axis=1) / level
+        weight = np.sqrt(np.minimum(np.add.reduceat(self.count, first), 1e4))
+        v, _ = optimize.nnls((share * weight).T, weight)
+        out: Array = np.maximum(v, 0.01 / share.max(axis=1))
         return out
