@@ -5,9 +5,9 @@
 Records are written from the equations, without the reduction's parts: white noise, flicker as a sum of relaxation
 processes whose means over tau0 are exact, means of a Wiener process, a ramp, errors of angles (in half of the records
 where the rate changes by more than them from sample to sample, the angle is rounded to steps of sqrt(12) Q instead).
-The length is log-uniform.  N = 1 if present; the tau where another term equals it is log-uniform: Q 0.3 to n/10 samples,
-B 1 to 3 n, K 3 to 10 n, R n/100 to 3 n; each term is absent from one record in four, so that many are hidden or missing.
-tau0 is log-uniform from 1 ms to 10 s.
+The length is log-uniform.  N = 1 if present; the tau where another term equals it is log-uniform: Q 0.3 to n/10
+samples, B 1 to 3 n, K 3 to 10 n, R n/100 to 3 n; each term is absent from one record in four, so that many are hidden
+or missing.  tau0 is log-uniform from 1 ms to 10 s.
 """
 
 from __future__ import annotations

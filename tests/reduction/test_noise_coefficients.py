@@ -183,3 +183,18 @@ def test_check_of_the_model() -> None:
     drift = lfilter([1.0], [1.0, -math.exp(-1.0 / 50.0)], 0.2 * rng.normal(size=n))  # corner at 0.032 Hz
     bad = fit(x + drift, 0.1).check
     assert bad is not None and bad.p < 1e-6 and 0.002 < bad.band[0] < 0.3
+    step = fit(x[:2000] + np.where(np.arange(2000) > 1000, 100.0, 0.0), 0.1).check
+    assert step is not None and step.p < 0.001  # its powers are as even as no random walk's
+
+
+@pytest.mark.parametrize("shape", ["parabola", "rounded ramp", "random walk", "short"])
+def test_extreme_records_have_coefficients(shape: str) -> None:
+    """Records of ten and more decades of power, or without any at some frequencies: a maximum is found, intervals are
+    finite and hold the estimate.
+    """
+    t, z = np.arange(2000.0), np.random.default_rng(0).normal(size=2000)
+    records = {"parabola": t**2 + z, "rounded ramp": np.diff(np.round(0.618 * t)), "random walk": np.cumsum(z)}
+    found = fit(records.get(shape, z[:40]), 1.0)
+    for name in "NBKRQ":
+        e = getattr(found, name)
+        assert e.low <= e.value <= e.high < 1e5, (name, e)
