@@ -43,7 +43,7 @@ class Coefficient:
     z: float | None = None  # (estimate - truth) / u
     limit: Limit | None = None
     verdict: str = NO_VERDICT  # pass | fail | inconclusive | void | no specification given
-    no_value: str = ""  # why there is none: estimate, u and interval are then NaN
+    no_value: str = ""  # why there is none: estimate and u are then NaN, and the interval where it has no bound
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
 
 
@@ -177,7 +177,7 @@ class Result(Displayed):
 
     def __post_init__(self) -> None:
         if not self.kind:
-            raise TypeError("a result is a DriftTestResult, a LoopResult or a SuiteResult")
+            raise TypeError("a result is a DriftTestResult, a LoopResult, a DriftRecordResult or a SuiteResult")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.system}: {len(self.coefficients)} coefficients, {self.verdict}>"
@@ -252,7 +252,7 @@ class Result(Displayed):
         return {"kind": self.kind, **ABSENT, **asdict(self)}
 
     @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> DriftTestResult | LoopResult | SuiteResult:
+    def from_dict(data: Mapping[str, Any]) -> DriftTestResult | LoopResult | DriftRecordResult | SuiteResult:
         """Return the result of the right kind, the inverse of :meth:`as_dict`.
 
         Without ``kind``, as in older files, its content tells it.  Raises TypeError for an unknown key.
@@ -314,6 +314,36 @@ class LoopResult(Result):
 
 
 @dataclass
+class DriftColumn:
+    """One column of a drift record: what its report draws and tabulates, in printed units.
+
+    record: {"t", "low", "high", "unit_t"}, extremes of the rate.  deviations: {"kind", "tau", "dev", "low", "high"}.
+    model: {"tau", "dev", "f", "S"} of the noise coefficients.  spectrum: {"f", "S", "low", "high"}, one-sided.
+    correlation: {"lag", "rho", "partial", "bound"}.  tables, texts: section of the report -> tables as of a Result,
+    sentences.
+    """
+
+    name: str
+    unit: str  # of the rate
+    record: dict[str, Any]
+    deviations: list[dict[str, Any]]
+    model: dict[str, Any] = field(default_factory=dict)
+    spectrum: dict[str, Any] = field(default_factory=dict)
+    correlation: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    texts: dict[str, list[str]] = field(default_factory=dict)
+
+
+@dataclass(kw_only=True, repr=False)
+class DriftRecordResult(Result):
+    """Noise coefficients of a drift record, for each of its columns, with deviations, spectrum and models."""
+
+    kind: ClassVar[str] = "noise_model"
+
+    columns: list[DriftColumn]
+
+
+@dataclass
 class SuiteComparison:
     """What the methods of a suite say of each other, see gyrobench.reduction.suite.method_comparison."""
 
@@ -339,8 +369,8 @@ class SuiteResult(Result):
     suite: SuiteComparison
 
 
-KINDS: dict[str, type[DriftTestResult | LoopResult | SuiteResult]] = {
-    cls.kind: cls for cls in (DriftTestResult, LoopResult, SuiteResult)
+KINDS: dict[str, type[DriftTestResult | LoopResult | DriftRecordResult | SuiteResult]] = {
+    cls.kind: cls for cls in (DriftTestResult, LoopResult, DriftRecordResult, SuiteResult)
 }
 #: key -> class of its entries
 ENTRIES: dict[str, type] = {
@@ -349,6 +379,7 @@ ENTRIES: dict[str, type] = {
     "series": Series,
     "budget": BudgetLine,
     "responses": Response,
+    "columns": DriftColumn,
 }
 #: what result.json holds under the keys that a kind does not have
 ABSENT: dict[str, Any] = {
@@ -369,4 +400,5 @@ ABSENT: dict[str, Any] = {
     "repeatability": {},
     "responses": [],
     "suite": {},
+    "columns": [],
 }

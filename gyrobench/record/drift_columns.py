@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 Blocks = Iterator[dict[str, Array]]
 TIME, FLAG = "time", "flag"
 ROWS = 1 << 18  # of a block of a Parquet file
+BUFFER = 1 << 20  # bytes of a column read at a time
 RATE, ANGLE, INCREMENT = "rate", "angle", "increment"
 KINDS = {RATE: "rad/s", ANGLE: "rad"}
 SIGNALS = "a drift record holds a rate [deg/h], an angle [arcsec], or another quantity with '# scale = 17.2deg/h/mA'"
@@ -91,7 +92,8 @@ def _of_parquet(source: Path) -> Table:
     import pyarrow.parquet as pq
 
     try:
-        file = pq.ParquetFile(source, memory_map=True)
+        # neither mapped nor read ahead: both keep the whole of a long file in memory
+        file = pq.ParquetFile(source, buffer_size=BUFFER, pre_buffer=False)
     except (pa.ArrowInvalid, OSError) as error:
         raise DataError(source, [f"not a readable Parquet file: {error}"]) from None
     schema = file.schema_arrow

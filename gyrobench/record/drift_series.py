@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 GAP = 1.5  # steps
 CHUNK = 200  # samples whose median step is held against the usual one
 MIXED = 0.1  # of the step: a larger change of it is another sampling rate
+BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
 JUMP = 100.0  # spreads of the increments of an angle
@@ -59,7 +60,7 @@ Observer = Callable[[str, int, Array], None]
 
 @dataclass
 class Acquisition:
-    """What the file says of its acquisition; times in s (resolution: of the values as rate or angle, SI)."""
+    """What the file says of its acquisition; times in s."""
 
     step: float = 0.0
     samples: int = 0
@@ -74,7 +75,6 @@ class Acquisition:
     longest: tuple[float, float] = (0.0, 0.0)  # gap: its beginning and its length
     resets: dict[str, int] = field(default_factory=dict)
     wraps: dict[str, int] = field(default_factory=dict)
-    resolution: dict[str, float] = field(default_factory=dict)  # rad/s or rad, 0: none seen
     stuck: dict[str, int] = field(default_factory=dict)  # samples at the largest or smallest value of the file
 
 
@@ -137,6 +137,7 @@ class DriftReader:
         self.before = math.nan  # time of the last sample
         self.last_other = dict.fromkeys(self.others, math.nan)
         self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
+        self.beginning = {s.name: np.empty(0) for s in signals}  # first values, rad/s or rad, as they are in the file
         self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
 
     def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
@@ -258,8 +259,8 @@ class DriftReader:
     def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
         self._extreme(s, value)
         value = value * s.factor if s.factor != 1.0 else value
-        if not self.about.samples:
-            self.about.resolution[s.name] = _resolution(value)
+        if (kept := self.beginning[s.name]).size < BEGINNING:
+            self.beginning[s.name] = np.append(kept, value[: BEGINNING - kept.size])
         if s.kind == RATE:
             return value
         if s.kind == PER_SAMPLE:
@@ -359,18 +360,6 @@ def _rounding(t: Array, step: float) -> float:
     return 0.0
 
 
-def _resolution(value: Array) -> float:
-    """Return the step of which all differences of the values are multiples; 0 where there is none."""
-    apart = np.diff(np.unique(value[: 1 << 16]))
-    if apart.size < 2:
-        return 0.0
-    q = float(apart.min())
-    size = float(np.max(np.abs(value)))
-    return q if q > 1e-12 * size and np.all(np.abs(apart / q - np.rint(apart / q)) < 0.01) else 0.0
-
-
 def as_dict(about: Acquisition) -> dict[str, Any]:
     """Return what is known of the acquisition, for run.json."""
-    from dataclasses import asdict
-
-    return asdict(about)
+    return {**asdict(about), "longest": list(about.longest)}

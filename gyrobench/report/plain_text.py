@@ -42,7 +42,7 @@ def format_result(result: Result) -> str:
     for c in result.coefficients:
         lo, hi = (write_number(x, c.u).text for x in c.interval)
         estimate = "no value" if c.no_value else write_number(c.estimate, c.u).text
-        row = [c.name, estimate, write_number(c.u, c.u).text, "–" if c.no_value else f"{lo} … {hi}", c.unit]
+        row = [c.name, estimate, write_number(c.u, c.u).text, "–" if lo == hi == "–" else f"{lo} … {hi}", c.unit]
         if truth:
             row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
         rows.append(row + ([c.verdict] if judged else []))

@@ -11,7 +11,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 from gyrobench.report.page_model import Page
 from gyrobench.report.result_json import document
-from gyrobench.result import Result, SuiteResult
+from gyrobench.result import DriftRecordResult, Result, SuiteResult
 
 FORMATS = ("json", "html", "pdf")
 NAMES = {"json": "result.json", "html": "report.html", "pdf": "report.pdf"}
@@ -51,6 +51,10 @@ def write(
             from gyrobench.report import suite_page
 
             return suite_page.page(doc)
+        if isinstance(result, DriftRecordResult):
+            from gyrobench.report import drift_record_page
+
+            return drift_record_page.page(doc)
         from gyrobench.report import result_page
 
         return result_page.page(doc, record)

@@ -30,6 +30,7 @@ from scipy import optimize, special
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.long_record import SHORTEST, Condensed, LongRecord
 from gyrobench.reduction.series.noise_likelihood import Likelihood
+from gyrobench.reduction.series.noise_spectra import folded
 
 Array = NDArray[np.float64]
 STEPS = 100  # of the search for a maximum, at most
@@ -83,6 +84,16 @@ class NoiseCoefficients:
         parts = n * n / tau + 2.0 * math.log(2.0) / math.pi * b * b + k * k * tau / 3.0
         out: Array = np.sqrt(parts + r * r * tau**2 / 2.0 + 3.0 * q * q / tau**2)
         return out
+
+    def spectrum(self, f: Array, tau0: float) -> Array:
+        """Return the two-sided spectrum (k,) of the determined terms for samples that are means over tau0 (s).
+
+        Averaging and aliasing included: 0 < f <= 1/(2 tau0).  The ramp has none.
+        """
+        n, b, k, q = (e.value if e.determined else 0.0 for e in (self.N, self.B, self.K, self.Q))
+        sine = 4.0 * np.sin(np.pi * f * tau0) ** 2
+        out: Array = n * n + b * b * tau0 * folded(f * tau0) + q * q / tau0 * sine
+        return out + (k * tau0) ** 2 * (1.0 - sine / 6.0) / sine
 
 
 @functools.cache

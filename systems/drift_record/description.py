@@ -1,0 +1,226 @@
+"""What the report of a drift record says of a column: tables of each section, sentences, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.record import sampling
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.noise_coefficients_table import TERMS
+from gyrobench.reduction.series.deviations import Deviation
+from gyrobench.reduction.series.noise_coefficients import NoiseCoefficients, slopes
+from gyrobench.reduction.series.quantization import folded
+from gyrobench.report.numbers import write_number, write_p
+
+from .preparation import Prepared
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
+MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
+
+
+def number(x: float, u: float | None = None) -> str:
+    return write_number(x, u, 3).text
+
+
+def table(title: str, caption: str, columns: list[str], rows: list[list[Any]]) -> Json:
+    return {"title": title, "caption": caption, "columns": columns, "rows": rows}
+
+
+def acquisition(p: Prepared, run: RunDocument) -> Json:
+    about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    step = about.get("step", p.step)
+    rows: list[list[Any]] = [
+        ["sampling interval", step, "s"],
+        ["samples", about.get("samples", int(np.count_nonzero(np.isfinite(p.rate)))), "1"],
+        ["length", p.rate.size * p.step / 3600.0, "h"],
+        ["mean rate", float(np.nanmean(p.rate)) / DPH, "°/h"],
+        [f"standard deviation of a {'sample' if p.step == step else 'mean'}", float(np.nanstd(p.rate)) / DPH, "°/h"],
+    ]
+    if run.series:
+        rows[:0], more = _column_rows(p.name, run.series)
+        rows += more
+    if p.averaged > 1:
+        rows.append(["samples in a mean of spectrum and models, because of gaps", p.averaged, "1"])
+    rows.append(["longest stretch without a gap", p.stretch.size * p.stretch_step / 3600.0, "h"])
+    return table("Acquisition", "What was recorded, and what is missing", ["quantity", "value", "unit"], rows)
+
+
+def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]], list[list[Any]]]:
+    about, column = series["acquisition"], series["columns"][name]
+    kind = column["kind"]
+    rows = [["gaps", about["gaps"], "1"], ["samples missing in gaps", about["missing"], "1"]]
+    rows += [["longest gap", about["longest"][1], "s"]] if about["longest"][1] else []
+    rows += [["rows without a value", about["incomplete"], "1"]] if about["incomplete"] else []
+    rows += [["samples flagged", about["flagged"], "1"]] if about["flagged"] else []
+    if kind != "rate":
+        rows.append(["resets of the angle or counter", about["resets"].get(name, 0), "1"])
+        rows.append(["turns or overflows unwrapped", about["wraps"].get(name, 0), "1"])
+    if series["factor"] > 1:
+        rows.append(["samples in a mean that is analysed", series["factor"], "1"])
+    if q := column["resolution"]:
+        si, unit = (DPH, "°/h") if kind == "rate" else (ARCSEC, "″")
+        rows.append(["resolution of the values", q / si, unit])
+    rows.append(["jitter of the time stamps, rms, of a step", 0.0 if about["rounded"] else about["jitter"], "1"])
+    return [["column", f"{name}: {kind} [{column['unit'] or '1'}]", ""]], rows
+
+
+def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
+    """Return what sampling did to the rate."""
+    if run.series is None:
+        return ["A sample is the mean of the current over a window, as an integrating meter reads it."]
+    if run.series["columns"][p.name]["kind"] == "rate":
+        return []
+    return [
+        "The rate is the difference of two angles over the step, which is its mean over the step: a sine of frequency "
+        "f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise coefficients and the "
+        "model curves allow for it."
+    ]
+
+
+def regression(p: Prepared) -> list[Json]:
+    rows = []
+    for r in p.regressions:
+        unit = units.display(r.unit) if r.unit != "1" else "1"
+        rows.append([r.name, r.slope / DPH, r.u / DPH, r.low / DPH, r.high / DPH, f"°/h per {unit}",
+                     "taken out" if r.significant else "not significant, left in"])  # fmt: skip
+    head = ["column", "slope", "u", "95 % from", "95 % to", "unit", "use"]
+    caption = "Slope of the rate over other columns, all at once, under noise estimated from the residuals"
+    return [table("Regression", caption, head, rows)] if rows else []
+
+
+def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Json:
+    """Return the coefficients beside those read from the slopes of the Allan deviation."""
+    read = slopes(allan)
+    rows = []
+    for term, (unit, si, _) in TERMS.items():
+        row: list[Any] = [term, unit]
+        for e in (getattr(noise, term), getattr(read, term)):
+            row += [e.value / si if e.determined else None, e.low / si if e.determined else None, abs(e.high) / si]
+        rows.append(row)
+    head = ["coefficient", "unit", "likelihood", "95 % from", "95 % to", "slopes", "from (slopes)", "to (slopes)"]
+    caption = (
+        "Restricted maximum likelihood, which is reported, beside the reading of the Allan deviation where its "
+        "slope is that of the term; 95 % intervals; without an estimate: below the upper end. The slopes take each "
+        "term as if alone: their intervals need not cover"
+    )
+    return table("Two ways to the coefficients", caption, head, rows)
+
+
+def lines(p: Prepared, removed: bool) -> list[Json]:
+    rows = [
+        [k, x.frequency, x.u_frequency, x.amplitude / DPH, x.u_amplitude / DPH, x.false_alarm]
+        for k, x in enumerate(p.model.lines.lines, 1)
+    ]
+    head = ["line", "frequency / Hz", "u(f) / Hz", "amplitude / (°/h)", "u(A) / (°/h)", "p"]
+    use = "taken out before the noise model" if removed else "left in (remove_lines = false)"
+    caption = f"Sines, {use}; p: probability of a line as clear in a record without any"
+    return [table("Lines", caption, head, rows)] if rows else []
+
+
+def line_texts(p: Prepared) -> list[str]:
+    found = p.model.lines
+    if not found.lines:
+        return [f"No line stands out of the spectrum at a false-alarm probability of {found.level:g} for the record."]
+    return [] if found.complete else ["The search for lines ended at its limit: there may be more."]
+
+
+def misfit_text(noise: NoiseCoefficients) -> str:
+    """Return whether the spectrum is that of the five terms."""
+    check = noise.check
+    if check is None:
+        return ""
+    if check.p > MISFIT and check.line_p > MISFIT:
+        return f"The spectrum is compatible with the noise coefficients (p {_p(check.p)})."
+    if check.p <= MISFIT:
+        low, high = check.band
+        return (
+            f"The spectrum is not that of the five terms (p {_p(check.p)}): between {low:.2g} and {high:.2g} Hz the "
+            f"power is {check.ratio:.2g} times that of the noise coefficients."
+        )
+    return f"An ordinate of the spectrum stands out at {check.line:.4g} Hz (p {_p(check.line_p)}): a line is left."
+
+
+def _p(p: float) -> str:
+    text = write_p(p).text
+    return text if text.startswith("<") else f"= {text}"
+
+
+def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[str]:
+    about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    out = list[str]()
+    if (check := noise.check) is not None and check.p <= MISFIT:
+        out.append(
+            f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
+            "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time."
+        )
+    if about and about["jitter"] > 0.01 and not about["rounded"]:
+        out.append(
+            f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
+            "models take the samples as even. Sample by a clock, or resample."
+        )
+    if about and about["stuck"].get(p.name, 0) > max(10, 1e-4 * about["samples"]):
+        out.append(
+            f"{about['stuck'][p.name]} samples stay at the largest or smallest value of the file: the converter may "
+            "have been at its limit. The coefficients are too small then. Use a larger range."
+        )
+    column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
+    if column and column["kind"] == "rate" and not column["white"]:
+        q = column["resolution"]
+        out.append(
+            f"The values are rounded to {number(q / DPH)} °/h, more than twice the noise of a sample: the error of "
+            "rounding is not white, and N is that of the rounding. Record more digits."
+        )
+    bandwidth = float(run.options.get("bandwidth") or 0.0)
+    means = (run.series or {}).get("samples") == "means"
+    if about and bandwidth and not means and (excess := folded(about["step"], bandwidth)).ratio > 1.0:
+        out.append(
+            f"Point samples every {about['step']:.3g} s of a signal of {bandwidth:.3g} Hz alias: N² is up to "
+            f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means."
+        )
+    elif about and (run.series or {}).get("samples") == "" and not bandwidth and _flat(p, run):
+        out.append(
+            f"The spectrum is flat to half the sampling rate of {1.0 / about['step']:.3g} Hz, as that of point samples "
+            "of a faster signal: if they are points, N holds folded noise. State '# samples = means' or '# bandwidth = "
+            "...Hz'."
+        )
+    return out
+
+
+def _flat(p: Prepared, run: RunDocument) -> bool:
+    if not run.series or run.series["factor"] > 1 or run.series["columns"][p.name]["kind"] != "rate":
+        return False
+    seen = sampling.Successive()
+    seen.add(p.stretch)
+    return seen.independent
+
+
+def conventions(run: RunDocument) -> list[str]:
+    return [
+        "N, B, K, R, Q as in IEEE 952 with S two-sided; N in °/√h is the density in °/h/√Hz over 60. B is flicker "
+        "without cutoff, its floor in the Allan deviation 0.664 B.",
+        "Spectrum figures are one-sided: 2 S.",
+        "Not determined: the 95 % interval of the coefficient holds zero; its upper end is stated.",
+        "Lines and columns whose slope is significant are taken out of the rate before coefficients and deviations.",
+    ]
+
+
+def summary(name: str, noise: NoiseCoefficients, several: bool) -> list[str]:
+    known, lacking = [], []
+    for term, (unit, si, _) in TERMS.items():
+        e = getattr(noise, term)
+        u = (e.high - e.low) / (2.0 * 1.96 * si)
+        if e.determined:
+            low, high = number(e.low / si, u), number(e.high / si, u)
+            known.append(f"{term} = {number(e.value / si, u)} {unit} ({low} to {high})")
+        else:
+            lacking.append(f"{term} (below {number(max(abs(e.low), abs(e.high)) / si)} {unit})")
+    of = f"{name}: " if several else ""
+    out = [f"{of}{'; '.join(known)}; 95 % intervals."] if known else []
+    return out + ([f"{of}The record does not determine {', '.join(lacking)}."] if lacking else [])

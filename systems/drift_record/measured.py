@@ -1,0 +1,122 @@
+"""A laboratory's drift record of any length: rate, angle or counts, CSV or Parquet, or a channel of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.record import sampling
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.drift_columns import find_signals, open_table
+from gyrobench.record.drift_series import DriftReader, Progress, as_dict
+from gyrobench.record.record import Record
+from gyrobench.reduction.series.checks import SeriesError
+from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator
+from gyrobench.reduction.series.quantization import quantization
+from gyrobench.system.lab_record import TEXTS, measured_run
+from gyrobench.system.system import MeasuredData, System
+
+Array = NDArray[np.float64]
+ATTITUDE = "at rest"
+LONG = 1 << 22  # missing samples from which on a deviation does not reach across a gap
+NUMBERS = ("deviation", "low", "high", "edf", "count", "exponent")  # of a deviation
+TEMPLATE = """\
+# Drift record of a gyro at rest: one row a sample, evenly spaced; CSV or Parquet, any number of rows.
+# instrument = type and number of the gyro
+# operator = who took the record
+#
+# time: of the sample; or no such column, and a line '# sampling = 100Hz'.  Rows may be missing: gaps are found.
+# Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], or another quantity and a line
+#   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (their resets are found),
+#   or those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
+# temperature [degC], and columns named by '# regressors = pressure', are taken out by regression.
+# flag: other than 0 where a sample is suspect.  What the samples are: '# samples = means' (each since the one before)
+#   or points, of a signal of '# bandwidth = 14Hz'.
+time [s],rate [deg/h]
+"""
+
+
+def read(system: System, data: Path, values: Mapping[str, str], progress: Progress | None = None) -> Record:
+    """Return the record of a file or a run's folder: windows with the rates in rad/s, gaps as NaN.
+
+    run.series: acquisition, and how many samples a window is the mean of.  Raises DataError and InvalidValueError.
+    """
+    table = open_table(data)
+    said = {**table.head.comments, **values}
+    for name in values:
+        if name not in system.options and name not in (*TEXTS, "samples"):
+            system.set(name, values[name])  # says which options there are
+    for name, value in said.items():
+        if name in system.options:
+            system.set(name, value)
+    if system["counts"] not in ("cumulative", "increments"):
+        raise DataError(data, [f"counts = {system['counts']}: must be 'cumulative' or 'increments'"])
+    try:
+        kind, _ = sampling.stated({k: v for k, v in said.items() if k == "samples"})
+    except ValueError as error:
+        raise DataError(data, [str(error)]) from None
+    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
+    reader = DriftReader(table, signals, system["regressors"], system["sampling"])
+    every = {s.name: _Every(reader) for s in signals}
+    columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
+    about = reader.about
+    length = about.step * reader.held.factor
+    count = next(iter(columns.values())).size
+    start = about.first + length * np.arange(count)
+    windows: dict[str, Any] = {"t_start": start, "t_end": start + length, **columns}
+    run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
+    si = {c.name: c.unit for c in reader.columns}
+    run.window_units = {"t_start": "s", "t_end": "s", **{n: si[n] for n in reader.others}, **dict.fromkeys(
+        (s.name for s in signals), "rad/s")}  # fmt: skip
+    run.series = {
+        "columns": {s.name: {"kind": s.kind, "unit": s.unit, **_rounding(reader.beginning[s.name])} for s in signals},
+        "others": reader.others,
+        "factor": reader.held.factor,
+        "samples": kind,
+        "acquisition": as_dict(about),
+    }
+    if reader.held.factor > 1:
+        run.series["deviations"] = {name: e.result() for name, e in every.items()}
+    return Record(windows, {}, run)
+
+
+def _rounding(values: Array) -> dict[str, Any]:
+    """Return the step to which values (rad/s or rad) are rounded, 0: none, and whether that is a white error."""
+    try:
+        q = quantization(values)
+    except SeriesError:
+        return {"resolution": 0.0, "white": True}
+    return {"resolution": q.step, "white": q.white}
+
+
+class _Every:
+    """Deviations of every sample of a column, where the record holds means."""
+
+    def __init__(self, reader: DriftReader) -> None:
+        self.about = reader.about
+        self.sums = DeviationAccumulator(1.0, KINDS)  # the step is known in the end
+        self.next = 0
+
+    def add(self, first: int, values: Array) -> None:
+        """Add samples without a gap between them; first: index on the grid."""
+        missing = first - self.next
+        if missing > LONG:
+            self.sums.gap()
+        elif missing > 0 and self.next:
+            self.sums.add(np.full(missing, np.nan))
+        self.sums.add(values)
+        self.next = first + values.size
+
+    def result(self) -> dict[str, dict[str, Any]]:
+        step = self.about.step
+        return {
+            kind: {"tau": (d.tau * step).tolist(), **{n: getattr(d, n).tolist() for n in NUMBERS}}
+            for kind, d in self.sums.result().items()
+        }
+
+
+MEASURED = MeasuredData(TEMPLATE, read, progress=True)

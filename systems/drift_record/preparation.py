@@ -1,0 +1,228 @@
+"""Columns of a drift record made ready for its statistics: rates on a grid, other columns regressed, lines removed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames, units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.series.checks import SeriesError
+from gyrobench.reduction.series.drift_model import DriftModel, describe
+from gyrobench.reduction.series.lines import Line
+from gyrobench.reduction.setups import attitude_of
+from gyrobench.reduction.window_checks import ReductionError
+
+Array = NDArray[np.float64]
+DPH = units.factor("deg/h")
+BLOCKS = 200  # means that other columns are regressed on
+WHOLE = 0.5  # part of the samples that a stretch without a gap must hold
+LEAST = 512  # samples of it
+OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged"}
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Slope of the rate over another column, SI, with its 95 % interval."""
+
+    name: str
+    unit: str
+    slope: float
+    u: float
+    low: float
+    high: float
+
+    @property
+    def significant(self) -> bool:
+        return not self.low <= 0.0 <= self.high
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A rate on the grid, rad/s, NaN in gaps; clean: without what regression and lines take out.
+
+    stretch: the longest one of ``clean`` without a gap, for spectra and models; of means over ``averaged`` samples
+    where gaps are many.  step, stretch_step: s.
+    """
+
+    name: str
+    time: Array  # of the first sample on, s
+    step: float
+    rate: Array
+    clean: Array
+    regressions: tuple[Regression, ...]
+    model: DriftModel  # of the stretch
+    stretch: Array
+    stretch_step: float
+    averaged: int
+
+    @property
+    def cleaned(self) -> bool:
+        """Whether anything was taken out."""
+        return self.clean is not self.rate
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The rates of a record and its other columns, on one grid."""
+
+    rates: dict[str, Array]
+    others: dict[str, Array]
+    others_unit: dict[str, str]
+    step: float
+    conventions: list[str] = field(default_factory=list)
+
+
+def columns_of(record: Record) -> Columns:
+    """Return rates and other columns of a record, simulated or measured.  Raises ReductionError."""
+    w, run = record.windows, record.run
+    if run.series is not None:
+        step = float(run.series["acquisition"]["step"]) * int(run.series["factor"])
+        others = {n: np.asarray(w[n], dtype=float) for n in run.series["others"]}
+        rates = {n: np.asarray(w[n], dtype=float) for n in run.series["columns"]}
+        return Columns(rates, others, run.window_units, step)
+    if "mean" not in w or len(w["mean"]) < LEAST:
+        raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
+    k = run_metadata.number(run, "k", "gyro.k", "torquer scale factor")
+    site = run_metadata.Site.of(run)
+    input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
+    rate = input_rate - k * np.asarray(w["mean"], dtype=float)
+    step = float(np.mean(np.asarray(w["t_end"]) - np.asarray(w["t_start"])))
+    others = {n: np.asarray(v, dtype=float) for n, v in w.items() if n not in OWN}
+    said = [
+        "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
+        f"k = {k * 1e-3 / DPH:.6g} °/h/mA, Earth rate along the input axis {input_rate / DPH:.6g} °/h.",
+    ]
+    return Columns({"drift": rate}, others, run.window_units, step, said)
+
+
+def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
+    """Return a rate with what other columns and lines explain taken out.
+
+    Another column is taken out where its slope, under noise estimated from the residuals, differs from zero (95 %).
+    Raises ReductionError for a record too short or without a stretch long enough.
+    """
+    rate = columns.rates[name]
+    if np.count_nonzero(np.isfinite(rate)) < LEAST:
+        raise ReductionError(
+            [f"column '{name}': {np.count_nonzero(np.isfinite(rate))} samples; at least {LEAST} needed"]
+        )
+    time = columns.step * np.arange(float(rate.size))
+    regressions = _regressions(time, columns.step, rate, columns.others, columns.others_unit)
+    clean = rate
+    for r in regressions:
+        if r.significant:
+            x = columns.others[r.name]
+            clean = clean - r.slope * np.nan_to_num(x - np.nanmean(x))
+    stretch, first, averaged = longest_stretch(clean)
+    step = columns.step * averaged
+    try:
+        model = describe(stretch, step)
+    except SeriesError as error:
+        raise ReductionError([f"column '{name}': {error}"]) from None
+    if remove_lines and model.lines.lines:
+        begin = time[first] + 0.5 * columns.step * (averaged - 1)
+        clean = clean - sum_of(model.lines.lines, time - begin, columns.step, averaged)
+        stretch = model.lines.residual
+    return Prepared(name, time, columns.step, rate, clean, tuple(regressions), model, stretch, step, averaged)
+
+
+def sum_of(lines: Sequence[Line], t: Array, step: float, averaged: int) -> Array:
+    """Return the lines at times t, s; what the mean over ``averaged`` samples had weakened is restored."""
+    out = np.zeros_like(t)
+    for line in lines:
+        x = math.pi * line.frequency * step
+        weaker = math.sin(averaged * x) / (averaged * math.sin(x)) if averaged > 1 else 1.0
+        out += line.amplitude / weaker * np.sin(2.0 * math.pi * line.frequency * t + line.phase)
+    return out
+
+
+def longest_stretch(x: Array) -> tuple[Array, int, int]:
+    """Return the longest stretch without a gap, its first index on the grid, and of how many samples it has the means.
+
+    Means, over those samples of each that are there (half of them or more), where single gaps cut the record short.
+    Raises ReductionError where there is none of LEAST values.
+    """
+    best: tuple[Array, int, int] | None = None
+    averaged, y = 1, x
+    total = np.count_nonzero(np.isfinite(x))
+    while y.size >= LEAST:
+        a, b = _longest(y)
+        if best is None or (b - a) * averaged > 1.5 * best[0].size * best[2]:
+            best = y[a:b], a * averaged, averaged
+        if (b - a) * averaged >= WHOLE * total:
+            break
+        averaged *= 2
+        y = _means(x, averaged)
+    if best is None or best[0].size < LEAST:
+        raise ReductionError([f"no stretch of {LEAST} samples without a gap: the gaps leave no spectrum"])
+    return best
+
+
+def _longest(x: Array) -> tuple[int, int]:
+    edges = np.flatnonzero(np.diff(np.isfinite(x).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    a, b = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))].tolist() if edges.size else (0, 0)
+    return int(a), int(b)
+
+
+def _means(x: Array, m: int) -> Array:
+    parts = x[: x.size // m * m].reshape(-1, m)
+    there = np.isfinite(parts)
+    count = there.sum(axis=1)
+    sums = np.where(there, parts, 0.0).sum(axis=1)
+    return np.where(2 * count >= m, sums / np.maximum(count, 1), np.nan)
+
+
+def _regressions(
+    time: Array, step: float, rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]
+) -> list[Regression]:
+    """Fit level and the other columns to block means, under noise that is estimated from the residuals."""
+    m = max(1, math.ceil(rate.size / BLOCKS))
+    names = [n for n, v in others.items() if np.count_nonzero(np.isfinite(v)) > 0.5 * v.size and np.nanstd(v) > 0.0]
+    if not names:
+        return []
+    y = _means(rate, m)
+    x = [_means(others[n], m) for n in names]
+    good = np.all(np.isfinite([y, *x]), axis=0)
+    y, x = y[good], [v[good] for v in x]
+    spread = [float(np.std(v)) for v in x]
+    start = time[: m * good.size : m][good]
+    scale = float(np.std(y)) or 1.0
+    design = np.column_stack([np.ones(y.size), *((v - v.mean()) / (s or 1.0) for v, s in zip(x, spread, strict=True))])
+    if np.linalg.matrix_rank(design) < design.shape[1] or y.size < 4 * design.shape[1]:
+        raise ReductionError([f"columns {', '.join(names)}: not separable in this record; name fewer by regressors"])
+    fit = noise_mixture_fit.fit(design, (y - y.mean()) / scale, ("level", *names), start, start + m * step)
+    out = []
+    for k, (n, s) in enumerate(zip(names, spread, strict=True), 1):
+        unit = scale / s
+        slope, half = float(fit.beta[k]) * unit, float(fit.half_width[k]) * unit
+        out.append(Regression(n, unit_of.get(n, "1"), slope, float(fit.u[k]) * unit, slope - half, slope + half))
+    return out
+
+
+#: noise coefficient -> parameter of the gyro that gives it
+GIVEN = {"B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
+
+
+def truth_of(run: RunDocument) -> dict[str, float]:
+    """Return the noise coefficients that the gyro of a run was given, SI; {} for measured data.
+
+    The noise of the current reading is part of N.  Pickoff noise is angle noise that the loop shapes: with it Q has no
+    stated truth.
+    """
+    p: dict[str, Any] = dict(run.parameters)
+    out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN.items() if f"gyro.{name}" in p}
+    if p.get("gyro.pickoff") or not p.get("gyro.quantization"):
+        out.pop("Q", None)
+    if "gyro.white" in p:
+        k, meter = float(run.options.get("k") or p.get("gyro.k", 0.0)), float(p.get("rebalance.meter", 0.0))
+        out["N"] = math.hypot(float(p["gyro.white"]), k * meter)
+    return out

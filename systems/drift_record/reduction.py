@@ -1,0 +1,206 @@
+"""Reduction of a drift record: noise coefficients N, B, K, R, Q of each column, and the evidence for them.
+
+    S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2 sin^2(pi f tau)/tau,   two-sided;   rate = ... + R t
+
+estimated by restricted maximum likelihood from the rate without what lines and other columns explain
+(gyrobench.reduction.series.noise_coefficients), beside them the slopes of the Allan deviation, deviations, spectrum,
+stationarity, distribution and an autoregressive model.
+[DRIFT-ALLAN, DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; IEEE 952, annex C; Xia 2008, ch. 3]
+
+Not modelled: noise that none of the five terms describes (Gauss-Markov drift of a correlation time within the record):
+the test of the model says so; steps of the bias; drift of the scale factor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction import run_metadata
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.noise_coefficients_table import TERMS
+from gyrobench.reduction.series.deviations import Deviation, deviations
+from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
+
+from . import description, model_tables
+from .preparation import Prepared, columns_of, prepare, truth_of
+
+__all__ = ["ReductionError", "from_record"]
+
+Array = NDArray[np.float64]
+NORMAL = 1.959963984540054
+SHOWN, SHOWN_LAGS = 1500, 40  # intervals of the record, lags that are drawn
+RESIDUAL = (
+    "The deviations are those of the rate without what lines and other columns explain: where these fits have taken "
+    "slow drift along, the deviations are too small at long averaging times."
+)
+DPH = units.factor("deg/h")
+FIELDS = ("tau", "deviation", "low", "high", "edf", "count", "exponent")
+KINDS = {"allan": "Allan", "modified": "modified Allan", "hadamard": "Hadamard"}
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """A column with its noise coefficients and deviations, SI."""
+
+    of: Prepared
+    noise: NoiseCoefficients
+    deviations: Mapping[str, Deviation]
+
+
+def from_record(record: Record, specification: Specification | None = None) -> DriftRecordResult:
+    """Return the result of a record.  Raises ReductionError where it is too short or cannot be analysed."""
+    run = record.run
+    columns = columns_of(record)
+    remove = bool(run.options.get("remove_lines", True))
+    analysed = [analyse(prepare(name, columns, remove), run.series) for name in columns.rates]
+    truth = truth_of(run)
+    relative = float(run.options.get("u_scale_factor", 0.0))
+    several = len(analysed) > 1
+    coefficients = [
+        _coefficient(a, term, several, truth.get(term), relative) for a in analysed for term in TERMS
+    ]  # fmt: skip
+    for c in coefficients:
+        c.limit = (specification or {}).get(c.name)
+        c.verdict = _verdict(c)
+    of = {a.of.name: f"Column {a.of.name}: " if several else "" for a in analysed}
+    warnings = [of[a.of.name] + w for a in analysed for w in description.warnings(a.of, a.noise, run)]
+    result = DriftRecordResult(
+        system="drift_record",
+        title="Drift record",
+        method="Noise coefficients by restricted maximum likelihood, deviations, spectrum, model of the random drift",
+        sources=["DRIFT-ALLAN; IEEE 952, annex C", "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
+        equation='S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0), quad '
+        'sigma_"A"^2 = N^2/tau + (2 ln 2)/pi B^2 + K^2 tau/3 + R^2 tau^2/2 + 3 Q^2/tau^2',
+        conventions=[*columns.conventions, *description.conventions(run)],
+        coefficients=coefficients,
+        warnings=warnings,
+        summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
+        decision_rule=uncertainty.DECISION_RULE,
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
+        instrument=run.instrument,
+        site={} if run.measured else run_metadata.Site.of(run).shown(),
+        simulated=not run.measured,
+        columns=[_column(a, run, remove) for a in analysed],
+    )  # fmt: skip
+    return run_metadata.finish(result, record)
+
+
+def stretches(x: Array, least: int = 2) -> list[Array]:
+    """Return the runs of a series without a gap, ``least`` values or more."""
+    edges = np.flatnonzero(np.diff(np.isfinite(x).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    return [x[a:b] for a, b in edges.tolist() if b - a >= least]
+
+
+def analyse(p: Prepared, series: Mapping[str, Any] | None = None) -> Analysed:
+    """Return the noise coefficients and deviations of a column."""
+    whole = stretches(p.clean, 32)
+    if len(whole) > MANY:  # single samples are missing all over: means over those that are there
+        whole = [p.stretch]
+    step = p.stretch_step if whole[0] is p.stretch else p.step
+    held = deviations(p.clean, p.step, tuple(KINDS))
+    every = {kind: _read(d) for kind, d in (series or {}).get("deviations", {}).get(p.name, {}).items()}
+    if every and p.cleaned:  # of the averaging times that the means do not reach, as recorded
+        held = {kind: _joined(every[kind], d) for kind, d in held.items()}
+    return Analysed(p, fit(whole, step), held if p.cleaned or not every else every)
+
+
+def _read(d: Mapping[str, Any]) -> Deviation:
+    return Deviation("", **{n: np.asarray(d[n]) for n in FIELDS})
+
+
+def _joined(short: Deviation, long: Deviation) -> Deviation:
+    below = short.tau < long.tau[0] * (1.0 - 1e-9)
+    return Deviation(long.kind, **{n: np.append(getattr(short, n)[below], getattr(long, n)) for n in FIELDS})
+
+
+MANY = 200  # stretches of a record that are fitted one by one
+
+
+def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, relative: float) -> Coefficient:
+    unit, si, meaning = TERMS[term]
+    e: Estimate = getattr(a.noise, term)
+    name = f"{term} {a.of.name}" if several else term
+    value, low, high = e.value / si, e.low / si, e.high / si
+    true = None if truth is None else truth / si
+    if not e.determined:
+        below = max(abs(low), abs(high))
+        why = f"not determined, below {below:.2g} {unit} (95 %): the record is too short or other noise covers it"
+        return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
+                           no_value=why)  # fmt: skip
+    u_a = (high - low) / (2.0 * NORMAL)
+    u = math.hypot(u_a, relative * value)
+    more = NORMAL * (u - u_a)
+    return Coefficient(
+        name, meaning, unit, value, u, NORMAL, (low - more, high + more), u_a=u_a, truth=true,
+        z=None if true is None else (value - true) / u,
+    )  # fmt: skip
+
+
+def _verdict(c: Coefficient) -> str:
+    """By the interval, which is not symmetric; of a coefficient that is not determined from zero to its bound."""
+    low, high = c.interval
+    return (
+        c.verdict if c.limit is None else uncertainty.assess_conformity(0.5 * (low + high), 0.5 * (high - low), c.limit)
+    )
+
+
+def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
+    p, m = a.of, a.of.model
+    tau = np.geomspace(p.step, max(d.tau[-1] for d in a.deviations.values()), 120)
+    s, c = m.spectrum, m.correlation
+    f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
+    density = {n: (v / DPH**2).tolist() for n, v in (("S", s.density), ("low", s.low), ("high", s.high))}
+    model = {"f": f.tolist(), "S": (2.0 * a.noise.spectrum(f, m.dt) / DPH**2).tolist()}
+    lags = slice(0, SHOWN_LAGS + 1)
+    return DriftColumn(
+        name=p.name,
+        unit="°/h",
+        record=_envelope(p),
+        deviations=[_deviation(kind, d) for kind, d in a.deviations.items()],
+        model={"tau": tau.tolist(), "dev": (a.noise.allan(tau) / DPH).tolist(), **model},
+        spectrum={"f": s.frequency.tolist(), **density},
+        correlation={"lag": c.lag[lags].tolist(), "rho": c.rho[lags].tolist(), "partial": c.partial[lags].tolist(),
+                     "bound": c.bound},
+        tables={
+            "acquisition": [description.acquisition(p, run)],
+            "regression": description.regression(p),
+            "deviations": [description.slope_readings(a.noise, a.deviations["allan"])],
+            "spectrum": description.lines(p, removed),
+            "stationarity": [model_tables.stationarity(m)],
+            "model": model_tables.models(m),
+        },
+        texts={
+            "acquisition": description.acquisition_texts(p, run),
+            "deviations": [RESIDUAL] if p.cleaned else [],
+            "spectrum": [*description.line_texts(p), description.misfit_text(a.noise)],
+            "model": model_tables.model_texts(m),
+        },
+    )  # fmt: skip
+
+
+def _deviation(kind: str, d: Deviation) -> dict[str, Any]:
+    scaled = {"dev": d.deviation, "low": d.low, "high": d.high}
+    return {"kind": KINDS[kind], "tau": d.tau.tolist(), **{n: (v / DPH).tolist() for n, v in scaled.items()},
+            "edf": d.edf.tolist()}  # fmt: skip
+
+
+def _envelope(p: Prepared) -> dict[str, Any]:
+    """Least and largest rate of each of SHOWN intervals, and its mean; gaps are left out."""
+    edges = np.unique(np.linspace(0, p.rate.size, min(SHOWN, p.rate.size) + 1).astype(int))
+    parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
+    there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
+    middle = 0.5 * (edges[:-1] + edges[1:]) * p.step
+    low, mean, high = ([float(f(parts[k])) / DPH for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
+    return {"t": middle[there].tolist(), "low": low, "mean": mean, "high": high}
