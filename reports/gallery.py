@@ -19,6 +19,7 @@ FIGURE = re.compile(r'<figure class="picture.*?(<svg.*?</svg>).*?<figcaption>(.*
 # system -> words of the caption of its figure, where it is not the first one
 SHOWN = {
     "angle_system_test": "first minus second reading",
+    "drift_record": "Allan deviation",
     "platform_four_gimbal": "Angles",
     "platform_single_axis": "Isolation",
     "platform_three_axis": "open loop",

@@ -110,3 +110,24 @@ def test_the_notebook_runs_and_shows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "mass unbalance" in shown[1] and "<svg" in shown[1] and "significant" in shown[5]
     assert 0.5 < float(names["np"].sqrt((names["z"] ** 2).mean().mean())) < 2.0
     assert {f.name for f in (tmp_path / "first_report").iterdir()} >= {"report.html", "report.pdf", "run.json"}
+
+
+def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -> None:
+    """The worked file, its commands, and the figures that the page prints of it."""
+    page = (GUIDES / "reduce_a_drift_record.md").read_text(encoding="utf-8")
+    names, _ = follow(GUIDES / "reduce_a_drift_record.md", command)
+    assert (tmp_path / "first" / "report.html").is_file() and (tmp_path / "first" / "report.pdf").is_file()
+    assert not (tmp_path / "second" / "report.html").exists()
+    result = names["reduced"].result
+    rows = re.findall(r"^\| ([NBKRQ]) \| ([^|]+) \| ([^|]+) to ([^|]+) \| ([^|]+) \| ([^|]+) \|$", page, re.M)
+    assert [r[0] for r in rows] == result.names
+    for name, estimate, low, high, unit, truth in rows:
+        c = result[name]
+        assert c.unit == unit and (estimate == "not determined") == bool(c.no_value)
+        printed = [float(v.replace("−", "-")) for v in (low, high)]
+        assert printed == pytest.approx(list(c.interval), rel=0.006)
+        assert c.no_value or float(estimate) == pytest.approx(c.estimate, rel=0.006)
+        assert printed[0] <= float(truth) <= printed[1], "the interval holds the true value"
+    (slope,) = result.columns[0].tables["regression"][0]["rows"]
+    assert f"explains {slope[1]:.4f}".rstrip("0") in page and abs(slope[1] - 0.05) < 2.0 * slope[2]
+    assert (GUIDES / "drift_record" / "gyro.csv").stat().st_size < 300_000

@@ -31,8 +31,8 @@ TEMPLATE = """\
 #
 # time: of the sample; or no such column, and a line '# sampling = 100Hz'.  Rows may be missing: gaps are found.
 # Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], or another quantity and a line
-#   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (their resets are found),
-#   or those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
+#   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (resets are found), or
+#   those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
 # temperature [degC], and columns named by '# regressors = pressure', are taken out by regression.
 # flag: other than 0 where a sample is suspect.  What the samples are: '# samples = means' (each since the one before)
 #   or points, of a signal of '# bandwidth = 14Hz'.
