@@ -14,8 +14,6 @@ from gyrobench.component.blocks.matrix_model import (
 )
 from gyrobench.component.math import dot, vector
 
-UNIT_M = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-
 
 class EstimatorColoured(LinearModel):
     """Kalman filter of a linear model whose readings carry coloured noise, without states for it.  [EST-KF-COLOURED]
@@ -50,10 +48,10 @@ class EstimatorColoured(LinearModel):
     begun = Discrete(0.0, "1", "1 once there was a reading")
     before = Discrete(NO_READING, "1", "the last reading")
     P_v = Discrete(NO_COVARIANCE, "1", "stationary covariance of the noise")
-    F = Discrete(UNIT, "1", "transition since the last reading")
-    W_k = Discrete(NO_MATRIX, "1", "covariance of what has driven the state since")
-    psi_k = Discrete(UNIT_M, "1", "transition of the noise since")
-    V_k = Discrete(NO_COVARIANCE, "1", "covariance of what has driven it since")
+    F = Discrete(UNIT, "1", "transition from the last reading to the next instant")
+    W_k = Discrete(NO_MATRIX, "1", "covariance of what drives the state between them")
+    psi_k = Discrete(NO_COVARIANCE, "1", "transition of the noise between them")
+    V_k = Discrete(NO_COVARIANCE, "1", "covariance of what drives it between them")
 
     def start(self) -> None:
         beyond = 0.0
@@ -93,19 +91,15 @@ class EstimatorColoured(LinearModel):
         self.since()
 
     def since(self) -> None:
-        """Begin to count the periods from a reading."""
-        self.F = vector(UNIT)
-        self.W_k = vector(NO_MATRIX)
-        self.psi_k = vector(UNIT_M)
-        self.V_k = vector(NO_COVARIANCE)
+        """One period from the last reading to the next instant."""
+        self.F = vector(self.A)
+        self.W_k = vector(self.W)
+        self.psi_k = vector(self.psi)
+        self.V_k = vector(self.V)
 
     @sampled(every=1)
     def tick(self) -> None:
         if self.reading > 0.5:
-            self.F = self.A @ self.F
-            self.W_k = self.A @ self.W_k @ self.A.T + self.W
-            self.psi_k = self.psi @ self.psi_k
-            self.V_k = self.psi @ self.V_k @ self.psi.T + self.V
             there = self.valid > 0.5 and (self.m < 2.0 or self.valid_2 > 0.5) and (self.m < 3.0 or self.valid_3 > 0.5)
             self.used = self.m if there else 0.0
             self.ys = vector(NO_READING)
@@ -151,3 +145,7 @@ class EstimatorColoured(LinearModel):
                 self.show(self.x, self.P)
             else:
                 self.show(self.F @ self.x, self.F @ self.P @ self.F.T + self.W_k)
+                self.F = self.A @ self.F  # one period more to the next instant
+                self.W_k = self.A @ self.W_k @ self.A.T + self.W
+                self.psi_k = self.psi @ self.psi_k
+                self.V_k = self.psi @ self.V_k @ self.psi.T + self.V
