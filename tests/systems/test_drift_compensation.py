@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ import pytest
 from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.system.system import InvalidConfigurationError, Slot, System, load_system
 
 NAME = "drift_compensation"
 DPH = ARCSEC = math.pi / 648000.0
@@ -150,3 +150,58 @@ def test_short_records_are_warned_of_and_a_record_of_two_is_refused(with_angle: 
     short = Record(channels={n: np.asarray(x)[kept] for n, x in record.channels.items()}, run=record.run)
     with pytest.raises(ReductionError, match="2 whole records"):
         system.reduce(short)
+
+
+class FloatOnServoTable(System):
+    """A floated gyro that nulls its own table, the compensator on its torquer: no quick form of either."""
+
+    title = "Compensation of a floated gyro on its servo table"
+    slots: ClassVar[dict[str, Slot]] = {
+        "table": Slot("ServoTable", "table_servo"),
+        "gyro": Slot("SdfGyro", "floated_gyro"),
+        "compensator": Slot(type(load_system(NAME)).slots["compensator"].socket, "drift_compensator"),
+    }
+    wires = """
+        table -> gyro: omega alpha f
+        gyro.u -> table.u
+        table.angle_read -> compensator.z
+        compensator.i -> gyro.i
+    """
+    raw: ClassVar[dict[str, float]] = {
+        "table.mode": 3.0,
+        **{f"table.face[{i},{j}]": float((i, j) in ((1, 3), (2, 1), (3, 2))) for i in (1, 2, 3) for j in (1, 2, 3)},
+    }
+    channels = ("table.angle", "gyro.drift", "compensator.estimate", "compensator.u")
+    step = 5e-4
+    stop = 300.0
+
+    def parameters(self, parts: Any) -> dict[str, Any]:
+        gyro = {"H": 0.04, "J": 3e-5, "C": 0.03, "K_sg": 10.0}
+        off = ("white", "pickoff", "D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS")
+        silent = dict.fromkeys(off, 0.0)
+        table = dict(zip(("H_g", "J_g", "C_g", "K_g"), gyro.values(), strict=True))
+        believed = {"Ts": 1.0, "tau": 100.0, "rms": 10.0 * DPH, "sigma": 0.06 * ARCSEC, "lag": 0.05, "T_c": 10.0}
+        return {
+            **{f"gyro.{n}": x for n, x in {**gyro, **silent, "markov": 10.0 * DPH, "markov_tau": 100.0}.items()},
+            **{f"table.{n}": x for n, x in {**table, "capture": 0, "quantum": 0.2 * ARCSEC}.items()},
+            **{f"compensator.{n}": x for n, x in {**believed, "u_max": 100.0 * DPH, "k": parts["gyro.k"]}.items()},
+        }
+
+
+def test_a_floated_gyro_on_its_servo_table_is_compensated() -> None:
+    """Sign and size of the current hold for the real loop: rate and angle are those of the closed form."""
+    found = {}
+    for name, limit in (("with", 100.0 * DPH), ("without", 1e-6 * DPH)):
+        system = FloatOnServoTable()
+        system.set("compensator.u_max", limit)
+        c = run(system, seed=3).channels
+        late = np.asarray(c["time"]) > 60.0
+        found[name] = {n: np.asarray(x)[late] for n, x in c.items()}
+    m = closed_form().Model(10.0 * DPH, 100.0, 0.05, 0.06 * ARCSEC)
+    expected = closed_form().expected(m, m, 1.0, 300, 10.0)
+    rms = lambda x: float(np.sqrt(np.mean(np.square(x))))  # noqa: E731
+    assert np.array_equal(found["with"]["gyro.drift"], found["without"]["gyro.drift"])
+    assert rms(found["without"]["table.angle"]) > 100.0 * rms(found["with"]["table.angle"])
+    assert rms(found["with"]["table.angle"]) == pytest.approx(expected.angle[-1], rel=0.3)
+    left = found["with"]["gyro.drift"] - found["with"]["compensator.u"]
+    assert rms(left) == pytest.approx(expected.rate[-1], rel=0.3)
