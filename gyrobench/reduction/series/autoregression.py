@@ -224,21 +224,23 @@ def _higher_order(phi: Array, n: int, method: Method) -> tuple[Array, Array]:
     of first order, Gamma^-1 sum_t y_{t-i} w_t/m, has a known law: it is taken off each record, which leaves bias
     and variance with a tenth of the scatter.
     """
-    radius = spectral_radius(phi)
+    radius, p = spectral_radius(phi), phi.size
     slow = int(min(40.0 / max(-np.log(max(radius, 1e-9)), 1e-9), 50.0 * LENGTH))
-    m, p = min(n, max(LENGTH, slow)), phi.size
+    m = min(n, max(LENGTH, slow))
     rng = np.random.default_rng(0)
-    transient = min(slow, 5 * LENGTH) + p
     records = max(FEWEST, min(RECORDS, RECORDS * 1000 // n))
-    rows = max(1, min(records, 2_000_000 // (m + transient)))
+    rows = max(1, min(records, 2_000_000 // m))
     a, C, done = np.concatenate([[1.0], -phi]), covariance_of(phi, m), 0
+    start = np.linalg.cholesky(np.linalg.inv(covariance_of(phi, 1)))  # p values of the stationary process
     errors, first = [], []
     while done < records:
-        w = rng.standard_normal((min(rows, records - done), m + transient))
-        y = signal.lfilter([1.0], a, w, axis=1)
-        before = [y[:, transient - i : -i] for i in range(1, p + 1)]
-        first.append(np.stack([np.einsum("ij,ij->i", b, w[:, transient:]) for b in before], axis=1) @ C)
-        y = y[:, transient:] - y[:, transient:].mean(axis=1, keepdims=True)
+        past = rng.standard_normal((min(rows, records - done), p)) @ start.T
+        memory = np.stack([past[:, k:] @ phi[k:][::-1] for k in range(p)], axis=1)
+        w = rng.standard_normal((len(past), m))
+        y = np.concatenate([past, signal.lfilter([1.0], a, w, axis=1, zi=memory)[0]], axis=1)
+        before = [y[:, p - i : -i] for i in range(1, p + 1)]
+        first.append(np.stack([np.einsum("ij,ij->i", b, w) for b in before], axis=1) @ C)
+        y = y[:, p:] - y[:, p:].mean(axis=1, keepdims=True)
         errors.append((_burg_rows(y, p) if method == "burg" else _yule_walker_rows(y, p)) - phi)
         done += len(w)
     error, linear = np.concatenate(errors), np.concatenate(first)
