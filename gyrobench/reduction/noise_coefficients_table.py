@@ -61,6 +61,8 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         f"IEEE 952, from {count} means of {length:g} s by maximum likelihood. Gauss-Markov drift is not among the five "
         "terms: B and K take it up"
     )
+    if found.check and (departs := found.check.finding()):
+        caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     title = "Noise coefficients"
     return [{"title": title, "caption": f"{caption}. {RESIDUAL}" if residual else caption, "columns": columns,

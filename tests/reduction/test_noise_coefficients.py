@@ -174,15 +174,15 @@ def test_check_of_the_model() -> None:
     n, rng = 20000, np.random.default_rng(1)
     x = rng.normal(size=n)
     good = fit(x, 0.1).check
-    assert good is not None and good.p > 0.01 and good.line_p > 0.01
+    assert good is not None and good.p > 0.01 and good.line_p > 0.01 and good.finding() == ""
     line = fit(x + 0.1 * np.sin(0.3 * np.arange(n)), 0.1).check
     assert line is not None and line.p > 0.01 and line.line_p < 1e-6
-    assert line.line == pytest.approx(0.3 / (2.0 * math.pi) / 0.1, abs=1e-3)
+    assert "a line at 0.477" in line.finding() and line.line == pytest.approx(0.3 / (2.0 * math.pi) / 0.1, abs=1e-3)
     from scipy.signal import lfilter
 
     drift = lfilter([1.0], [1.0, -math.exp(-1.0 / 50.0)], 0.2 * rng.normal(size=n))  # corner at 0.032 Hz
     bad = fit(x + drift, 0.1).check
-    assert bad is not None and bad.p < 1e-6 and 0.002 < bad.band[0] < 0.3
+    assert bad is not None and bad.p < 1e-6 and 0.002 < bad.band[0] < 0.3 and "times the power" in bad.finding()
     step = fit(x[:2000] + np.where(np.arange(2000) > 1000, 100.0, 0.0), 0.1).check
     assert step is not None and step.p < 0.001  # its powers are as even as no random walk's
 

@@ -34,6 +34,7 @@ from gyrobench.reduction.series.noise_spectra import folded
 
 Array = NDArray[np.float64]
 STEPS = 100  # of the search for a maximum, at most
+DEPARTS = 0.001  # probability from which on a departure from the model is reported
 RAMPS = 13  # values of K over which the interval of the ramp is a mixture
 NAMES = ("N", "B", "K", "Q")  # order of the variances
 
@@ -62,6 +63,21 @@ class ModelCheck:
     ratio: float
     line_p: float
     line: float
+
+    def finding(self) -> str:
+        """Return what departs from the model with p < 0.001, or an empty string."""
+        found = []
+        if self.p < DEPARTS:
+            low, high = self.band
+            found.append(f"{low:.2g} to {high:.2g} Hz has {self.ratio:.2g} times the power of the model")
+        if self.line_p < DEPARTS:
+            found.append(f"a line at {self.line:.4g} Hz")
+        remedy = "the coefficients and their intervals are not those of the instrument; remove what is not noise"
+        return (
+            f"The five terms do not describe the record (p < {DEPARTS:g}): {', '.join(found)}; {remedy}"
+            if found
+            else ""
+        )
 
 
 @dataclass(frozen=True)
