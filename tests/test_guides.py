@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 import json
+import math
 import os
 import re
 import shlex
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -131,3 +133,9 @@ def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -
     (slope,) = result.columns[0].tables["regression"][0]["rows"]
     assert f"explains {slope[1]:.4f}".rstrip("0") in page and abs(slope[1] - 0.05) < 2.0 * slope[2]
     assert (GUIDES / "drift_record" / "gyro.csv").stat().st_size < 300_000
+    values = tomllib.loads((tmp_path / "fitted" / "floated_gyro.toml").read_text(encoding="utf-8"))["gyro"]
+    assert (
+        values["white"] == pytest.approx(math.radians(result["N"].estimate) / 60.0, rel=1e-9) and values["ramp"] == 0.0
+    )
+    simulated = json.loads((tmp_path / "simulated" / "run.json").read_text(encoding="utf-8"))["parameters"]
+    assert {n: simulated[f"gyro.{n}"] for n in values} == values

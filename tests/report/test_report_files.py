@@ -101,9 +101,7 @@ def test_each_kind_of_result_comes_back_as_that_kind(written):
     assert isinstance(report.load(json.dumps(older)), result_module.DriftTestResult)
     with pytest.raises(report.ResultError, match=r"missing or unknown fields: .*mood"):
         report.load(json.dumps({**older, "mood": 1}))
-    with pytest.raises(
-        TypeError, match="a result is a DriftTestResult, a LoopResult, a DriftRecordResult or"
-    ):
+    with pytest.raises(TypeError, match="a result is a DriftTestResult, a LoopResult, a DriftRecordResult or"):
         result_module.Result(system="", title="", method="", sources=[], conventions=[], coefficients=[])
 
 
