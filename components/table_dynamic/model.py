@@ -65,8 +65,9 @@ class TableDynamic(BodyTable):
     @sampled(every=1)
     def tick(self) -> None:
         self.settle(self.motor_M, self.M_load)
-        self.scale.latch(self.axis_x)
         self.clock.tick()
+        if self.clock_due == 1.0 or self.t > self.step_end - 0.5 * self.h:  # nobody sees the counts in between
+            self.scale.latch(self.axis_x)
         self.law.wait()
         if self.clock_due == 1.0:
             self.command.advance(self.mode, self.target, self.command_way, self.index_rate)

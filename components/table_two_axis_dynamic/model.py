@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import IDENTITY, Discrete, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.angle import IncrementalEncoder
-from gyrobench.component.blocks.axis_body import AxisBody
+from gyrobench.component.blocks.axis_body import AxisBody, further
 from gyrobench.component.blocks.command import ARCSEC, CountCommand, SampleClock
 from gyrobench.component.blocks.control import InPosition, SampledController
 from gyrobench.component.blocks.drive import DcMotor, SquareLawMotor
@@ -77,52 +77,58 @@ class TableTwoAxisDynamic(TwoAxisTable):
         self.outer.rest(self.angle0[0])
         self.inner.rest(self.angle0[1])
         self.outer_axis.rest(self.angle0[0], 0.0, self.earth_x())
-        self.inner_axis.rest(self.angle0[1], 0.0, self.earth_y(self.angle0[0]))
+        c_x = cos(self.angle0[0])
+        s_x = sin(self.angle0[0])
+        self.inner_axis.rest(self.angle0[1], 0.0, self.earth_y(c_x, s_x))
         self.outer_scale.latch(self.angle0[0])
         self.inner_scale.latch(self.angle0[1])
-        self.weigh(self.angle0[0], self.angle0[1], 0.0, 0.0)
+        self.weigh(c_x, s_x, cos(self.angle0[1]), sin(self.angle0[1]), 0.0, 0.0)
 
     def earth_x(self) -> Number:
         return self.base[0] @ self.omega_local
 
-    def earth_y(self, x: Number) -> Number:
-        """Return the rate along the inner axis that the site and the outer axis at the angle x leave there."""
-        return cos(x) * (self.base[1] @ self.omega_local) + sin(x) * (self.base[2] @ self.omega_local)
+    def earth_y(self, c: Number, s: Number) -> Number:
+        """Return the rate of the site along the inner axis; c, s of the outer angle."""
+        return c * (self.base[1] @ self.omega_local) + s * (self.base[2] @ self.omega_local)
 
-    def weigh(self, x: Number, y: Number, w_x: Number, v_y: Number) -> None:
-        """Set inertia and loads at these angles and rates."""
-        s = sin(y)
-        c = cos(y)
+    def weigh(self, c_x: Number, s_x: Number, c: Number, s: Number, w_x: Number, v_y: Number) -> None:
+        """Set inertia and loads at these rates; c_x, s_x of the outer angle, c, s of the inner one."""
         difference = self.across[1] - self.across[0]
         self.outer_axis.weigh(self.outer_axis_J + difference * s * s)
         self.load_x = -2.0 * difference * s * c * w_x * v_y
         self.load_y = difference * s * c * w_x * w_x
         g = self.base @ self.f_local
         if self.outer_axis_unbalance[0] != 0.0 or self.outer_axis_unbalance[1] != 0.0:
-            self.load_x = self.load_x + self.outer_axis.unbalanced(cos(x), sin(x), vector([g[1], g[2], g[0]]))
+            self.load_x = self.load_x + self.outer_axis.unbalanced(c_x, s_x, vector([g[1], g[2], g[0]]))
         if self.inner_axis_unbalance[0] != 0.0 or self.inner_axis_unbalance[1] != 0.0:
-            up = cos(x) * g[2] - sin(x) * g[1]
+            up = c_x * g[2] - s_x * g[1]
             self.load_y = self.load_y + self.inner_axis.unbalanced(c, s, vector([up, g[0], 0.0]))
 
     def flow(self) -> None:
         self.outer_axis.turn(self.outer_motor_M_mean, self.load_x, self.earth_x())
-        self.inner_axis.turn(self.inner_motor_M_mean, self.load_y, self.earth_y(self.outer_axis_x))
+        e_y = self.earth_y(cos(self.outer_axis_x), sin(self.outer_axis_x))
+        self.inner_axis.turn(self.inner_motor_M_mean, self.load_y, e_y)
 
     @sampled(every=1)
     def tick(self) -> None:
         e_x = self.earth_x()
-        e_y = self.earth_y(self.outer_axis_x)
-        self.weigh(self.outer_axis_x, self.inner_axis_x, self.outer_axis_w, self.inner_axis_w - e_y)
+        c_x = cos(self.outer_axis_x)
+        s_x = sin(self.outer_axis_x)
+        c_y = cos(self.inner_axis_x)
+        s_y = sin(self.inner_axis_x)
+        e_y = self.earth_y(c_x, s_x)
+        self.weigh(c_x, s_x, c_y, s_y, self.outer_axis_w, self.inner_axis_w - e_y)
         self.outer_axis.settle(self.outer_motor_M, self.load_x, e_x)
         self.inner_axis.settle(self.inner_motor_M, self.load_y, e_y)
         half = 0.5 * self.h  # the loads of the next step at its middle
-        x = self.outer_axis_x + half * self.outer_axis_v
-        y = self.inner_axis_x + half * self.inner_axis_v
+        x = further(c_x, s_x, half * self.outer_axis_v)
+        y = further(c_y, s_y, half * self.inner_axis_v)
         w_x = self.outer_axis_w + half * self.outer_axis_acc
-        self.weigh(x, y, w_x, self.inner_axis_v + half * self.inner_axis_acc)
-        self.outer_scale.latch(self.outer_axis_x)
-        self.inner_scale.latch(self.inner_axis_x)
+        self.weigh(x[0], x[1], y[0], y[1], w_x, self.inner_axis_v + half * self.inner_axis_acc)
         self.clock.tick()
+        if self.clock_due == 1.0 or self.t > self.step_end - 0.5 * self.h:  # nobody sees the counts in between
+            self.outer_scale.latch(self.outer_axis_x)
+            self.inner_scale.latch(self.inner_axis_x)
         self.outer_law.wait()
         self.inner_law.wait()
         if self.clock_due == 1.0:
@@ -136,9 +142,10 @@ class TableTwoAxisDynamic(TwoAxisTable):
         self.inner_motor.advance(self.inner_law_demand, self.inner_axis_v)
 
     def outputs(self) -> None:
+        e_y = self.earth_y(cos(self.outer_axis_x), sin(self.outer_axis_x))
         self.place(
             vector([self.outer_axis_x, self.inner_axis_x]),
-            vector([self.outer_axis_w - self.earth_x(), self.inner_axis_w - self.earth_y(self.outer_axis_x)]),
+            vector([self.outer_axis_w - self.earth_x(), self.inner_axis_w - e_y]),
             vector([self.outer_axis_acc_mean, self.inner_axis_acc_mean]),
         )
         self.angle_x_read = self.outer_scale_count * self.quantum

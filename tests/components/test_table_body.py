@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from wired import BENCH
 
 from gyrobench.component import ComponentError
+from gyrobench.component.blocks.axis_body import further
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 
@@ -208,3 +209,28 @@ def test_rates_and_forces_on_the_face():
 def test_what_is_refused(values, text):
     with pytest.raises(ComponentError, match=text):
         turned(1e-3, 2e-3, lambda t: 0.0, **values)
+
+
+def test_cosine_and_sine_a_small_way_further():
+    """The series below 1 mrad and the addition theorem above it: to the last digits of cos and sin themselves."""
+    for x in (0.3, -2.0, 40.0):
+        for way in (1e-9, -3e-5, 9.99e-4, 1.01e-3, 0.5):
+            c, s = further(math.cos(x), math.sin(x), way)
+            assert abs(c - math.cos(x + way)) < 3e-16 + 1e-16 * abs(x) and abs(
+                s - math.sin(x + way)
+            ) < 3e-16 + 1e-16 * abs(x)
+
+
+def test_friction_without_its_vanishing_exponentials():
+    """Where exp(-50) and less are left out, and at the steady deflection, the law is the same to the last bit."""
+    block = load_part("table_body", BENCH)(axis_friction=0.1, axis_friction_static=0.16, axis_friction_slip_rate=1e-4)
+    block.initialize()
+    contact = block.axis.friction
+    for v in (0.0, 3e-5, -6.9e-4, 7.2e-4, 0.3):
+        level = 0.1 + 0.06 * math.exp(-((v / 1e-4) ** 2))
+        assert contact.limit(v) == level / contact.spring
+    for z in (0.0, 2e-6, 5e-6, -5e-6):
+        for dx in (1e-8, -4e-6, 2.4e-4, 2.6e-4, -1e-2):
+            contact.z = z
+            end = math.copysign(5e-6, dx)
+            assert contact.after(dx, 5e-6) == end + (z - end) * math.exp(-abs(dx) / 5e-6)

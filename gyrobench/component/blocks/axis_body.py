@@ -5,7 +5,21 @@ from __future__ import annotations
 from gyrobench.component.blocks.table import AxisTable
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Noise, Parameter, State
-from gyrobench.component.math import Number, Vector, cos, exp, fabs, sign, sin, sqrt
+from gyrobench.component.math import Number, Vector, cos, exp, fabs, sign, sin, vector
+
+GONE = 50.0  # exp(-50) = 2e-22 changes no last digit of what it is added to
+SMALL = 1e-3  # rad: below it the series of cos and sin are exact to the last digit
+
+
+def further(c: Number, s: Number, way: Number) -> Vector:
+    """Return cosine and sine of an angle, whose own are c and s, after a small way more."""
+    q = way * way
+    a = 1.0 - q * (0.5 - q / 24.0)
+    b = way * (1.0 - q / 6.0)
+    if fabs(way) > SMALL:
+        a = cos(way)
+        b = sin(way)
+    return vector([c * a - s * b, s * a + c * b])
 
 
 class Presliding(Block):
@@ -46,12 +60,15 @@ class Presliding(Block):
         level = self.coulomb
         if self.static > self.coulomb:
             q = v / self.slip_rate
-            level = level + (self.static - self.coulomb) * exp(-q * q)
+            if q * q < GONE:
+                level = level + (self.static - self.coulomb) * exp(-q * q)
         return level / self.spring
 
     def after(self, dx: Number, limit: Number) -> Number:
         """Return z after a turn by dx, towards the limit of its mean rate."""
         end = sign(dx) * limit
+        if self.z == end or fabs(dx) > GONE * limit:
+            return end
         return end + (self.z - end) * exp(-fabs(dx) / limit)
 
     def torque(self, z: Number, v: Number, limit: Number) -> Number:
@@ -73,7 +90,7 @@ class Presliding(Block):
         """Take the contact to the angle x and the rate v; acc without friction and 1 / inertia tell the next step."""
         if self.coulomb > 0.0:
             self.refuse(
-                self.h * sqrt(self.spring * per_J) > 0.5,
+                self.h * self.h * self.spring * per_J > 0.25,
                 "{self}_presliding = {presliding} rad is too small for the internal step, which must be at most "
                 "0.5 sqrt(J presliding / Coulomb torque): shorten the step",
             )
@@ -226,8 +243,15 @@ class BodyTable(AxisTable):
         self.axis.turn(motor, load + self.pull, self.earth())
 
     def settle(self, motor: Number, load: Number) -> None:
-        self.axis.settle(motor, load + self.unbalanced(self.axis_x), self.earth())
-        self.pull = self.unbalanced(self.axis_x + 0.5 * self.h * self.axis_v)
+        if self.axis_unbalance[0] == 0.0 and self.axis_unbalance[1] == 0.0:
+            self.axis.settle(motor, load, self.earth())
+            return
+        c = cos(self.axis_x)
+        s = sin(self.axis_x)
+        g = self.tilted @ self.f_local
+        self.axis.settle(motor, load + self.axis.unbalanced(c, s, g), self.earth())
+        middle = further(c, s, 0.5 * self.h * self.axis_v)
+        self.pull = self.axis.unbalanced(middle[0], middle[1], g)
 
     def outputs(self) -> None:
         rate = self.axis_w - self.earth()
