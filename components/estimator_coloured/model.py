@@ -129,6 +129,10 @@ class EstimatorColoured(LinearModel):
                         y[i] = 0.0
                         S[i][i] = 1.0
                 G = whitening(S)
+                self.refuse(
+                    G[0][0] == 0.0,
+                    "two readings have the same innovation to rounding (1e-12): P0 is too large against their noise",
+                )
                 e = G @ y
                 K = (F @ P @ H.T + W @ self.C.T) @ G.T @ G
                 L = F - K @ H

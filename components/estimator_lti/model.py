@@ -70,6 +70,10 @@ class EstimatorLti(LinearModel):
                         V[j][i] = 0.0
                     V[i][i] = 1.0
             G = whitening(C @ P @ C.T + V)
+            self.refuse(
+                G[0][0] == 0.0,
+                "two readings have the same innovation to rounding (1e-12): P0 is too large against their noise",
+            )
             e = G @ y
             K = P @ C.T @ G.T @ G
             rest = vector(UNIT) - K @ C

@@ -107,7 +107,7 @@ def had_it_stopped(
         then = {c.name: c for c in reduce(shorter).coefficients}
     except ReductionError as error:
         why = "; ".join(error.problems)
-        return [{"title": LEFT, "caption": f"Not estimable: {why}", "columns": ["coefficient"], "rows": []}]
+        return [{"title": LEFT, "caption": "Not estimable from these windows", "columns": ["reason"], "rows": [[why]]}]
     both = [
         [c.name, c.unit, c.estimate, c.u, then[c.name].estimate, then[c.name].u]
         for c in result.coefficients

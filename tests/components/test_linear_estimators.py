@@ -110,6 +110,15 @@ def test_lti_refusals(n: int, m: int, change: dict[str, Any], text: str) -> None
         built("estimator_lti", n, m, **(LEVEL | change))
 
 
+@pytest.mark.parametrize("part", ["estimator_lti", "estimator_coloured"])
+def test_two_readings_that_are_one_to_rounding(part: str) -> None:
+    """P0 = 1 seen twice with a noise of 1e-14: the second pivot of S is 2e-14, rounding.  Said, not left out."""
+    given = {**LEVEL, "C": [[1.0], [1.0]], "V": 1e-14 * np.eye(2), "W": [[1e-20]]}
+    one = built(part, 1, 2, **given, **({"psi": 0.1 * np.eye(2)} if part == "estimator_coloured" else {}))
+    with pytest.raises(ComponentError, match="the same innovation to rounding"):
+        one.do_step(0.0, 1e-3)
+
+
 def test_unobservable_unstable_modes_are_refused_and_no_others() -> None:
     """Against the eigenvectors (Popov, Belevitch, Hautus): an unseen mode with an eigenvalue of 1 or more."""
     rng = np.random.default_rng(9)

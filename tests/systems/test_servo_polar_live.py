@@ -138,7 +138,8 @@ def test_stopped_too_early_to_be_estimable(live: Any) -> None:
     windows = {**record.windows, "live_may_stop": np.ones(record.windows["phase"].size)}
     result = load_system(NAME).reduce(type(record)(windows, {}, record.run))
     table = next(t for t in result.tables if "had the test been left" in t["title"])
-    assert table["rows"] == [] and "Not estimable: phase 2 (polar S) has 1 windows: at least 8" in table["caption"]
+    assert table["caption"].startswith("Not estimable")
+    assert table["rows"][0][0].startswith("phase 2 (polar S) has 1 windows: at least 8 are needed; phase 4")
 
 
 def test_what_is_not_reached_is_said(live: Any) -> None:
