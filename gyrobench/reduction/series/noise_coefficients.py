@@ -54,8 +54,8 @@ class ModelCheck:
     """Whether the spectrum is that of the five terms.
 
     p: probability of so large a departure if it is; band: lower and upper frequency (Hz) of the largest, ratio: power
-    over the model's there.  line_p: probability of a single ordinate so large, line: its frequency (Hz); of a record of
-    more than 2^21 samples only up to 1/(1024 tau0).
+    over the model's there; even: powers are nearer to the model than those of noise.  line_p: probability of a single
+    ordinate so large, line: its frequency (Hz); of a record of more than 2^21 samples only up to 1/(1024 tau0).
     """
 
     p: float
@@ -63,21 +63,22 @@ class ModelCheck:
     ratio: float
     line_p: float
     line: float
+    even: bool
 
     def finding(self) -> str:
         """Return what departs from the model with p < 0.001, or an empty string."""
         found = []
-        if self.p < DEPARTS:
-            low, high = self.band
+        low, high = self.band
+        if self.p < DEPARTS and self.even:
+            found.append("its powers are more even than those of noise, as of a step or a wild sample")
+        elif self.p < DEPARTS:
             found.append(f"{low:.2g} to {high:.2g} Hz has {self.ratio:.2g} times the power of the model")
         if self.line_p < DEPARTS:
             found.append(f"a line at {self.line:.4g} Hz")
-        remedy = "the coefficients and their intervals are not those of the instrument; remove what is not noise"
-        return (
-            f"The five terms do not describe the record (p < {DEPARTS:g}): {', '.join(found)}; {remedy}"
-            if found
-            else ""
-        )
+        if not found:
+            return ""
+        remedy = "The coefficients and their intervals are not those of the instrument; remove what is not noise"
+        return f"The five terms do not describe the record (p < {DEPARTS:g}): {', '.join(found)}. {remedy}"
 
 
 @dataclass(frozen=True)
@@ -272,7 +273,8 @@ def _coefficients(record: Condensed, line: float, size: float, tau0: float) -> N
         estimates[name] = Estimate(value, low, high, low > 0.0)
     slope, low, high = ((x + line) * size / tau0 for x in found.ramp())
     p, (lower, upper, ratio), line_p, line_at = found.f.check(found.v)
-    check = ModelCheck(p, (float(lower) / tau0, float(upper) / tau0), float(ratio), line_p, line_at / tau0)
+    band = float(lower) / tau0, float(upper) / tau0
+    check = ModelCheck(2.0 * min(p, 1.0 - p), band, float(ratio), line_p, line_at / tau0, p > 0.5)
     estimates["R"] = Estimate(slope, low, high, low * high > 0.0)
     return _result(estimates, check)
 

@@ -184,7 +184,6 @@ class Likelihood:
         number, ratio = number[used], total[used] / number[used]
         score = (np.cbrt(ratio) - 1.0 + 2.0 / (9.0 * number)) / np.sqrt(2.0 / (9.0 * number))
         p = float(special.chdtrc(max(number.size - np.count_nonzero(v), 1), score @ score))
-        p = 2.0 * min(p, 1.0 - p)  # powers too even are no noise either, but a step or a wild sample
         worst = int(np.argmax(np.abs(score)))
         edge = self.frequency.min() * BAND ** (np.flatnonzero(used)[worst] + np.arange(2.0))
         # a single ordinate is measured against what the angles at the ends and the ramp may add, too
