@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import Discrete, Output, sampled
 from gyrobench.component.blocks.angle import wrapped
 from gyrobench.component.blocks.attitude import (
+    ZEROS,
     AttitudeEstimator,
     SensorNoise,
     angles_of,
@@ -12,15 +13,8 @@ from gyrobench.component.blocks.attitude import (
 )
 from gyrobench.component.math import Number, Vector, cos, cross, exp, sin, vector
 
-NONE = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-UNIT = [
-    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
-    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-]
+SQUARE = [ZEROS, ZEROS, ZEROS]
+UNIT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class AttitudeMekf(AttitudeEstimator):
@@ -51,60 +45,63 @@ class AttitudeMekf(AttitudeEstimator):
     used = Output("1", "readings used in the step")
 
     q = Discrete([1.0, 0.0, 0.0, 0.0], "1", "rotation from vehicle to ENU axes")
-    x = Discrete(NONE, "1", "error of rotation (rad, ENU) and biases (rad/s) that is not yet in q and b")
-    P = Discrete([NONE, NONE, NONE, NONE, NONE, NONE], "1", "its covariance")
+    d = Discrete(ZEROS, "rad", "rotation error that is not yet in q, ENU")
+    db = Discrete(ZEROS, "rad/s", "error of the biases that is not yet in b")
+    P = Discrete(SQUARE, "1", "covariance of d")
+    X = Discrete(SQUARE, "1", "covariance of d (rows) with db")
+    B = Discrete(SQUARE, "1", "covariance of db")
     e = Discrete(0.0, "1", "sum of squared innovations over their variances")
     n = Discrete(0.0, "1", "readings used")
 
-    def correct(self, H: Vector, y: Number, R: Number) -> None:
-        """Take a reading whose residual is y = H x + v, var v = R."""
-        g = self.P @ H
-        S = H @ g + R
-        y_left = y - H @ self.x
-        self.x = self.x + g * (y_left / S)
-        for i in range(6):
-            for j in range(6):
+    def correct(self, row: Vector, y: Number, R: Number) -> None:
+        """Take a reading whose residual is y = row . d + v, var v = R."""
+        g = self.P @ row
+        gb = self.X.T @ row
+        S = row @ g + R
+        left = y - row @ self.d
+        self.d = self.d + g * (left / S)
+        self.db = self.db + gb * (left / S)
+        for i in range(3):
+            for j in range(3):
                 self.P[i][j] = self.P[i][j] - g[i] * g[j] / S
-        self.e = self.e + y_left * y_left / S
+                self.X[i][j] = self.X[i][j] - g[i] * gb[j] / S
+                self.B[i][j] = self.B[i][j] - gb[i] * gb[j] / S
+        self.e = self.e + left * left / S
         self.n = self.n + 1.0
 
     def predict(self) -> None:
-        """Turn q by the rates of the step and carry the covariance along."""
+        """Turn q by the rates of the step and carry the covariance along: d+ = F d + G db, db+ = keep db."""
         before = matrix_of(self.q)
         h = self.h
         self.q = turned(self.q, (vector(self.omega) - self.b - before @ self.earth()) * h)
         keep = exp(-h / self.noise_of.tau)
         self.b = keep * self.b
-        C = 0.5 * (before + matrix_of(self.q))  # of the middle of the step
+        G = (before + matrix_of(self.q)).T * (-0.5 * h)  # C of the middle of the step
         s = 2.0 * self.noise_of.bias * self.noise_of.bias / self.noise_of.tau
+        unit = vector(UNIT)
         F = vector(UNIT)
         for j in range(3):
-            axis = vector([0.0, 0.0, 0.0])
-            axis[j] = 1.0
-            column = cross(axis, self.earth()) * h  # -(omega_earth x axis) h
+            column = cross(unit[j], self.earth()) * h  # -(omega_earth x axis) h
             for i in range(3):
                 F[i][j] = F[i][j] + column[i]
-                F[i][j + 3] = -h * C[j][i]
-            F[j + 3][j + 3] = keep
-        self.P = F @ self.P @ F.T
+        both = F @ self.X @ G.T
+        self.P = F @ self.P @ F.T + both + both.T + G @ self.B @ G.T
+        self.X = keep * (F @ self.X + G @ self.B) + (0.5 * s * h) * G
+        self.B = keep * keep * self.B
         for i in range(3):
-            for j in range(3):
-                self.P[i][j + 3] = self.P[i][j + 3] - 0.5 * s * h * h * C[j][i]
-                self.P[j + 3][i] = self.P[j + 3][i] - 0.5 * s * h * h * C[j][i]
             self.P[i][i] = self.P[i][i] + self.noise_of.gyro * self.noise_of.gyro * h + s * h * h * h / 3.0
-            self.P[i + 3][i + 3] = self.P[i + 3][i + 3] + s * h
+            self.B[i][i] = self.B[i][i] + s * h
+        self.P = 0.5 * (self.P + self.P.T)
+        self.B = 0.5 * (self.B + self.B.T)
 
     def align(self) -> None:
         """Set attitude and covariance to the first readings."""
         self.q = quaternion_of(self.aligned)
         sigma = self.noise_of.heading if self.heading_new > 0.5 else self.noise_of.start
-        for i in range(6):
-            for j in range(6):
-                self.P[i][j] = 0.0
-        for i in range(3):
-            self.P[i][i] = self.noise_of.acc * self.noise_of.acc / (self.h * self.gravity * self.gravity)
-            self.P[i + 3][i + 3] = self.noise_of.bias * self.noise_of.bias
+        tilt = self.noise_of.acc * self.noise_of.acc / (self.h * self.gravity * self.gravity)
+        self.P = vector(UNIT) * tilt
         self.P[2][2] = sigma * sigma
+        self.B = vector(UNIT) * (self.noise_of.bias * self.noise_of.bias)
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -114,31 +111,34 @@ class AttitudeMekf(AttitudeEstimator):
             self.align()
         else:
             self.predict()
-            self.x = vector(NONE)
+            self.d = vector(ZEROS)
+            self.db = vector(ZEROS)
             C = matrix_of(self.q)
             if self.usable > 0.5:
                 R = self.noise_of.acc * self.noise_of.acc / self.h
                 level = C.T @ self.f
-                self.correct(vector([0.0, -self.gravity, 0.0, 0.0, 0.0, 0.0]), level[0], R)
-                self.correct(vector([self.gravity, 0.0, 0.0, 0.0, 0.0, 0.0]), level[1], R)
-                self.correct(vector(NONE), level[2] - self.gravity, R)
+                self.correct(vector([0.0, -self.gravity, 0.0]), level[0], R)
+                self.correct(vector([self.gravity, 0.0, 0.0]), level[1], R)
+                up = level[2] - self.gravity  # tells nothing of the attitude
+                self.e = self.e + up * up / R
+                self.n = self.n + 1.0
             angle = angles_of(C)
             if self.heading_new > 0.5 and cos(angle[0]) > 0.1:
                 row = (C[2] * cos(angle[1]) - C[0] * sin(angle[1])) / cos(angle[0])
-                H = vector(NONE)
-                for i in range(3):
-                    H[i] = row[i]
-                self.correct(H, wrapped(self.heading - angle[2]), self.noise_of.heading * self.noise_of.heading)
-            self.q = turned(self.q, C @ self.x[0:3])
-            self.b = self.b + self.x[3:6]
+                self.correct(row, wrapped(self.heading - angle[2]), self.noise_of.heading * self.noise_of.heading)
+            self.q = turned(self.q, C @ self.d)
+            self.b = self.b + self.db
 
     def outputs(self) -> None:
         C = matrix_of(self.q)
         self.angle = angles_of(C)
-        T = vector(UNIT)
+        rotation = C @ self.P @ C.T
+        both = C @ self.X
         for i in range(3):
             for j in range(3):
-                T[i][j] = C[i][j]
-        self.covariance = T @ self.P @ T.T
+                self.covariance[i][j] = rotation[i][j]
+                self.covariance[i][j + 3] = both[i][j]
+                self.covariance[j + 3][i] = both[i][j]
+                self.covariance[i + 3][j + 3] = self.B[i][j]
         self.nis = self.e
         self.used = self.n
