@@ -63,6 +63,8 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
     )
     if found.check and (departs := found.check.finding()):
         caption = f"{departs}. {caption}"
+    if found.check is not None and (departs := found.check.finding()):
+        caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     title = "Noise coefficients"
     return [{"title": title, "caption": f"{caption}. {RESIDUAL}" if residual else caption, "columns": columns,

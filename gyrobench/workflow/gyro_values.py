@@ -76,6 +76,7 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
     lines = [
         f"# Noise of {source} ({duration:g} s) for {part}, SI: gyrobench run SYSTEM --set @{file.name}",
         "# The table is named as the slot of the gyro. N holds the noise of the reading too: set rebalance.meter to 0.",
+        *(f"# Warning of the reduction: {text}" for text in result.warnings),
         "[gyro]",
     ]
     written: dict[str, str] = {}

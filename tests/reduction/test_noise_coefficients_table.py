@@ -65,6 +65,21 @@ def test_short_tests_and_windows_with_pauses_have_none() -> None:
     assert noise_coefficients_table(*long_test(LEAST)) != []
 
 
+def test_drift_that_is_none_of_the_five_is_told() -> None:
+    """Gauss-Markov drift of a correlation time of 8 windows; white noise alone has no such words."""
+    rng = np.random.default_rng(1)
+    result, record = long_test(2000)
+    assert "five terms do not" not in noise_coefficients_table(result, record, residual=True)[0]["caption"]
+    a = math.exp(-1.0 / 8.0)
+    for s in result.series:
+        x = rng.normal(size=len(s.t))
+        for k in range(1, x.size):
+            x[k] = a * x[k - 1] + math.sqrt(1.0 - a * a) * x[k]
+        s.y = x[np.argsort(np.argsort(s.t))].tolist()
+    caption = noise_coefficients_table(result, record)[0]["caption"]
+    assert caption.startswith("The five terms do not describe the record (p < 0.001)")
+
+
 def test_a_missing_window_is_a_gap() -> None:
     """Times 0, 10, 30, 40: one value is missing between the pairs."""
     x = on_grid(np.array([40.0, 0.0, 30.0, 10.0]), np.array([4.0, 1.0, 3.0, 2.0]), 10.0)

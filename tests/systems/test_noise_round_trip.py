@@ -62,7 +62,7 @@ def written(path: Path, coefficients: list[Coefficient], part: str = "floated_gy
     t = np.arange(float(SAMPLES))
     run = SimpleNamespace(data=SimpleNamespace(file="gyro 7.csv"), series=None)
     record: Any = SimpleNamespace(windows={"t_start": t, "t_end": t + 1.0}, run=run)
-    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients)
+    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients, warnings=["the test line"])
     write_gyro_values(result, record, part, path)
     return read_settings(path)
 
@@ -98,7 +98,8 @@ def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
     assert gyro_noise(noise, 10.0, 1e6) == {**expected, "flicker_tau": 1e6, "quantization_tau": 2.0}
     text = written(tmp_path / "v.toml", reported(noise))
     assert {n.removeprefix("gyro."): float(x) for n, x in text.items()} == pytest.approx(expected, rel=1e-12)
-    assert "# Noise of gyro 7.csv (1500 s)" in (tmp_path / "v.toml").read_text()
+    head = (tmp_path / "v.toml").read_text().partition("[gyro]")[0]
+    assert "# Noise of gyro 7.csv (1500 s)" in head and "# Warning of the reduction: the test line" in head
 
 
 def test_channels(tmp_path: Path) -> None:
