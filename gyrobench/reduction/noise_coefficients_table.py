@@ -54,12 +54,12 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         e = getattr(found, name)
         value = e.value / si if e.determined else None
         high = None if residual and name in SLOW else float(e.high) / si
-        finding = "" if e.determined else "not determined: the interval holds 0"
+        finding = "" if e.determined else "not determined"
         rows.append([f"{name}, {meaning}", value, float(e.low) / si, high, unit, finding])
     count = sum(int(np.isfinite(x).sum()) for x in stretches)
     caption = (
-        f"IEEE 952, from {count} means of {length:g} s by maximum likelihood. Gauss-Markov drift is not among the five "
-        "terms: B and K take it up"
+        f"IEEE 952, from {count} means of {length:g} s by maximum likelihood; not determined: the interval holds 0. "
+        "Gauss-Markov drift is not among the five terms: B and K take it up"
     )
     if found.check and (departs := found.check.finding()):
         caption = f"{departs}. {caption}"
