@@ -163,6 +163,20 @@ def test_every_relaxation(instance: Callable[..., Any]) -> None:
     assert pytest.approx(np.array(rows), rel=1e-9) == got["plain"].T
 
 
+@pytest.mark.parametrize("h", STEPS)
+def test_rate_ramp(h: float, instance: Callable[..., Any]) -> None:
+    """A gyro without other noise: the Allan variance of a ramp R is R2 tau2 / 2 exactly."""
+    one = instance("floated_gyro", "native")
+    one.set({"ramp": 2e-6, "markov": 0.0, "white": 0.0})
+    one.initialize()
+    x = []
+    for k in range(64):
+        one.step(k * h, h)
+        x += one.get(["drift"])
+    for m in (1, 2, 8):
+        assert allan(np.array(x), m) == pytest.approx((2e-6 * m * h) ** 2 / 2.0, rel=1e-6)
+
+
 GYROS = (("floated_gyro", ""), ("compliant_gyro", ""), ("gyro_2dof", "_x"), ("gyro_2dof", "_y"))
 
 
