@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
+from scipy.spatial.transform import Rotation
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification, Test
 
@@ -74,13 +76,20 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     result.tests = tests
     result.residual_std = math.sqrt(float(np.mean(np.sum(errors[measured] ** 2, axis=1)))) / DEG
     result.residual_unit, result.dof = "°", float(measured.size)
-    result.summary = told(
-        result.coefficients,
-        f"{name or 'The estimator'}: attitude to {{attitude}} (rms) over all phases.",
-        *(f"Tilt error in {g.label}: {{tilt {g.label}}}." for g in found.gates if g.label in ("acceleration", "turn")),
-        *(f"Gyro biases after {g.label}: to {{bias {g.label}}}." for g in calm[-1:]),
-    )
+    labels = [g.label for g in found.gates]
+    result.summary = [
+        f"{name or 'The estimator'}: attitude to {_words(result, 'attitude')} over all phases.",
+        *(f"Tilt error in {n}: {_words(result, f'tilt {n}')}." for n in labels if n in ("acceleration", "turn")),
+        *(f"Gyro biases after {g.label}: to {_words(result, f'bias {g.label}')}." for g in calm[-1:]),
+    ]
     return result
+
+
+def _words(result: LoopResult, name: str) -> str:
+    """Return an rms with its interval: "0.0302° (rms; 95 %: 0.024 to 0.041)"."""
+    c = result[name]
+    unit = c.unit if c.unit.startswith("°") and len(c.unit) == 1 else f" {c.unit}"
+    return f"{c.estimate:.3g}{unit} (rms; 95 %: {c.interval[0]:.2g} to {c.interval[1]:.2g})"
 
 
 def vectors(channels: Mapping[str, Array], name: str) -> Array:
@@ -110,8 +119,6 @@ def matrices(angle: Array) -> Array:
 
 def attitude_errors(estimated: Array, true: Array) -> Array:
     """Return the rotation vectors d (n, 3), rad, vehicle axes: C_true = exp(-[d x]) C_estimated."""
-    from scipy.spatial.transform import Rotation
-
     turned = np.einsum("nij,nkj->nik", matrices(estimated), matrices(true))  # C_est C_true' = exp([d x])
     return np.asarray(Rotation.from_matrix(turned).as_rotvec())
 
@@ -126,7 +133,8 @@ def _size(
 ) -> None:
     """rms of the length of vectors (n, axes); u of as many independent squares as the series hold.
 
-    most: largest u: where an acceleration makes the error, noise changes it by what it is without one.
+    most: largest u: where an acceleration makes the error, noise changes it by what it is without one.  The interval is
+    that of a root of chi-square with as many degrees of freedom, k its upper side: an rms has no value below 0.
     """
     value = math.sqrt(float(np.mean(np.sum(x * x, axis=1))))
     squares = np.mean(x * x, axis=0)
@@ -135,7 +143,13 @@ def _size(
         return
     # var of a mean square of Gaussian series: sum of 2 (mean square)^2 / nu
     variance = sum(2.0 * s * s / lasting_squares(x[:, k]) for k, s in enumerate(squares) if s > 0.0)
-    found.measure(name, meaning, unit, value / scale, min(math.sqrt(variance) / (2.0 * value), most) / scale)
+    u = min(math.sqrt(variance) / (2.0 * value), most)
+    nu = 0.5 * (value / u) ** 2
+    low, high = (value * math.sqrt(nu / float(special.chdtri(nu, q))) / scale for q in (0.025, 0.975))
+    found.measure(name, meaning, unit, value / scale, u / scale)
+    found.coefficients[-1] = replace(
+        found.coefficients[-1], interval=(low, high), k=(high - value / scale) / (u / scale), dof=nu
+    )
 
 
 def consistency(found: LoopFindings, e: Array, rows: NDArray[np.int_]) -> list[Test]:
@@ -165,8 +179,6 @@ def whitened(channels: Mapping[str, Array], e: Array, rows: NDArray[np.int_]) ->
 
 
 def _against(found: LoopFindings, name: str, what: str, value: float, nu: float) -> Test:
-    from scipy import special
-
     below = float(special.chdtr(nu, value * nu))
     p = 2.0 * min(below, 1.0 - below)
     found.measure(

@@ -76,6 +76,16 @@ def test_the_multiplicative_filter_is_consistent_at_any_attitude() -> None:
         assert r.result["tilt rocking"].estimate < 0.008
 
 
+def test_intervals_of_an_rms_are_those_of_chi_square() -> None:
+    """Above 0, wider upwards; few independent values of a bias: the next run may have several times as much."""
+    r = made(phases=CALM)
+    for c in r.result.coefficients[:-2]:
+        assert 0.0 < c.interval[0] < c.estimate < c.interval[1]
+        assert c.interval[1] == pytest.approx(c.estimate + c.k * c.u)
+        assert c.interval[1] - c.estimate > c.estimate - c.interval[0]
+    assert r.result["bias rocking"].dof < 20.0 < r.result["tilt rocking"].dof
+
+
 def test_the_linear_filter_is_consistent_at_small_angles_only() -> None:
     small, large = (made("kalman", phases=CALM, rocking=x) for x in ("1deg", "20deg"))
     assert abs(small.result["NEES"].estimate - 1.0) < 4.0 * small.result["NEES"].u

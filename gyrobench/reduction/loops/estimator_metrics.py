@@ -93,7 +93,7 @@ def independent_squares(x: Array) -> float:
 def lasting_squares(x: Array) -> float:
     """Return :func:`independent_squares` of a series whose errors stay over much of it: a constant counts once.
 
-    n/(1 + 2 sum (1 - k/n) rho_k^2), lags up to n/2, rho_k of the n - k products there are.
+    n/(1 + 2 sum (1 - k/n) rho_k^2), all lags, rho_k of the n - k products there are.
     """
     n = x.size
     power = float(x @ x) / n
@@ -101,7 +101,7 @@ def lasting_squares(x: Array) -> float:
         return 1.0
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.fft.rfft(x, size)
-    lags = np.arange(1, n // 2 + 1)
+    lags = np.arange(1, n)
     rho = np.fft.irfft(spectrum * spectrum.conj(), size)[lags] / (n - lags) / power
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum((1.0 - lags / n) * (rho * rho - 1.0 / (n - lags))))))
 
