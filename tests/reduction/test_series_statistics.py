@@ -164,6 +164,23 @@ def test_lines_in_slow_drift_and_none_where_there_are_none() -> None:
     assert alarms <= 19  # of 180 at 5 %: 9 expected, standard deviation 3
 
 
+def test_a_line_that_wanders_is_said_to_and_close_ones_are_told_apart() -> None:
+    """Phase of a random walk: two lines, none steady; two lines 2.6 bins apart are two, a comb of eight is eight."""
+    rng = np.random.default_rng(23)
+    n, t = 8000, np.arange(8000) * 0.01
+    wander = np.sin(2 * np.pi * 11.0 * t + np.cumsum(rng.normal(size=n)) * 0.03)
+    found = lines.find_lines(rng.normal(size=n) + 2.0 * wander, 0.01)
+    assert found.complete and 1 <= len(found.lines) <= 4
+    assert all(not line.steady for line in found.lines if abs(line.frequency - 11.0) < 0.1)
+    close = np.sin(2 * np.pi * 11.0 * t) + 0.5 * np.sin(2 * np.pi * (11.0 + 2.6 / 80.0) * t + 1.0)
+    pair = lines.find_lines(rng.normal(size=n) + close, 0.01).lines
+    assert len(pair) == 2 and all(line.steady for line in pair)
+    assert pair[1].amplitude == pytest.approx(0.5, abs=4 * pair[1].u_amplitude)
+    comb = sum(np.sin(2 * np.pi * 1.7 * k * t + k) / k for k in range(1, 9))
+    found = lines.find_lines(rng.normal(size=n) + comb, 0.01)
+    assert sorted(round(line.frequency / 1.7) for line in found.lines) == list(range(1, 9))
+
+
 def test_refusals_of_lines() -> None:
     x = np.random.default_rng(6).normal(size=1000)
     with pytest.raises(SeriesError, match=r"shows 0.002 to 0.5 Hz"):

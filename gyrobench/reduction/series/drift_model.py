@@ -210,6 +210,11 @@ def _limits(
         )
     if not lines.complete:
         out.append(f"{len(lines.lines)} lines were removed; there may be more.")
+    if moving := [line for line in lines.lines if not line.steady]:
+        out.append(
+            f"The line at {moving[0].frequency:.4g} Hz changes its frequency or amplitude during the record; only its "
+            "steady part was removed."
+        )
     if drift is not None and (limit := markov.check_length(drift)):
         out.append(f"Correlation time: {limit}.")
     elif drift is not None and mixed is not None and not mixed.white:

@@ -10,8 +10,9 @@ the mean logarithm over up to 64 bins on either side (a straight line over log f
 gamma type describe, trigamma(k) = its variance.  The ratio R then exceeds r by chance with the probability
 (1 + r exp(-digamma k))^-k in one bin, and 1 - (1 - p)^M in any of M.  Not modelled: noise resonances narrower than
 some 60 bins, which count as lines; lines of fewer than about 6 cycles in the record are not sought, slow noise looks
-like them.  Estimates are least squares of all lines together with level and slope, found by Gauss-Newton steps on
-exact sums.
+like them.  Of a line that wanders (a third significant value within 32 bins) two lines are removed, marked as not
+steady; what is left of it stays.  Estimates are least squares of all lines together with level and slope, found by
+Gauss-Newton steps on exact sums.
 [DRIFT-PERIODIC; Xia 2008, eq. 3.4.2..3.4.5 with EX11]
 """
 
@@ -33,7 +34,8 @@ HALF = 64  # bins of the level on either side
 LEAST_NEIGHBOURS = 8
 EULER = 0.5772156649015329  # E ln of a unit exponential is minus this
 MOST = 20  # lines
-SWEEPS = 40
+SWEEPS = 20
+CLUSTER = 32  # bins: two lines may be as near as that, of more it is one that wanders
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class Line:
     u_phase: float
     density: float  # one-sided, of the noise around it, unit^2/Hz
     false_alarm: float  # probability that a record without lines shows one as clear as this; NaN: not tested
+    steady: bool = True  # False: power around it that is no third line, so its frequency or amplitude changes
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class _Model:
 class _Fitted:
     f: float
     density: float  # of the noise around it
+    steady: bool = True
     c: complex = 0j  # b - i a, about the middle of the record
 
 
@@ -223,12 +227,18 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
         taken: list[int] = []
         for bin_, chance in sorted(found, key=lambda item: -density[item[0]]):
             # of what a stronger line leaks into this bin nothing is left after the next pass
-            if all(abs(bin_ - o) > 2 and density[bin_] > density[o] / (abs(bin_ - o) - 1.0) ** 2 for o in taken):
+            if any(abs(bin_ - o) <= 2 or density[bin_] <= density[o] / (abs(bin_ - o) - 1.0) ** 2 for o in taken):
+                continue
+            beside = [line for line in removal.lines if abs(line.f * n * dt - bin_) < CLUSTER]
+            if len(beside) >= 2:
+                for line in beside:
+                    line.steady = False
+            elif len(removal.lines) < most:
                 taken.append(bin_)
-                if len(removal.lines) < most:
-                    removal.start(_interpolated(removal.padded[:n], bin_, dt), float(around[bin_]), chance)
+                removal.start(_interpolated(removal.padded[:n], bin_, dt), float(around[bin_]), chance)
+        complete = not taken and len(removal.lines) < most
         removal.fit()
-        if len(removal.lines) >= most:
+        if not taken or len(removal.lines) >= most:
             break
     return _finished(x, dt, removal, level, complete)
 
@@ -259,7 +269,9 @@ def _finished(x: Array, dt: float, removal: _Removal, level: float, complete: bo
         b, a = fitted.c.real, -fitted.c.imag
         phase = math.atan2(b, a) - 2.0 * math.pi * fitted.f * dt * (n - 1) / 2.0
         phase = (phase + math.pi) % (2.0 * math.pi) - math.pi
-        lines.append(Line(fitted.f, math.sqrt(3.0) * u / (math.pi * A * T), A, u, phase, 2.0 * u / A, S, chance))
+        lines.append(
+            Line(fitted.f, math.sqrt(3.0) * u / (math.pi * A * T), A, u, phase, 2.0 * u / A, S, chance, fitted.steady)
+        )
     lines.sort(key=lambda line: -line.amplitude)
     return Lines(tuple(lines), residual[:n].copy(), level, complete)
 
