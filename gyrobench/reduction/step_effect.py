@@ -92,7 +92,7 @@ def _budget(result: Result, c: Coefficient, part: float, step: float) -> None:
     if c.u > 0.0 and not any(b.coefficient == c.name for b in lines):
         lines.append(BudgetLine("noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A"))
     note = "m(h) − m(0), rectangular"
-    lines.append(BudgetLine(SOURCE, step, "s", part / step, f"{c.unit}/s", part, c.unit, c.name, note))
+    lines.append(BudgetLine(SOURCE, step, "s", part / step, f"{c.unit}/s", abs(part), c.unit, c.name, note))
 
 
 def _widen(c: Coefficient, part: float) -> None:

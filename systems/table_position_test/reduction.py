@@ -26,6 +26,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, LoopResult, Series, Specification
 
@@ -320,7 +321,7 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
         residual_unit="arcsec",
         tables=tables,
         summary=[
-            f"Largest position error {a.estimate:+.2g}″ (u = {a.u:.2g}″) at {where:g}°; "
+            f"Largest position error {plus_minus(a).replace(' arcsec', '″')} at {where:g}°; "
             f"repeatability {spread / ARCSEC:.2g}″ (one count: {float(p.get('reader.quantum', 0.0)) / ARCSEC:.2g}″).",
             "Orders told from the polygon: " + (", ".join(map(str, orders)) or "none") + ".",
         ],

@@ -14,6 +14,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Coefficient, LoopResult, Response, Specification
 
@@ -195,6 +196,7 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
     if "controller.e" in record.channels:
         responses.insert(0, _tracking(record))
     worst = max(readings, key=lambda r: abs(r.mean) + 2.0 * r.ripple)
+    at_worst = f"{worst.rate / ERU:+.6g}".replace("-", "−")
     name = run.parts["controller"].name if "controller" in run.parts else run.instrument
     return LoopResult(
         system=run.system,
@@ -214,10 +216,11 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
         warnings=warnings,
         tables=tables,
         summary=[
-            f"Time base of the command: {clock / PPM:+.3g} ppm (u = {u_clock / PPM:.2g} ppm) from {len(readings)} runs "
-            f"at {min(abs(r.rate) for r in readings) / ERU:.4g} to {max(abs(r.rate) for r in readings) / ERU:.6g} ERU.",
+            f"Time base of the command: {plus_minus(found[0]).removesuffix(' 1e-6 (95 %)')} ppm (95 %) from "
+            f"{len(readings)} runs at {min(abs(r.rate) for r in readings) / ERU:.4g} to "
+            f"{max(abs(r.rate) for r in readings) / ERU:.6g} ERU.",
             f"Largest tracking error (mean and two standard deviations) "
-            f"{(abs(worst.mean) + 2.0 * worst.ripple) / ARCSEC:.2g}″, at {worst.rate / ERU:+.6g} ERU (1.5″ allowed).",
+            f"{(abs(worst.mean) + 2.0 * worst.ripple) / ARCSEC:.2g}″, at {at_worst} ERU (1.5″ allowed).",
         ],
         decision_rule=uncertainty.DECISION_RULE,
         verdict=uncertainty.worst_verdict(c.verdict for c in found),

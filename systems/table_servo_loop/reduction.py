@@ -144,7 +144,7 @@ def _square_law(found: LoopFindings, loop: ServoLoop | None) -> None:
         blocks = np.array([b.mean() for b in np.array_split(late, BLOCKS)])
         ends[gate.label] = gate.amplitude, float(late.mean()), float(np.std(blocks, ddof=1))
         found.step(gate, "gyro.b", scale=ARCSEC, unit="″", y_name="float angle")
-    forth, back = ends.get("torque 1 M"), ends.get("torque -1 M")
+    forth, back = ends.get("torque 1 M"), ends.get("torque −1 M")
     if forth is None or back is None:
         return
     closed = None

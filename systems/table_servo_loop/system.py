@@ -110,7 +110,10 @@ class TableServoLoop(LoopTest):
         frequencies = [f * share for f in TESTS]
         long: Any = {"periods": 20, "settle": 0.5 / share, "dwell": 1.0 / share}
         weights = [
-            LoopPhase(f"torque {w:g} M", "torque", "step", 1, w * self.hung(), settle=slow, dwell=slow) for w in WEIGHTS
+            LoopPhase(
+                f"torque {w:g} M".replace("-", "−"), "torque", "step", 1, w * self.hung(), settle=slow, dwell=slow
+            )
+            for w in WEIGHTS
         ]
         turns = [
             LoopPhase(f"turning {way}", "command", "step", 1, sign * self["turning"], settle=slow, dwell=RINGS)

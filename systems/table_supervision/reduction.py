@@ -99,8 +99,8 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     summary = [f"Found: {by} {n} faults; named rightly: {int((seen & named).sum())}."]
     if slowest is not None:
         summary.append(f"Slowest to find: {slowest.name[2:]}, {slowest.estimate:.2g} s.")
-    bounds = f"{low / hours:.2g} to {high / hours:.2g} 1/h"
-    summary.append(f"False alarms: {count} in {hours:.3g} h without faults (95 %: {bounds}).")
+    low, high = (float(f"{x / hours:.2g}") for x in (low, high))  # two digits, without a power of ten
+    summary.append(f"False alarms: {count} in {quiet:.4g} s without faults (95 %: {low:g} to {high:g} 1/h).")
     result = LoopResult(
         system=run.system,
         title="Supervision of a table",

@@ -113,6 +113,14 @@ def test_effects_and_verdicts() -> None:
     assert r.warnings[-1] == "Mind the step." and plus_minus(a).endswith("°/h (95 %)")
 
 
+def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
+    """U = 1.96 u: 5839 is 5800, and the estimate is rounded to hundreds; 0.0023 has four decimals."""
+    (c,) = [x for x in result(line(60, 0.001)).coefficients if x.name == "a"]
+    large = replace(c, estimate=263087.4, u=2979.0, k=1.96, unit="N·m/rad")
+    assert plus_minus(large) == "263100 ± 5800 N·m/rad (95 %)"
+    assert plus_minus(replace(large, estimate=-0.30012, u=0.00117, unit="°/h")) == "−0.3001 ± 0.0023 °/h (95 %)"
+
+
 def test_merge_of_two_channels() -> None:
     x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
     parts = {"x channel": result(x, warnings=["same"]), "y channel": result(y, warnings=["same", "other"])}

@@ -135,3 +135,13 @@ def test_the_effect_stated_by_default_is_that_of_much_smaller_steps(command: Any
     assert again["step_check"] == result["step_check"] and again["coefficients"] == result["coefficients"]
     code, out, _ = command("run", PLATFORM, "--set", "hold=10s", "--out", tmp_path / "b")  # with --no-check-step
     assert code == 0 and "step check" not in out
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_effect_of_either_sign_has_its_share_of_the_variance(sign: float) -> None:
+    """|c| u(x): the figure of the budget shows no bar for a contribution below 0, although it is in u."""
+    r = loop_result(coefficient(10.0, 0.3))
+    rows = [{"name": "m", "unit": "1", "change": sign * 0.4 * math.sqrt(3.0)}]
+    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": rows})
+    assert [b.contribution for b in r.budget] == pytest.approx([0.3, 0.4])
+    assert r.budget[1].sensitivity == pytest.approx(sign * 400.0)

@@ -130,8 +130,9 @@ def plus_minus(c: Coefficient) -> str:
     U = c.k * c.u
     if not U > 0.0 or not math.isfinite(U):
         return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
-    digits = max(0, 1 - math.floor(math.log10(U)))
-    return f"{c.estimate:.{digits}f} ± {U:.{digits}f} {c.unit} (95 %)".replace("-", "−")
+    digits = 1 - math.floor(math.log10(U))
+    shown = max(0, digits)
+    return f"{round(c.estimate, digits):.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
 
 
 def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: Specification) -> Coefficient:

@@ -221,7 +221,7 @@ def fit(
     if slow and tau[2] > 0.9 * float(grid.tau.max()):
         warnings.append(
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
-            f"{tau[2]:.3g} s). Slower drift is confounded with the constant term, whose interval is valid for this "
+            f"{tau[2]:.0f} s). Slower drift is confounded with the constant term, whose interval is valid for this "
             "record only."
         )
     columns = np.column_stack([X, Z])[:, keep]

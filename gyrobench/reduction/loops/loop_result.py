@@ -337,7 +337,8 @@ class LoopFindings:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
             curves.append({**curve, "y": ((measures.initial + simulated[pick]) / scale).tolist()})
         what = y_name or output
-        cause = f"{gate.amplitude:g} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
+        size = f"{gate.amplitude:g}".replace("-", "−")
+        cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
         self.responses.append(
             Response(
                 name=f"{gate.label}, {what}",
