@@ -2,6 +2,7 @@
 
     python tests/benchmarks/estimators.py            # all; half a minute
     python tests/benchmarks/estimators.py --runs 200 lti coefficients
+    python tests/benchmarks/estimators.py --days 40  # instead: the live estimate of servo_polar, shortened days
 
 NEES: mean of error' P^-1 error at the end of a run over its degrees of freedom; NIS: of all innovations of all runs.
 Each should be 1; the bounds of 99 % are those of chi-square.  Rows "wrong: ..." are told a wrong model.
@@ -172,12 +173,47 @@ def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Coun
     yield "wrong: coefficients, tau x 2", lambda rng: coefficients(rng, runs, tau=3600.0)
 
 
+def live_days(days: int, seed: int) -> None:
+    """Count how often 95 % of the live estimate hold the truth, at the end and at the stop: days of 1723 s."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
+    from servoing import DAY50, polar_harmonics
+
+    from gyrobench.engine.session import Session
+    from gyrobench.system.system import load_system
+
+    names, held = ("A0", "A1", "B1", "A2", "B2"), {"end": [], "stop": []}  # type: ignore[var-annotated]
+    values = {**DAY50, "route": "combination", "wanted": 0.002 * DPH, "coefficients.sigma": 9.5e-8}
+    system, nis = load_system("servo_polar"), []
+    system.request("coefficients")
+    with Session(system) as session:
+        for k in range(days):
+            record = session.run({**values, "gyro.markov_tau": 60.0, "gyro.markov": 0.004 * DPH}, seed=seed + k)
+            w = record.windows
+            for row in record.run.plan:
+                if row.label not in ("polar S", "polar N"):
+                    continue
+                rows, true = np.flatnonzero(w["phase"] == row.phase), polar_harmonics(record, row.label)
+                nis.append(w["live_mean_nis"][rows[-1]])
+                for name, at in (("end", rows[-1]), ("stop", rows[w["live_may_stop"][rows] > 0.5][0])):
+                    error = [(w[f"live_value_{n}"][at] - true[n]) / w[f"live_sd_{n}"][at] for n in names]
+                    held[name].append(np.array(error))
+    for name, errors in held.items():
+        inside = np.mean(np.abs(errors) < 1.96, axis=0)
+        print(f"{name:5s} {len(errors)} mounts: held {inside.min():.3f} to {inside.max():.3f}, "
+              f"mean square {np.mean(np.square(errors)):.3f}")  # fmt: skip
+    print(f"NIS {np.mean(nis):.3f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="only the rows with one of these words")
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--days", type=int, default=0, help="count the live estimate of servo_polar in so many days")
     given = parser.parse_args()
+    if given.days:
+        live_days(given.days, given.seed)
+        return
     print(f"{'filter':30s} {'NEES':>7s} {'99 % of':>9s} {'chi-sq.':>7s} {'NIS':>7s} {'99 % of':>9s} {'chi-sq.':>7s}")
     for name, count in cases(given.runs):
         if given.names and not any(word in name for word in given.names):

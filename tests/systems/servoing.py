@@ -71,6 +71,23 @@ def expected_rate(record: Any) -> Array:
     return rate
 
 
+def polar_harmonics(record: Any, mount: str) -> dict[str, float]:
+    """True drift over the angle in a polar mount, rad/s: A0 + A1 cos + B1 sin + A2 cos 2 + B2 sin 2.
+
+    X = s, Y = c sin, Z = c cos of the angle, with s, c = g sin, g cos of the latitude in mount S, negative in N.
+    """
+    latitude, D = record.run.options["latitude"], {n: record.run.parameters[f"gyro.{n}"] for n in NAMES}
+    g = frames.normal_gravity(latitude) / frames.G0 * (1.0 if mount == "polar S" else -1.0)
+    s, c = g * math.sin(latitude), g * math.cos(latitude)
+    return {
+        "A0": D["D_F"] + D["D_I"] * s + D["D_II"] * s * s + D["D_SS"] * c * c / 2.0,
+        "A1": D["D_S"] * c + D["D_IS"] * s * c,
+        "B1": D["D_O"] * c + D["D_IO"] * s * c,
+        "A2": D["D_SS"] * c * c / 2.0,
+        "B2": D["D_OS"] * c * c / 2.0,
+    }
+
+
 def errors(result: Any, values: dict[str, Any]) -> dict[str, float]:
     """Estimate minus truth, deg/h per g^n."""
     return {c.name: c.estimate - values[f"gyro.{c.name}"] / DPH for c in result.coefficients}
