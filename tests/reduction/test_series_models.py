@@ -371,6 +371,21 @@ def test_description_of_a_drift(drift: DriftModel) -> None:
     assert drift.runs is not None and drift.runs[0].z < -1.96
 
 
+def test_description_does_not_depend_on_the_unit() -> None:
+    """In rad/s about an offset (1e-12, 5e-9) as in °/h: no tolerance is absolute."""
+    x = autoregressive(0.9, 700, np.random.default_rng(24)) + 1.5 * np.sin(0.7 * np.arange(700))
+    one, other = describe(x, 5.0), describe(1e-12 * x + 5e-9, 5.0)
+    assert one.recommended == other.recommended and one.refused == other.refused == {}
+    assert one.gauss_markov is not None and other.gauss_markov is not None and one.burg is not None
+    assert other.gauss_markov.tau == pytest.approx(one.gauss_markov.tau, rel=1e-5)
+    assert other.gauss_markov.high == pytest.approx(one.gauss_markov.high, rel=1e-4)
+    assert other.burg is not None and other.burg.low == pytest.approx(one.burg.low, rel=1e-5, abs=1e-9)
+    assert [line.amplitude for line in other.lines.lines] == pytest.approx(
+        [1e-12 * line.amplitude for line in one.lines.lines], rel=1e-6
+    )
+    assert len(one.lines.lines) == 1 and other.spectrum.density == pytest.approx(1e-24 * one.spectrum.density, rel=1e-3)
+
+
 def test_description_on_block_means_says_so() -> None:
     """A wandering level with a steep record: models describe means of 4 samples; the walk is named."""
     rng = np.random.default_rng(19)

@@ -110,7 +110,10 @@ def fit_arma(x: Any, p: int, q: int) -> Arma:
     columns += [signal.lfilter([1.0], ma, np.concatenate([np.zeros(j), e[:-j]])) for j in range(1, q + 1)]
     J = np.column_stack(columns)[settled:]
     R = np.linalg.qr(J, mode="r")
-    u = np.linalg.norm(np.linalg.inv(R), axis=1) * math.sqrt(variance * J.shape[0] / x.size)
+    if np.linalg.cond(R) < 1e12:
+        u = np.linalg.norm(np.linalg.inv(R), axis=1) * math.sqrt(variance * J.shape[0] / x.size)
+    else:  # a root of phi is one of theta: of white noise any such pair fits
+        u = np.full(p + q, math.inf)
     value = np.concatenate([phi, theta])
     invertible = 1.0 - radius > AT_THE_CIRCLE / x.size
     if not invertible:
