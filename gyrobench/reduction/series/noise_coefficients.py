@@ -41,7 +41,10 @@ NAMES = ("N", "B", "K", "Q")  # order of the variances
 
 @dataclass(frozen=True)
 class Estimate:
-    """One coefficient; not determined: the interval of 95 % holds zero, the coefficient is below ``high``."""
+    """One coefficient; not determined: the interval of 95 % holds zero, the coefficient is below ``high``.
+
+    The interval covers whatever the truth; among those that just exclude zero are more misses (tests/benchmarks).
+    """
 
     value: float
     low: float
