@@ -35,6 +35,7 @@ BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
 JUMP = 100.0  # spreads of the increments of an angle
+LONG = 1 << 20  # steps of a gap at most on the grid; of a longer one the rest is left out
 TURNS = (2.0 * math.pi,)
 WRAPS = tuple(2.0**k for k in (8, 12, 14, 16, 18, 20, 24, 32))  # of counts
 
@@ -131,9 +132,10 @@ class DriftReader:
             )  # fmt: skip
         self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
         self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
-        self.held = Held([*(s.name for s in signals), *self.others])
+        self.held = Held([TIME, *(s.name for s in signals), *self.others])
         self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (RATE, PER_SAMPLE)}
         self.position = 0  # on the grid, of the next sample
+        self.cut = 0  # samples of long gaps that are left out of it
         self.before = math.nan  # time of the last sample
         self.last_other = dict.fromkeys(self.others, math.nan)
         self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
@@ -141,7 +143,7 @@ class DriftReader:
         self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
 
     def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
-        """Return the means that are held, NaN in gaps: rates in rad/s, other columns in SI.  Raises DataError."""
+        """Return the means that are held, NaN in gaps: time, rates in rad/s, other columns in SI.  Raises DataError."""
         start, rows, told = time.monotonic(), 0, 0.0
         for block in self.table.blocks(self.columns):
             first = next(iter(block.values()))
@@ -173,7 +175,8 @@ class DriftReader:
         if not good.any():
             return
         t = block[TIME][good] if self.timed else np.empty(0)
-        place = self._places(t, row[good]) if self.timed else rows + np.flatnonzero(good)
+        number = rows + np.flatnonzero(good)
+        place = self._places(t, row[good]) if self.timed else number - self.cut
         if not self.timed:
             about.gaps += int(np.sum(np.diff(np.concatenate([[self.position - 1], place])) > 1))
         follows = np.diff(np.concatenate([[self.position - 1], place])) == 1
@@ -181,6 +184,7 @@ class DriftReader:
         dt = self._intervals(t) if self.timed else np.full(place.size, about.step)
         values = {s.name: self._rate(s, block[s.name][good], follows, dt) for s in self.signals}
         others = {n: block[n][good] for n in self.others}
+        values[TIME] = t if self.timed else about.step * number.astype(float)
         about.samples += place.size
         self._put(place, values, others, observers)
 
@@ -285,9 +289,25 @@ class DriftReader:
         others: dict[str, Array],
         observers: Sequence[Observer],
     ) -> None:
-        """Hand on runs without a gap; what lies between is missing."""
+        """Hand on runs without a gap; what lies between is missing, of a long gap LONG samples."""
+        steps = np.diff(np.concatenate([[self.position - 1], place]))
+        self.about.missing += int(np.sum(steps - 1))
+        if np.any(steps > LONG):
+            cut = np.cumsum(np.maximum(steps - LONG, 0))
+            place, self.cut = place - cut, self.cut + int(cut[-1])
+            for part in np.split(np.arange(place.size), np.flatnonzero(steps > LONG)):
+                if part.size:
+                    taken = {n: v[part] for n, v in values.items()}
+                    self._run(place[part], taken, {n: v[part] for n, v in others.items()}, observers)
+        else:
+            self._run(place, values, others, observers)
+
+    def _run(
+        self, place: NDArray[np.int64], values: dict[str, Array], others: dict[str, Array],
+        observers: Sequence[Observer],
+    ) -> None:  # fmt: skip
+        """Hand on samples with gaps of LONG at most between them."""
         self.held.skip(int(place[0]) - self.position)
-        self.about.missing += int(place[0]) - self.position
         size = int(place[-1] - place[0]) + 1
         gap_free = size == place.size
         at = place - place[0]
@@ -298,10 +318,9 @@ class DriftReader:
                 grid[at] = v
                 v = grid
             dense[n] = self._filled(n, v) if n in others else v
-        self.about.missing += size - place.size
         for k in range(0, size, 1 << 18):
             self.held.add({n: v[k : k + (1 << 18)] for n, v in dense.items()})
-        for n in values if observers else ():
+        for n in (s.name for s in self.signals if observers):
             v = dense[n]
             edges = np.flatnonzero(np.diff(np.isfinite(v).astype(np.int8), prepend=0, append=0))
             for a, b in edges.reshape(-1, 2).tolist():
@@ -333,7 +352,7 @@ class DriftReader:
             mean = self.regular[1] / self.regular[0]
             about.jitter = math.sqrt(max(self.regular[2] / self.regular[0] - (mean / about.step - 1.0) ** 2, 0.0))
             about.step = mean
-        about.last = self.before if self.timed else about.step * (self.position - 1)
+        about.last = self.before if self.timed else about.step * (self.position - 1 + self.cut)
         for s in self.signals:
             e = self.extremes[s.name]
             about.stuck[s.name] = max(int(e[2]), int(e[3])) if e[0] < e[1] else 0

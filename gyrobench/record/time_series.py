@@ -61,7 +61,11 @@ def read_blocks(file: Path, head: Head, columns: Sequence[Column]) -> Iterator[d
             rows += batch.num_rows
             yield {n: places[n][1].to_si(_floats(batch.column(c))) for n, c in taken.items()}
     except pa.ArrowInvalid as error:
-        raise DataError(file, _not_numbers(file, head, taken) or [str(error)]) from None
+        try:
+            problems = _not_numbers(file, head, taken)
+        except pa.ArrowInvalid:
+            problems = ["holds text that is not UTF-8; save the table as CSV (UTF-8)"]
+        raise DataError(file, problems or [str(error)]) from None
     if wrong:
         many = f"{len(wrong)} rows have" if len(wrong) > 1 else "a row has"
         raise DataError(file, [f"{many} not the {len(head.names)} cells of the header; the first: '{wrong[0][:80]}'"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.report import drift_record_figures as figures
@@ -143,8 +143,3 @@ def _values(doc: Json, k: int) -> Any:
     columns = [Column(*h) for h in [*heads, *((d["kind"], c["unit"]) for d in others)]]
     caption = "Deviations. edf: equivalent degrees of freedom of the Allan deviation."
     return CollapsedBlocks("Values of the deviations", [Table(columns, rows, caption, small=True)])
-
-
-def main_figure(doc: Mapping[str, Any], key: str) -> str:
-    """Return the figure of the deviations of the first column, for a notebook."""
-    return figures.deviations(doc["columns"][0], key)

@@ -112,8 +112,8 @@ def result_html(result: Result) -> str:
 
 
 def _main_figure(doc: Mapping[str, Any]) -> str:
-    """Return the first loop or response, else the richest fit with its residuals, as SVG; "" where there is none."""
-    from gyrobench.report import plots, responses
+    """Return the first loop or response, the deviations of a drift record, or the richest fit, as SVG; "" for none."""
+    from gyrobench.report import drift_record_figures, plots, responses
     from gyrobench.report.style import styled
 
     key = f"nb{doc['report_id']}"  # unique in the notebook
@@ -121,6 +121,8 @@ def _main_figure(doc: Mapping[str, Any]) -> str:
         drawn = sorted(doc.get("responses") or [], key=lambda r: r["kind"] != "loop")
         if drawn:
             return responses.draw([("measured", drawn[0])], key, curves=drawn[0]["curves"])
+        if doc["columns"]:
+            return drift_record_figures.deviations(doc["columns"][0], key)
         curves = [s for s in doc["series"] if plots.is_curve(s)]
         if not curves:
             return ""

@@ -22,6 +22,7 @@ from .preparation import Prepared
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
+WILD = 20.0  # standard deviations
 MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
 
 
@@ -39,7 +40,7 @@ def acquisition(p: Prepared, run: RunDocument) -> Json:
     rows: list[list[Any]] = [
         ["sampling interval", step, "s"],
         ["samples", about.get("samples", int(np.count_nonzero(np.isfinite(p.rate)))), "1"],
-        ["length", p.rate.size * p.step / 3600.0, "h"],
+        ["length", (p.time[-1] - p.time[0] + p.step) / 3600.0, "h"],
         ["mean rate", float(np.nanmean(p.rate)) / DPH, "°/h"],
         [f"standard deviation of a {'sample' if p.step == step else 'mean'}", float(np.nanstd(p.rate)) / DPH, "°/h"],
     ]
@@ -76,7 +77,13 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     if run.series is None:
         return ["A sample is the mean of the current over a window, as an integrating meter reads it."]
     if run.series["columns"][p.name]["kind"] == "rate":
-        return []
+        if run.series["samples"] or run.options.get("bandwidth") or not _flat(p, run):
+            return []
+        return [
+            f"The spectrum is flat to half the sampling rate of {1.0 / run.series['acquisition']['step']:.3g} Hz. That "
+            "of point samples of a faster signal is too: if they are points, N holds what is folded. To say what they "
+            "are: '# samples = means', or '# bandwidth = ...Hz'."
+        ]
     return [
         "The rate is the difference of two angles over the step, which is its mean over the step: a sine of frequency "
         "f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise coefficients and the "
@@ -160,6 +167,14 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
             f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
             "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time."
         )
+    off = np.abs(p.clean - np.nanmedian(p.clean))
+    spread = 1.4826 * float(np.nanmedian(off))
+    if spread and (wild := np.flatnonzero(off > WILD * spread)).size:
+        many = f"{wild.size} samples lie" if wild.size > 1 else "A sample lies"
+        out.append(
+            f"{many} more than {WILD:g} standard deviations from the median, the first at {number(p.time[wild[0]])} s. "
+            "They raise N and hide the rest. Where they are no drift, mark them in a column flag."
+        )
     if about and about["jitter"] > 0.01 and not about["rounded"]:
         out.append(
             f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
@@ -183,12 +198,6 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
         out.append(
             f"Point samples every {about['step']:.3g} s of a signal of {bandwidth:.3g} Hz alias: N² is up to "
             f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means."
-        )
-    elif about and (run.series or {}).get("samples") == "" and not bandwidth and _flat(p, run):
-        out.append(
-            f"The spectrum is flat to half the sampling rate of {1.0 / about['step']:.3g} Hz, as that of point samples "
-            "of a faster signal: if they are points, N holds folded noise. State '# samples = means' or '# bandwidth = "
-            "...Hz'."
         )
     return out
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record import sampling
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import find_signals, open_table
+from gyrobench.record.drift_columns import TIME, find_signals, open_table
 from gyrobench.record.drift_series import DriftReader, Progress, as_dict
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
@@ -65,8 +65,9 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
     about = reader.about
     length = about.step * reader.held.factor
-    count = next(iter(columns.values())).size
-    start = about.first + length * np.arange(count)
+    middle = columns.pop(TIME)
+    there, place = np.isfinite(middle), np.arange(float(middle.size))
+    start = np.interp(place, place[there], middle[there]) - 0.5 * (length - about.step)
     windows: dict[str, Any] = {"t_start": start, "t_end": start + length, **columns}
     run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
     si = {c.name: c.unit for c in reader.columns}

@@ -71,7 +71,7 @@ def models(m: DriftModel) -> list[Json]:
         walker = m.yule_walker.phi if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)
         rows = [[*row, float(w), -row[1]] for row, w in zip(_coefficients(m.burg), walker, strict=True)]
         caption = (
-            "x_t = φ₁ x_{t−1} + ... + w_t, by Burg with 95 % intervals, and by Yule-Walker; a = −φ is what arburg "
+            "x(t) = φ₁ x(t−1) + ... + w(t), by Burg with 95 % intervals, and by Yule-Walker; a = −φ is what arburg "
             "prints: a table of a read as φ gives another, often explosive model"
         )
         head = ["coefficient", "Burg", "u", "95 % from", "95 % to", "Yule-Walker", "a (arburg)"]
@@ -85,7 +85,7 @@ def models(m: DriftModel) -> list[Json]:
     if rows:
         head = ["model", "coefficient", "estimate", "u", "95 % from", "95 % to"]
         tables.append(
-            table("Other models", "ARMA: x_t = φ₁ x_{t−1} + e_t + θ₁ e_{t−1}; ARIMA: of differences", head, rows)
+            table("Other models", "ARMA: x(t) = φ₁ x(t−1) + e(t) + θ₁ e(t−1); ARIMA: of differences", head, rows)
         )
     if m.whiteness:
         names = {"block means": "none: the means themselves", "burg": "AR, Burg", "arma": "ARMA(1,1)"}

@@ -74,6 +74,7 @@ class Prepared:
 class Columns:
     """The rates of a record and its other columns, on one grid."""
 
+    time: Array  # of the beginning of each sample, s; a gap of more than a million samples has a million
     rates: dict[str, Array]
     others: dict[str, Array]
     others_unit: dict[str, str]
@@ -88,7 +89,8 @@ def columns_of(record: Record) -> Columns:
         step = float(run.series["acquisition"]["step"]) * int(run.series["factor"])
         others = {n: np.asarray(w[n], dtype=float) for n in run.series["others"]}
         rates = {n: np.asarray(w[n], dtype=float) for n in run.series["columns"]}
-        return Columns(rates, others, run.window_units, step)
+        start = np.asarray(w["t_start"], dtype=float)
+        return Columns(start - start[0], rates, others, run.window_units, step)
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
     k = run_metadata.number(run, "k", "gyro.k", "torquer scale factor")
@@ -101,7 +103,7 @@ def columns_of(record: Record) -> Columns:
         "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
         f"k = {k * 1e-3 / DPH:.6g} °/h/mA, Earth rate along the input axis {input_rate / DPH:.6g} °/h.",
     ]
-    return Columns({"drift": rate}, others, run.window_units, step, said)
+    return Columns(step * np.arange(float(rate.size)), {"drift": rate}, others, run.window_units, step, said)
 
 
 def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
@@ -115,7 +117,7 @@ def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
         raise ReductionError(
             [f"column '{name}': {np.count_nonzero(np.isfinite(rate))} samples; at least {LEAST} needed"]
         )
-    time = columns.step * np.arange(float(rate.size))
+    time = columns.time
     regressions = _regressions(time, columns.step, rate, columns.others, columns.others_unit)
     clean = rate
     for r in regressions:

@@ -201,6 +201,6 @@ def _envelope(p: Prepared) -> dict[str, Any]:
     edges = np.unique(np.linspace(0, p.rate.size, min(SHOWN, p.rate.size) + 1).astype(int))
     parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
     there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
-    middle = 0.5 * (edges[:-1] + edges[1:]) * p.step
+    middle = 0.5 * (p.time[edges[:-1]] + p.time[edges[1:] - 1] + p.step)
     low, mean, high = ([float(f(parts[k])) / DPH for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
     return {"t": middle[there].tolist(), "low": low, "mean": mean, "high": high}

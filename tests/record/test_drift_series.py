@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from gyrobench.record import block_means
+from gyrobench.record import block_means, drift_series
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import find_signals, open_table
 from gyrobench.record.drift_series import DriftReader
@@ -59,7 +59,7 @@ def test_a_rate_in_any_unit_and_file(tmp_path: Path) -> None:
     pq.write_table(pa.table([TIME * 1e3, RATE], schema=pa.schema(fields)), tmp_path / "b.parquet")
     for name, close in (("g.csv", 1e-6), ("a.parquet", 1e-6), ("b.parquet", 1e-12)):
         reader, columns, _ = read(tmp_path / name)
-        assert list(columns) == ["rate"] and reader.about.step == pytest.approx(STEP, rel=1e-6)
+        assert list(columns) == ["time", "rate"] and reader.about.step == pytest.approx(STEP, rel=1e-6)
         assert np.allclose(columns["rate"], RATE * DPH, rtol=0, atol=close * 5 * DPH)
 
 
@@ -79,6 +79,21 @@ def test_gaps_are_found_and_kept(tmp_path: Path) -> None:
     assert (about.gaps, about.missing, about.incomplete, about.flagged) == (3, 12, 1, 1)
     assert about.longest == (pytest.approx(0.99), pytest.approx(0.11))
     assert out["temperature"][57] == pytest.approx(273.15 + 20.5)  # the reading before, logged every tenth sample
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_long_gap_is_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, timed: bool) -> None:
+    """The grid holds LONG steps of it, the times are those of the file, and so are the samples missing."""
+    monkeypatch.setattr(drift_series, "LONG", 50)
+    monkeypatch.setattr("gyrobench.record.time_series.BLOCK", 1000)
+    keep = (np.arange(N) < 300) | (np.arange(N) >= 700)
+    columns = {"time [s]": TIME[keep], "rate [deg/h]": RATE[keep]}
+    x = np.where(keep, RATE, np.nan)
+    reader, out, runs = read(write(tmp_path, columns if timed else {"rate [deg/h]": x}), sampling=0.0 if timed else 100)
+    assert reader.about.missing == 400 and reader.about.gaps == 1 and out["rate"].size == 649
+    assert np.isnan(out["rate"][300:349]).all() and np.allclose(out["rate"][349:], RATE[700:] * DPH)
+    assert out["time"][349] == pytest.approx(7.0) and reader.about.last == pytest.approx(9.99)
+    assert runs[-1][1] + runs[-1][2].size == 649
 
 
 def test_rate_of_angles_and_counts(tmp_path: Path) -> None:
@@ -126,6 +141,7 @@ def test_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, timed: 
     file = write(tmp_path, columns if timed else {"rate [deg/h]": x})
     reader, out, runs = read(file, sampling=0.0 if timed else 100.0)
     assert reader.held.factor == 16 and out["rate"].size == 62
+    assert np.allclose(out["time"][[1, 61]], [0.235, 9.835])  # the middle of the samples of a mean
     expected = (x * DPH)[: 62 * 16].reshape(62, 16).mean(axis=1)
     assert np.allclose(out["rate"], expected, equal_nan=True)
     assert np.array_equal(np.concatenate([v for _, _, v in runs]), (x * DPH)[np.isfinite(x)])
@@ -168,10 +184,12 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "text.parquet").write_text("time [s],rate [deg/h]\n0,1\n")
     (tmp_path / "head.csv").write_text("time [s],rate [deg/h]\n")
+    (tmp_path / "latin.csv").write_bytes("time [s],rate [deg/h]\n0,1\n0.1,2 °\n".encode("latin-1"))
     pq.write_table(pa.table({"time [s]": ["a", "b"], "rate [deg/h]": [1.0, 2.0]}), tmp_path / "words.parquet")
     for name, words in {
-        "empty.csv": "the file is empty", "nothing.csv": "no such file", "text.parquet": "not a readable Parquet file",
-        "head.csv": "no rows below the header", "words.parquet": "column 'time': holds string, numbers are expected",
+        "empty.csv": "the file is empty", "latin.csv": "text that is not UTF-8", "nothing.csv": "no such file",
+        "text.parquet": "not a readable Parquet file", "head.csv": "no rows below the header",
+        "words.parquet": "column 'time': holds string, numbers are expected",
     }.items():  # fmt: skip
         with pytest.raises(DataError) as error:
             read(tmp_path / name)

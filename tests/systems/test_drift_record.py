@@ -205,6 +205,26 @@ def test_what_is_refused(
     assert not (tmp_path / "out" / "report.html").exists()
 
 
+def test_what_is_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wild value, rounding coarser than the noise, aliasing, a converter at its limit: read, and said."""
+    description = importlib.import_module(".description", type(load()).__module__)
+    n = 2000
+    t, x = np.arange(n) * 0.1, np.random.default_rng(8).normal(size=n)
+    files = {
+        "wild": (np.where(t == 50.0, 3.0e4, x), "", "more than 20 standard deviations from the median, the first"),
+        "rounded": (10.0 * np.round(x / 25.0 + (t > 100.0)), "", "rounded to 10 °/h, more than twice the noise"),
+        "folded": (x, "# bandwidth = 100Hz", "N² is up to 14 dB too large. Sample every 0.004 s"),
+        "limit": (np.clip(x, -0.5, 0.5), "", "stay at the largest or smallest value"),
+    }
+    monkeypatch.setattr(P, "describe", lambda x, step: None)  # of the warnings nothing needs the models
+    for name, (values, head, words) in files.items():
+        file = write(tmp_path / "r.csv", {"time [s]": t, "rate [deg/h]": values}, head)
+        record = load().read_measured(file, {})
+        p = P.prepare("rate", P.columns_of(record), False)
+        noise = fit(np.random.default_rng(9).normal(size=600), 0.1)
+        assert any(words in w for w in description.warnings(p, noise, record.run)), name
+
+
 def test_short_runs_are_refused(command: Command, tmp_path: Path) -> None:
     code, _, said = command("run", NAME, "--set", "duration=100s", "--out", tmp_path / "out")
     assert code == 2 and "100 samples of 1 s; at least 512 are needed" in said

@@ -28,7 +28,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.series import gauss_markov as markov
 from gyrobench.reduction.series.arima import Arima310, arima310
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar
@@ -100,7 +99,10 @@ class _Parts:
     def __call__(self, name: str, part: Callable[[], T]) -> T | None:
         try:
             return part()
-        except (SeriesError, RegressionError) as error:
+        except (
+            ValueError,
+            np.linalg.LinAlgError,
+        ) as error:  # of this room, or of statsmodels
             self.refused[name] = str(error)
             return None
 
