@@ -111,8 +111,8 @@ def stability(doc: Json) -> list[Any]:
             "allan",
             plots.allan(doc["allan"], "allan") if doc["allan"].get("tau") else "",
             "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
-            "bias instability; +½: random walk (of a rate: rate random walk). In the residuals of a fit the slow drift that "
-            "its terms take up is missing: a fall at long averaging times is then the fit's.",
+            "bias instability; +½: random walk (of a rate: rate random walk). In the residuals of a fit the slow drift "
+            "that its terms take up is missing: a fall at long averaging times is then the fit's.",
             "Allan deviation against averaging time, logarithmic axes",
             half=True,
         ),
