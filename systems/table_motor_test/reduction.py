@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import integrate, optimize, stats
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
@@ -341,7 +341,7 @@ def _inductance(gate: Gate, R: float, K_e: float) -> float | None:
         return None
     induced = U[part] - R * i[part]
     turned = x[part][-1] - x[part][0]
-    way = float(np.trapezoid(induced, dx=dt)) - K_e * turned
+    way = float(integrate.simpson(induced, dx=dt)) - K_e * turned  # the current bends within a sampling interval
     change = float(i[part][-1] - i[part][0])
     return way / change if abs(change) > 0.0 else None
 

@@ -133,9 +133,11 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
             )
         )  # fmt: skip
 
-    # the time base: what all rates have in common, each with the error of its two readings and of the tracking
+    # the time base: what all rates have in common.  A reading errs by its rounding and by the motion of the table; the
+    # ripple, of the tracking error in counts, holds the rounding of the command, too, which the table does not follow
     errors = np.array([r.error for r in readings])
-    at_ends = np.array([math.sqrt(2.0 * (r.ripple**2 + quantum**2 / 12.0)) / r.angle for r in readings])
+    rounding = quantum**2 / 12.0
+    at_ends = np.array([math.sqrt(2.0 * max(r.ripple**2 - rounding, rounding)) / r.angle for r in readings])
     weights = 1.0 / at_ends**2
     clock, u_clock = float(np.sum(weights * errors) / np.sum(weights)), float(1.0 / math.sqrt(np.sum(weights)))
     true_clock = run.parameters.get("command.reference_clock")
@@ -216,7 +218,7 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
         warnings=warnings,
         tables=tables,
         summary=[
-            f"Time base of the command: {plus_minus(found[0]).removesuffix(' 1e-6 (95 %)')} ppm (95 %) from "
+            f"Time base of the command: {plus_minus(found[0]).removesuffix(' 1e−6 (95 %)')} ppm (95 %) from "
             f"{len(readings)} runs at {min(abs(r.rate) for r in readings) / ERU:.4g} to "
             f"{max(abs(r.rate) for r in readings) / ERU:.6g} ERU.",
             f"Largest tracking error (mean and two standard deviations) "
