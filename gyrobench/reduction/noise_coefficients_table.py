@@ -61,8 +61,6 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         f"IEEE 952, from {count} means of {length:g} s by maximum likelihood; not determined: the interval holds 0. "
         "Gauss-Markov drift is not among the five terms: B and K take it up"
     )
-    if found.check and (departs := found.check.finding()):
-        caption = f"{departs}. {caption}"
     if found.check is not None and (departs := found.check.finding()):
         caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]

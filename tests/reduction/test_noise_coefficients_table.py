@@ -51,14 +51,6 @@ def test_residuals_and_the_rate_itself(gap: bool) -> None:
         assert rows["K"][1] is None and rows["K"][2] == 0.0 and "not determined" in rows["K"][5]
 
 
-def test_a_record_that_is_not_the_model_is_said_so() -> None:
-    result, record = long_test(LEAST + 100)
-    assert "do not describe" not in noise_coefficients_table(result, record)[0]["caption"]
-    for s in result.series:
-        s.y = (np.array(s.y) + 0.3 * np.sin(0.01 * np.array(s.t))).tolist()
-    assert "The five terms do not describe the record" in noise_coefficients_table(result, record)[0]["caption"]
-
-
 def test_short_tests_and_windows_with_pauses_have_none() -> None:
     assert noise_coefficients_table(*long_test(LEAST - 2)) == []
     assert noise_coefficients_table(*long_test(LEAST, length=0.5 * T)) == []
@@ -78,6 +70,7 @@ def test_drift_that_is_none_of_the_five_is_told() -> None:
         s.y = x[np.argsort(np.argsort(s.t))].tolist()
     caption = noise_coefficients_table(result, record)[0]["caption"]
     assert caption.startswith("The five terms do not describe the record (p < 0.001)")
+    assert caption.count("do not describe") == 1
 
 
 def test_a_missing_window_is_a_gap() -> None:
