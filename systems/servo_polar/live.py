@@ -40,10 +40,12 @@ ON_REQUEST = OnRequest(
 )
 
 
-def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: float) -> list[dict[str, Any]]:
+def tables(
+    windows: Mapping[str, Array], labels: Mapping[int, str], parameters: Mapping[str, Any]
+) -> list[dict[str, Any]]:
     """Return the tables of the live estimate; none for a record without it.
 
-    windows: columns of the record.  labels: phase -> attitude.  wanted: standard deviation asked for, rad/s.
+    windows: columns of the record.  labels: phase -> attitude.  parameters: of the run.
     """
     if MAY_STOP not in windows:
         return []
@@ -65,7 +67,8 @@ def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: floa
                 for k in (stop, end)
             )
             values.append([label, name, *then, *last])
-    asked = f"Wanted of the mean and of each harmonic: a standard deviation of {wanted / DPH:.3g} °/h."
+    wanted = list(dict.fromkeys(f"{x / DPH:.3g}" for x in parameters.get(f"{SLOT}.wanted", ()) if x > 0.0))
+    asked = f"Standard deviation wanted of mean and harmonics: {', '.join(wanted) or 'none stated'} °/h."
     model = "Type A only, for the noise that the estimator is told; NIS is 1 on average where that is right."
     return [
         {

@@ -101,7 +101,7 @@ def _examined(record: Record, specification: Specification | None = None) -> Dri
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)
-    live_tables = live.tables(windows, labels, float(options.get("wanted", 0.0)))
+    live_tables = live.tables(windows, labels, run.parameters)
     statistics = _composite(found, labels, phase, held, site)
     together = {n: model.words(n, book=True) for n in model.fitted}
     warnings = refusals.unseen(route, mounts, which)

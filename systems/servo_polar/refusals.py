@@ -66,6 +66,8 @@ def option_problems(options: Mapping[str, Any]) -> list[str]:
         found.append(f"terms = {options['terms']}: there are 4 (low grades), 8 and 9 terms")
     if 4.0 * options["window"] > options["time"]:
         found.append(f"window = {options['window']:g} s in a time of {options['time']:g} s: too few windows")
+    if not options["wanted"] > 0.0:
+        found.append("wanted = 0: no estimate reaches a standard deviation of 0; give the one that is wanted")
     if options["route"] == "dwells" and not options["dwell"] > 0.0:
         found.append("dwell = 0: the route 'dwells' needs two dwells with the input axis east")
     return found

@@ -10,7 +10,7 @@ from polar_drift import Day, Noise
 from servoing import DAY50, DPH, held, polar_harmonics
 
 from gyrobench.engine.session import Session
-from gyrobench.system.system import load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "servo_polar"
 LIVE = {
@@ -100,6 +100,8 @@ def test_hours_saved_are_those_of_the_record(live: Any) -> None:
         assert row["saved / h"] == pytest.approx((t[-1] - t[np.argmax(ready)]) / 3600.0)
         assert row["consistent"] == "yes" and 0.6 < row["mean NIS"] < 1.5
         total += row["saved / h"]
+    caption = next(t["caption"] for t in result.tables if t["title"].startswith("Live estimate: time"))
+    assert caption.startswith("Standard deviation wanted of mean and harmonics: 0.002 °/h.")
     assert any(f"would have saved {total:.1f} h of" in s for s in result.summary)
 
 
@@ -152,6 +154,11 @@ def test_without_the_slot_nothing_is_said(live: Any) -> None:
     assert not [t for t in plain.tables if t["title"].startswith("Live")]
     assert not [s for s in plain.summary if "live" in s]
     assert [c.estimate for c in plain.coefficients] == [c.estimate for c in result.coefficients]
+
+
+def test_wanted_of_nothing_is_refused() -> None:
+    with pytest.raises(InvalidConfigurationError, match="wanted = 0: no estimate reaches"):
+        load_system(NAME).with_values({"wanted": 0.0}).refuse()
 
 
 def test_the_estimator_is_told_the_noise_of_the_gyro(live: Any) -> None:
