@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+
+from gyrobench.errors import GyrobenchError
+
+LOCK = ".lock"
+TEMPORARY = "gyrobench-"
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
@@ -39,3 +45,81 @@ def unzip_fmu(path: Path, folder: Path) -> None:
     from fmpy import extract
 
     extract(str(path), str(folder), include=lambda name: not name.startswith(("sources/", "documentation/")))
+
+
+class FolderInUseError(GyrobenchError):
+    """Another process writes into the folder."""
+
+
+class FolderLock:
+    """The right to write into a folder, for one process at a time; it ends with the process, however that ends.
+
+    Raises FolderInUseError where another process has it.  The folder is made where it does not exist.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.path = folder / LOCK
+        self.handle = os.open(self.path, os.O_RDWR | os.O_CREAT)
+        try:
+            _lock(self.handle)
+        except OSError:
+            owner = os.read(self.handle, 20).decode("ascii", "replace").strip()
+            os.close(self.handle)
+            whose = f" (process {owner})" if owner else ""
+            raise FolderInUseError(
+                f"{folder}: another run writes here{whose}; wait for its end, or name another folder: --out"
+            ) from None
+        os.ftruncate(self.handle, 0)
+        os.write(self.handle, str(os.getpid()).encode("ascii"))
+
+    def release(self) -> None:
+        """Give the folder free."""
+        if self.handle >= 0:
+            self.path.unlink(missing_ok=True)
+            os.close(self.handle)
+            self.handle = -1
+
+    def __enter__(self) -> FolderLock:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _lock(handle: int) -> None:
+    """Lock an open file for this process.  Raises OSError where another one has it."""
+    if os.name == "nt":
+        import msvcrt
+
+        # beyond the number of the process, which others read
+        os.lseek(handle, 1024, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        os.lseek(handle, 0, os.SEEK_SET)
+        return
+    import fcntl
+
+    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def temporary_folder() -> Path:
+    """Make a folder for the files of this process; those of processes that were killed are removed."""
+    root = Path(tempfile.gettempdir())
+    for old in root.glob(f"{TEMPORARY}*-*"):
+        owner = old.name.removeprefix(TEMPORARY).partition("-")[0]
+        if owner.isdigit() and not _alive(int(owner)):
+            shutil.rmtree(old, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-"))
+
+
+def _alive(process: int) -> bool:
+    """Whether a process runs; of Windows it is not known without its tools, and the answer is yes."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
 from pathlib import Path
@@ -409,6 +410,9 @@ def init(
 
 def main() -> None:
     """Run a command; an error ends in one message and an exit code, with a traceback if GYROBENCH_TRACEBACK=1."""
+    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C: files that are being written are finished or removed
+        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
+            signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
         app(prog_name="gyrobench", standalone_mode=True)
     except KeyboardInterrupt:

@@ -2,10 +2,10 @@
 
 ``checkpoint.npz`` in the folder of the run holds the serialized state of every FMU, the buffer ``out`` of the engine,
 the last watched value, the number of steps and the rows recorded so far: one file, written under a temporary name and
-renamed, so that it is either complete or absent.  It is written when the user stops the run and about once a minute
-of wall time, for a process that is killed; it is removed when the run is complete.  A checkpoint belongs to one job:
-parts, parameters, options, seed, step, order and wiring; it is not accepted for any other.  Both engines write and
-read the same file.
+renamed, so that it is either complete or absent.  It is written when the user stops the run, after some seconds and
+then about once a minute of wall time, for a process that is killed; it is removed when the run is complete.  A
+checkpoint belongs to one job: parts, parameters, options, seed, step, order and wiring; it is not accepted for any
+other.  Both engines write and read the same file.
 
 Not covered: FMUs that cannot serialize their state, and FMUs in a process of their own (``isolate``).
 """
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.bench import display_path
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import Array, RunState, read_outputs
@@ -32,6 +33,7 @@ from gyrobench.files import write_whole
 FILE = "checkpoint.npz"
 FORMAT = 1
 PERIOD = 60.0  # s of wall time between two checkpoints
+FIRST = 5.0  # s of wall time until the first one
 SHARE = 50.0  # and this many times what the last one took
 MAX_LISTED = 5  # differences named in a message
 NAMES = {
@@ -186,28 +188,30 @@ class CheckpointManager:
             return
         if self.obstacle:
             raise ResumeError(f"--resume: {self.obstacle}; run it again without --resume")
-        file = self.source / FILE
+        file, where = self.source / FILE, display_path(self.source)
         if not file.is_file():
-            raise ResumeError(f"--resume: no interrupted run to continue in {self.source} (there is no {FILE})")
+            raise ResumeError(f"--resume: no interrupted run to continue in {where} (there is no {FILE})")
         self.head, self.arrays = _read(file)
         changed = differences(self.head["job"], self.job)
         if changed:
             more = [f"and {len(changed) - MAX_LISTED} more"] if len(changed) > MAX_LISTED else []
             lines = "".join(f"\n  - {line}" for line in [*changed[:MAX_LISTED], *more])
-            raise ResumeError(f"--resume: the interrupted run in {self.source} is another one; what differs:{lines}")
+            raise ResumeError(f"--resume: the interrupted run in {where} is another one; what differs:{lines}")
 
     def notes(self) -> list[str]:
         """Return notes for a run that starts anew although it could be continued."""
         if self.resume or not (self.source / FILE).is_file():
             return []
-        return [f"this run starts anew; the interrupted one in {self.source} could be continued with --resume"]
+        return [
+            f"this run starts anew; the interrupted one in {display_path(self.source)} could be continued with --resume"
+        ]
 
     def restore(self, state: RunState) -> RunState:
         """Return the state of the run as it was saved, after initialization; ``state`` itself when not resuming.
 
         Raises FmuCallError, and ResumeError for an FMU whose outputs are not those it had.
         """
-        self.due = time.monotonic() + self.period
+        self.due = time.monotonic() + min(self.period, FIRST)
         if not self.resume:
             return state
         out = self.program.out

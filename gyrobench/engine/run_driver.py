@@ -56,25 +56,32 @@ class EngineStopped(GyrobenchError):
         super().__init__(message)
 
 
+#: what asks a run to end: Ctrl-C, the end of a job or of a terminal
+SIGNALS = tuple(s for name in ("SIGINT", "SIGTERM", "SIGHUP") if (s := getattr(signal, name, None)) is not None)
+
+
 class _CtrlC:
-    """While active, the first Ctrl-C only raises a flag, so that no step or row is lost; the second one kills."""
+    """While active, the first such signal only raises a flag, so that no step or row is lost; the second one kills."""
 
     def __init__(self) -> None:
         self.pressed = False
-        self.previous_handler: Any = None
+        self.previous: dict[Any, Any] = {}
 
     def __enter__(self) -> _CtrlC:
         if threading.current_thread() is threading.main_thread():
-            self.previous_handler = signal.signal(signal.SIGINT, self._handle)
+            self.previous = {s: signal.signal(s, self._handle) for s in SIGNALS}
         return self
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.pressed = True
-        signal.signal(signal.SIGINT, self.previous_handler or signal.SIG_DFL)
+        self._restore()
+
+    def _restore(self) -> None:
+        for s, handler in self.previous.items():
+            signal.signal(s, handler if handler is not None else signal.SIG_DFL)
 
     def __exit__(self, *_: object) -> None:
-        if self.previous_handler is not None:
-            signal.signal(signal.SIGINT, self.previous_handler)
+        self._restore()
 
 
 def run_to_end(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import datetime
 import functools
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import ReferenceEngine, initial_state, initialize
 from gyrobench.engine.run_driver import EngineStopped, ProgressReport, run_to_end
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import sha256, unzip_fmu
+from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
 from gyrobench.system.parameters import defaults, resolve
@@ -98,7 +97,7 @@ class Session:
         self.base = defaults(self.assembly)
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
         self.engine = self._choose(engine)
-        self.folder = Path(tempfile.mkdtemp(prefix="gyrobench-"))
+        self.folder = temporary_folder()
         self.instances: dict[str, FmuInstance] = {}
         try:
             for slot, path in paths.items():

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Protocol
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import unzip_fmu
+from gyrobench.files import temporary_folder, unzip_fmu
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.loading import load_part
 
@@ -129,7 +129,7 @@ class Fmu:
         self._own = like is None
         if like is None:
             self.description = fmpy.read_model_description(str(path), validate=False)
-            self.folder = Path(tempfile.mkdtemp(prefix="gyrobench-"))
+            self.folder = temporary_folder()
             unzip_fmu(path, self.folder)
         else:
             self.description, self.folder = like.description, like.folder

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
-from gyrobench.report import FORMATS
-from gyrobench.result import Coefficient
+from gyrobench.record.record import Record
+from gyrobench.report import FORMATS, NAMES
+from gyrobench.result import Coefficient, Specification
 from gyrobench.system.system import System
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
@@ -69,54 +70,85 @@ def execute_run(
     Raises what Session.run raises, and PostRunError for whatever goes wrong after the run: its text names the folder
     of the record, its attribute ``record`` holds it.
     """
-    from gyrobench.engine.session import RunError, RunInterrupted
-
     spec = find_specification(request.spec)
     limits = load_limits(spec)
     with open_session(request, system) if prepared is None else contextlib.nullcontext(prepared) as session:
-        step = request.step or system.step
-        folder: Path | None = None
-        checkpoints: CheckpointManager | None = None
-        if not request.in_memory:
-            folder, checkpoints = prepare_run_folder(
-                session, system, request.seed, step, request.maps, request.out, request.force, request.resume
-            )
-        feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
-        try:
-            with feedback.progress(system.name) as progress:
-                record = session.run({}, request.seed, request.step, None, progress, checkpoints)
-        except RunError as error:
-            if error.record is None or folder is None:
-                raise
-            kept = save_partial_record(error.record, folder)
-            message = f"{error}\nthe record until then is kept in {display_path(kept)}"
-            if isinstance(error, RunInterrupted):
-                raise CommandInterrupted(f"{message} (gyrobench report lists what is missing)", error.record) from None
-            raise PostRunError(message, error.record) from None
-        if folder is not None and checkpoints is not None:
-            record.save(folder)
-            checkpoints.remove()
-        stopped: PostRunError | None = None
-        with record_kept(folder, record):
-            if not system.has_reduction:
-                return RunOutcome(record, folder=folder)
-            check: dict[str, Any] = {}
-            by_default = bool(system.loops) or system.closed_loop
-            wanted = by_default if request.check_step is None else request.check_step
-            if wanted and record.complete:
-                try:
-                    check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
-                except RunInterrupted as error:
-                    stopped = CommandInterrupted(f"step check {error}; the report is without it")
-                except Exception as error:
-                    stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
-                    stopped.__cause__ = error
-            result = reduce_run(system, record, limits, check)
-            if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
-                result.warnings.append(f"The communication step is not in u: {stopped}.".replace("\n", "; "))
-                stopped = None
-            paths = write_report(result, folder, record, spec, request.formats)
-            return RunOutcome(record, result, folder, paths, stopped)
+        if request.in_memory:
+            record = _run(request, feedback, session, None, None)
+            return _report(request, system, feedback, session, record, None, limits)
+        step, files = request.step or system.step, [NAMES[f] for f in request.formats]
+        folder, checkpoints, lock = prepare_run_folder(
+            session, system, request.seed, step, request.maps, request.out, request.force, request.resume, files
+        )
+        with lock:
+            run_now = checkpoints is not None  # else the record is there, its report is not
+            record = _run(request, feedback, session, folder, checkpoints) if run_now else Record.load(folder)
+            return _report(request, system, feedback, session, record, folder, limits, spec)
+
+
+def _run(
+    request: RunRequest,
+    feedback: Feedback,
+    session: Session,
+    folder: Path | None,
+    checkpoints: CheckpointManager | None,
+) -> Record:
+    """Run and save the record, as far as it comes."""
+    from gyrobench.engine.session import RunError, RunInterrupted
+
+    feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
+    try:
+        with feedback.progress(session.system.name) as progress:
+            record = session.run({}, request.seed, request.step, None, progress, checkpoints)
+    except RunError as error:
+        if error.record is None or folder is None:
+            raise
+        kept = save_partial_record(error.record, folder)
+        message = f"{error}\nthe record until then is kept in {display_path(kept)}"
+        if isinstance(error, RunInterrupted):
+            raise CommandInterrupted(f"{message} (gyrobench report lists what is missing)", error.record) from None
+        raise PostRunError(message, error.record) from None
+    if folder is not None and checkpoints is not None:
+        record.save(folder)
+        checkpoints.remove()
+    return record
+
+
+def _report(
+    request: RunRequest,
+    system: System,
+    feedback: Feedback,
+    session: Session,
+    record: Record,
+    folder: Path | None,
+    limits: Specification | None,
+    spec: Path | None = None,
+) -> RunOutcome:
+    """Reduce a record, with the effect of the step where it is wanted, and write its report."""
+    from gyrobench.engine.session import RunInterrupted
+
+    stopped: PostRunError | None = None
+    step = request.step or system.step
+    with record_kept(folder, record):
+        if not system.has_reduction:
+            return RunOutcome(record, folder=folder)
+        check: dict[str, Any] = {}
+        by_default = bool(system.loops) or system.closed_loop
+        wanted = by_default if request.check_step is None else request.check_step
+        if wanted and record.complete:
+            try:
+                check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
+            except RunInterrupted as error:
+                stopped = CommandInterrupted(f"step check {error}; the report is without it")
+            except Exception as error:
+                stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
+                stopped.__cause__ = error
+        result = reduce_run(system, record, limits, check)
+        if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
+            result.warnings.append(f"The communication step is not in u: {stopped}.".replace("\n", "; "))
+            stopped = None
+        paths = write_report(result, folder, record, spec, request.formats)
+        return RunOutcome(record, result, folder, paths, stopped)
 
 
 def check_step(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import Bench, UsageError
+from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.engine import checkpoint
+from gyrobench.files import LOCK, FolderLock
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import RecordError, read_run
@@ -28,8 +30,13 @@ def prepare_run_folder(
     out: Path | None,
     force: bool,
     resume: bool = False,
-) -> tuple[Path, checkpoint.CheckpointManager]:
-    """Return where the run is saved, --out, else a folder named by what is run; and the manager of its checkpoint.
+    wanted: Collection[str] = REPORT,
+) -> tuple[Path, checkpoint.CheckpointManager | None, FolderLock]:
+    """Return where the run is saved, --out, else a folder named by what is run; the manager of its checkpoint; and the
+    lock of the folder, to be released.
+
+    The manager is None where ``resume`` finds the complete record of this run without the files ``wanted`` of its
+    report, which are all that is left to do.
 
     With ``resume`` the manager continues from the checkpoint in that folder or in its :func:`incomplete_folder`, once
     it is known to belong to this run.  Raises UsageError when there is none to resume, and when --out holds another
@@ -50,9 +57,27 @@ def prepare_run_folder(
     texts = {slot: file.read_text(encoding="utf-8") for slot, file in maps.items()}
     text = json.dumps([identity, texts, session.engine], sort_keys=True)
     folder = out or Bench.find().out / system.name / hashlib.sha256(text.encode()).hexdigest()[:8]
+    folder = Path(os.path.abspath(folder))  # wherever a part may go
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{display_path(folder)}: is a file; name a folder")
+    lock = FolderLock(folder)
+    try:
+        return folder, _manager(session, folder, identity, force, resume, wanted), lock
+    except BaseException:
+        lock.release()
+        raise
+
+
+def _manager(
+    session: Any, folder: Path, identity: Mapping[str, Any], force: bool, resume: bool, wanted: Collection[str]
+) -> checkpoint.CheckpointManager | None:
+    """Prepare the folder of a run; return the manager of its checkpoint, None where only its report is missing."""
     kept = [f for f in (folder, incomplete_folder(folder)) if (f / checkpoint.FILE).is_file()]
     if not resume:
         prepare_folder(folder, identity, force)
+    elif not kept and has_complete_record(folder) and not all((folder / name).is_file() for name in wanted):
+        prepare_folder(folder, identity, False)  # refuses another run
+        return None
     elif not kept:
         state = (
             "the run is complete"
@@ -61,17 +86,20 @@ def prepare_run_folder(
         )
         raise UsageError(
             "--resume: "
-            + (checkpoint.resume_obstacle(session.instances) or f"nothing to continue in {folder}: {state}")
+            + (
+                checkpoint.resume_obstacle(session.instances)
+                or f"nothing to continue in {display_path(folder)}: {state}"
+            )
         )
     elif folder not in kept:
         prepare_folder(folder, identity, force)
-    return folder, checkpoint.CheckpointManager(partial_folder(folder), resume, kept[0] if kept else None)
+    return checkpoint.CheckpointManager(partial_folder(folder), resume, kept[0] if kept else None)
 
 
 def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:
     """Make and return a folder for a run; one that holds the same run may be written again.  Raises UsageError."""
     if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder}: is a file; name a folder")
+        raise UsageError(f"{display_path(folder)}: is a file; name a folder")
     old = None
     if (folder / RUN).is_file():
         try:
@@ -83,13 +111,15 @@ def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Pa
             old = checkpoint.read_job(folder)
         except checkpoint.ResumeError:
             old = {}
-    elif folder.is_dir() and any(not p.name.startswith(checkpoint.FILE) for p in folder.iterdir()):
-        raise UsageError(f"{folder}: holds other files; name a new folder, for example {folder / 'run1'}")
+    elif folder.is_dir() and any(not p.name.startswith((checkpoint.FILE, LOCK)) for p in folder.iterdir()):
+        raise UsageError(
+            f"{display_path(folder)}: holds other files; name a new folder, for example {display_path(folder / 'run1')}"
+        )
     if old is not None:
         changed = [k for k, v in identity.items() if not _covers(old.get(k), v)]
         if changed and not force:
             raise UsageError(
-                f"{folder}: holds another run (its {', '.join(changed)} differ); name another folder, "
+                f"{display_path(folder)}: holds another run (its {', '.join(changed)} differ); name another folder, "
                 "or replace it: --force (force=True)"
             )
         for name in (*RECORD, *REPORT) if changed else ():

@@ -1,0 +1,121 @@
+"""Folders of runs have one writer, whatever ends a process; what a killed one left is found and finished."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench.commands import cli
+from gyrobench.engine import checkpoint
+from gyrobench.engine.checkpoint import FILE
+from gyrobench.files import LOCK, FolderInUseError, FolderLock, temporary_folder
+from gyrobench.record.record import Record
+
+Command = Callable[..., tuple[int, str, str]]
+ROOT = str(Path(cli.__file__).parents[2])
+SHORT = ("fixed_position", "--set", "dwell=16s", "--set", "readings=8", "--set", "settle=1s", "--set", "attitude=E U")
+
+
+def started(*words: str, cwd: Path) -> subprocess.Popen[str]:
+    """The command in a process of its own; the reference engine takes its time."""
+    code = f"import sys; sys.path.insert(0, {ROOT!r}); from gyrobench.commands.cli import main; main()"
+    given = [sys.executable, "-c", code, "run", *words]
+    return subprocess.Popen(given, cwd=cwd, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < deadline:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    assert condition()
+
+
+def test_one_process_at_a_time(tmp_path: Path) -> None:
+    """The lock ends with the process that has it, killed or not; its file may stay."""
+    held = FolderLock(tmp_path / "r")
+    code = (
+        f"import sys; sys.path.insert(0, {ROOT!r})\nfrom pathlib import Path\nfrom gyrobench.files import FolderLock\n"
+    )
+    other = subprocess.run(
+        [sys.executable, "-c", f"{code}FolderLock(Path({str(tmp_path / 'r')!r}))"], capture_output=True, text=True
+    )
+    assert other.returncode and f"another run writes here (process {os.getpid()})" in other.stderr
+    held.release()
+    assert not (tmp_path / "r" / LOCK).exists()
+    killed = f"{code}import os, signal\nFolderLock(Path({str(tmp_path / 'r')!r})); os.kill(os.getpid(), signal.SIGKILL)"
+    assert subprocess.run([sys.executable, "-c", killed]).returncode == -signal.SIGKILL
+    with FolderLock(tmp_path / "r"), pytest.raises(FolderInUseError):
+        FolderLock(tmp_path / "r")
+
+
+def test_two_runs_into_one_folder(command: Command, tmp_path: Path) -> None:
+    long = ("fixed_position", "--engine", "reference", "--out", str(tmp_path / "r"))
+    process = started(*long, cwd=tmp_path)
+    try:
+        wait_for(lambda: (tmp_path / "r" / LOCK).is_file(), process)
+        code, _, err = command("run", *long)
+        assert code == 2 and f"another run writes here (process {process.pid})" in err
+    finally:
+        process.send_signal(signal.SIGTERM)  # as Ctrl-C: the record until then is kept
+        _, said = process.communicate(timeout=60)
+    assert process.returncode not in (0, -signal.SIGTERM)
+    if (tmp_path / "r" / "run.json").is_file():
+        assert "the same command with --resume continues it" in said
+        assert not Record.load(tmp_path / "r").complete and (tmp_path / "r" / FILE).is_file()
+
+
+def test_a_hangup_keeps_the_record(tmp_path: Path) -> None:
+    process = started("fixed_position", "--engine", "reference", "--out", "r", cwd=tmp_path)
+    wait_for(lambda: (tmp_path / "r" / LOCK).is_file(), process)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGHUP)
+    _, said = process.communicate(timeout=60)
+    assert "interrupted at t = " in said and "--resume continues it" in said
+    assert (tmp_path / "r" / FILE).is_file() and not (tmp_path / "r" / LOCK).exists()
+
+
+def test_resume_finishes_a_missing_report(command: Command, tmp_path: Path) -> None:
+    """Killed between record and report: --resume makes the report, and nothing runs again."""
+    out = tmp_path / "r"
+    assert command("run", *SHORT, "--out", out)[0] == 0
+    whole = json.loads((out / "result.json").read_text("utf-8"))
+    stamp = (out / "run.json").read_bytes()
+    (out / "result.json").unlink()
+    code, _, err = command("run", *SHORT, "--out", out, "--resume")
+    assert code == 0, err
+    assert json.loads((out / "result.json").read_text("utf-8"))["coefficients"] == whole["coefficients"]
+    assert (out / "run.json").read_bytes() == stamp
+    code, _, err = command("run", *SHORT, "--out", out, "--resume")
+    assert code == 2 and "the run is complete" in err
+    (out / "result.json").unlink()
+    code, _, err = command("run", *SHORT, "--out", out, "--resume", "--seed", "2")
+    assert code == 2 and "holds another run" in err
+
+
+def test_the_first_checkpoint_comes_after_seconds() -> None:
+    assert checkpoint.FIRST <= 10.0 < checkpoint.PERIOD
+
+
+def test_files_of_killed_processes_are_removed() -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    old = Path(tempfile.mkdtemp(prefix=f"gyrobench-{gone.pid}-"))
+    (old / "gyro").mkdir()
+    other = Path(tempfile.mkdtemp(prefix="gyrobench-notes-"))
+    mine = temporary_folder()
+    again = temporary_folder()
+    try:
+        assert not old.exists() and other.is_dir() and mine.is_dir() and again.is_dir()
+    finally:
+        for folder in (mine, again, other):
+            folder.rmdir()
