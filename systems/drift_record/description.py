@@ -12,6 +12,7 @@ from gyrobench import units
 from gyrobench.record import sampling
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_coefficients_table import TERMS
+from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import NoiseCoefficients, slopes
 from gyrobench.reduction.series.quantization import folded
@@ -22,6 +23,7 @@ from .preparation import Prepared
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
+STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
 WILD = 20.0  # standard deviations
 MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
 
@@ -167,6 +169,7 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
             f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
             "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time."
         )
+    out += step_warnings(p)
     off = np.abs(p.clean - np.nanmedian(p.clean))
     spread = 1.4826 * float(np.nanmedian(off))
     if spread and (wild := np.flatnonzero(off > WILD * spread)).size:
@@ -200,6 +203,23 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
             f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means."
         )
     return out
+
+
+def step_warnings(p: Prepared) -> list[str]:
+    """Return a warning where one change from block to block stands out of all: a step, which no noise makes."""
+    m = max(1, p.stretch.size // STEP_BLOCKS)
+    change = np.diff(block_means(p.stretch, m))
+    off = change - np.median(change)
+    k = int(np.argmax(np.abs(off)))
+    spread = 1.4826 * float(np.median(np.abs(off)))
+    if not spread or abs(off[k]) < STEP * spread:
+        return []
+    hours = (k + 1) * m * p.stretch_step / 3600.0
+    return [
+        f"The level changes by {number(off[k] / DPH)} °/h within {number(2.0 * m * p.stretch_step)} s, "
+        f"about {number(hours)} h after the beginning of the longest stretch: a step, which is not in the model; K and B take it "
+        "for theirs. Reduce the parts before and after it, or find its cause."
+    ]
 
 
 def _flat(p: Prepared, run: RunDocument) -> bool:

@@ -214,6 +214,7 @@ def test_what_is_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         "wild": (np.where(t == 50.0, 3.0e4, x), "", "more than 20 standard deviations from the median, the first"),
         "rounded": (10.0 * np.round(x / 25.0 + (t > 100.0)), "", "rounded to 10 °/h, more than twice the noise"),
         "folded": (x, "# bandwidth = 100Hz", "N² is up to 14 dB too large. Sample every 0.004 s"),
+        "step": (x + 5.0 * (t > 120.0), "", "a step, which is not in the model"),
         "limit": (np.clip(x, -0.5, 0.5), "", "stay at the largest or smallest value"),
     }
     monkeypatch.setattr(P, "describe", lambda x, step: None)  # of the warnings nothing needs the models
