@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.component.blocks.gyro import DEG_H
@@ -130,6 +131,16 @@ class AttitudeEstimatorTest(LoopTest):
     def check(self) -> list[str]:
         found = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.done_phases() if p not in PHASES]
         return found + self.not_positive("rest", "period", "time", "gate")
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        """A base that flies no manoeuvres moves by itself: phases named after manoeuvres would say what is not so."""
+        moving = [p for p in self.done_phases() if p in ("rocking", "turn", "acceleration")]
+        if not moving or "motion.forward[1]" in parameters or "motion.forward" in parameters:
+            return []
+        return [
+            f"phases: {', '.join(moving)}: the part in the slot motion flies no manoeuvres (no parameters forward, "
+            "turn, roll); it moves by itself: take phases=rest"
+        ]
 
     def warnings(self) -> list[str]:
         if self["heading_period"] == 0.0:

@@ -169,6 +169,11 @@ def test_sea_as_motion() -> None:
     assert r.result["tilt rest"].estimate < 0.1
 
 
+def test_a_base_without_manoeuvres_is_asked_to_rest() -> None:
+    with pytest.raises(InvalidConfigurationError, match="rocking: the part in the slot motion flies no manoeuvres"):
+        run(load_system(NAME), {"motion": "base_motion"}, values={"phases": "rest rocking"})
+
+
 def test_comparison_ranks_them() -> None:
     runs = [made(e) for e in ("mekf", "kalman", "complementary")]
     text = str(gb.compare(*runs, names=("mekf", "kalman", "complementary")))
