@@ -57,13 +57,13 @@ class Table:
         return rows / self.size if self.size else 0.0
 
 
-def open_table(source: Path) -> Table:
-    """Return a CSV or Parquet file, or the channels (windows, where there are none) of a run's folder.
+def open_table(source: Path, channel: str = "") -> Table:
+    """Return a CSV or Parquet file, or of a run's folder its windows, or its channels where ``channel`` is one of them.
 
     Raises DataError for anything else, RecordError for a folder that is not a run.
     """
     if source.is_dir():
-        return _of_run(Record.load(source), source)
+        return _of_run(Record.load(source), source, channel)
     if not source.is_file():
         raise DataError(source, ["no such file; name a CSV or Parquet file, or the folder of a run"])
     if source.stat().st_size == 0:
@@ -128,14 +128,13 @@ def _numbers(column: Any) -> Array:
     return np.asarray(column.to_numpy(zero_copy_only=False), dtype=float)
 
 
-def _of_run(record: Record, source: Path) -> Table:
-    """The channels of a run, or its windows: time is then the middle of each."""
+def _of_run(record: Record, source: Path, channel: str) -> Table:
+    """The windows of a run, which are means (time: the middle of each), or its channels, which are point samples."""
     columns, of = record.table("channels")
-    if not columns:
+    if "t_start" in record.windows and not (channel and channel.replace(",", " ").split()[0] in columns):
         columns, of = record.table("windows")
-        if "t_start" in columns:
-            columns = {TIME: 0.5 * (columns["t_start"] + columns["t_end"]), **columns}
-            of = {**of, TIME: "s"}
+        columns = {TIME: 0.5 * (columns["t_start"] + columns["t_end"]), **columns}
+        of = {**of, TIME: "s"}
     heads = [f"{n} [{of[n]}]" if of.get(n) not in ("", "1", None) else n for n in columns]
     head = Head(heads, {"instrument": record.run.instrument} if record.run.instrument else {}, 0, ",", False)
 

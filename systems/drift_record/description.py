@@ -70,9 +70,7 @@ def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]],
     if q := column["resolution"]:
         si, unit = (DPH, "°/h") if kind == "rate" else (ARCSEC, "″")
         rows.append(["resolution of the values", q / si, unit])
-    rows.append(
-        ["jitter of the time stamps, rms, of a step", 0.0 if about["rounded"] else round(about["jitter"], 9), "1"]
-    )
+    rows.append(["jitter of time stamps, rms, of a step", 0.0 if about["rounded"] else round(about["jitter"], 9), "1"])
     return [["column", f"{name}: {kind} [{column['unit'] or '1'}]", ""]], rows
 
 
@@ -219,8 +217,8 @@ def step_warnings(p: Prepared) -> list[str]:
     hours = (k + 1) * m * p.stretch_step / 3600.0
     return [
         f"The level changes by {number(off[k] / DPH)} °/h within {number(2.0 * m * p.stretch_step)} s, about "
-        f"{number(hours)} h after the beginning of the longest stretch: a step, which is not in the model; K and B take "
-        "it for theirs. Reduce the parts before and after it, or find its cause."
+        f"{number(hours)} h after the beginning of the longest stretch: a step, which is not in the model; K and B take"
+        " it for theirs. Reduce the parts before and after it, or find its cause."
     ]
 
 

@@ -45,7 +45,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
 
     run.series: acquisition, and how many samples a window is the mean of.  Raises DataError and InvalidValueError.
     """
-    table = open_table(data)
+    table = open_table(data, values.get("channel", ""))
     said = {**table.head.comments, **values}
     for name in values:
         if name not in system.options and name not in (*TEXTS, "samples"):

@@ -92,7 +92,6 @@ def test_the_report_finds_the_noise_of_the_gyro(run: Record, result: DriftRecord
 
 def test_a_channel_of_a_run(run: Record, result: DriftRecordResult, tmp_path: Path, command: Command) -> None:
     """The windows of a folder: the current with its scale is the rate, and the coefficients are those of the run."""
-    run.channels = {}
     folder = run.save(tmp_path / "run")
     scale = f"{math.degrees(run.run.parameters['gyro.k']):.12g}deg/s/A"
     code, out, said = command(
@@ -105,6 +104,8 @@ def test_a_channel_of_a_run(run: Record, result: DriftRecordResult, tmp_path: Pa
         if c["name"] != "R":  # turned round: rate = k i here, omega_IA - k i there
             assert c["interval"] == pytest.approx(expected.interval, rel=1e-3, abs=1e-12)
     assert json.loads(out)["provenance"]["data"]["file"] == "run"
+    record = load().read_measured(folder, {"channel": "gyro.drift"})  # one of its channels, sampled every 10 s
+    assert np.allclose(record.windows["gyro.drift"], run.channels["gyro.drift"])
 
 
 # ------------------------------------------------------------------------------------------- files
