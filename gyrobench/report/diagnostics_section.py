@@ -170,7 +170,7 @@ def estimates(doc: Json) -> list[Any]:
                     [
                         text_cell(c["name"], "strong"),
                         *([] if groups else [text_cell(c["unit"])]),
-                        number_cell(doc, (*path, "u_a"), u),
+                        number_cell(doc, (*path, "u_a"), significant=2, trim=False),  # may be far below u
                         number_cell(doc, (*path, "dof"), significant=3),
                         number_cell(doc, (*path, "k"), 0.1),
                         number_cell(doc, ("derived", "U", k), u),

@@ -54,8 +54,8 @@ def test_rates_of_a_laboratory(tmp_path: Path) -> None:
     assert not result.simulated
     clock = result["time base"]
     assert abs(clock.estimate - 8.0) < 4.0 * clock.u
-    # a reading errs by sqrt(0.1^2 - 0.18^2/12) = 0.085 arcsec, without the rounding of the command: of 500 ERU over 54 s,
-    # 406 100 arcsec, both senses, 0.085 sqrt(2) / 406 100 / sqrt(2) = 0.21e-6
+    # a reading errs by sqrt(0.1^2 - 0.18^2/12) = 0.085 arcsec, without the rounding of the command: of 500 ERU over
+    # 54 s, 406 100 arcsec, both senses, 0.085 sqrt(2) / 406 100 / sqrt(2) = 0.21e-6
     assert clock.u == pytest.approx(0.21, abs=0.015)
     assert "ppm (95 %) from 4 runs" in result.summary[0] and "1e" not in result.summary[0]
     for rate in (20, 500):  # both senses; the fast one over an angle of 125 deg

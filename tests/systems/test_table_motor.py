@@ -114,7 +114,7 @@ def test_without_shaper_is_refused() -> None:
 
 
 def test_inductance_of_a_quick_winding() -> None:
-    """R / L = 600 1/s: the current bends within 0.1 ms.  Trapezoids err by h2/12 R (i'1 - i'0) / (L di), 4e-4 of L here."""
+    """R / L = 600 1/s: the current bends within 0.1 ms.  Trapezoids err by h2/12 R (i'1 - i'0) / (L di), some 4e-4."""
     test = gb.load(NAME, coast=0.5)
     values = {"drive.motor_R": 6.0, "drive.motor_L": 0.01, "voltmeter.noise_rms": 1e-3, "ammeter.noise_rms": 1e-5}
     for name, value in values.items():
