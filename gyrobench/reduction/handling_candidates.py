@@ -205,7 +205,7 @@ def odd_rows(record: Record, column: str, words: str) -> Iterator[Candidate]:
 
 def _late(record: Record, means: Sequence[str]) -> Iterator[Candidate]:
     """Currents that belong to the row before or after, all of them or one."""
-    yield from shifted(record, means, "the current" if len(means) == 1 else "the currents")
+    yield from shifted(record, means, "the current")
     for n in means if len(means) > 1 else ():
         yield from shifted(record, [n], f"the current {n}".replace("mean_", "about "))
 

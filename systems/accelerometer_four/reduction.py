@@ -122,8 +122,8 @@ def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
     off = np.flatnonzero((np.abs(alpha - number * step) > POSITION) | (np.abs(end - alpha) > POSITION))
     if off.size:
         return [
-            f"row {off[0] + 1}: {math.degrees(float(alpha[off[0]])):.6g}° to {math.degrees(float(end[off[0]])):.6g}° is "
-            f"not one of {points} equally spaced positions"
+            f"row {off[0] + 1}: {math.degrees(float(alpha[off[0]])):.6g}° to {math.degrees(float(end[off[0]])):.6g}° "
+            f"is not one of {points} equally spaced positions"
         ]
     counts = np.bincount(np.mod(number, points).astype(int), minlength=points)
     if np.any(counts != counts[0]) or counts[0] == 0:
@@ -198,7 +198,7 @@ def _tables(
     ]
     compared = {
         "title": "Joint fit, chain of the source, each sensor alone",
-        "caption": "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, with the same D1. "
+        "caption": "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
         "Alone: five terms of each sensor, errors of the head in them. Residuals of the sensors alone: "
         + ", ".join(f"{v:.3g}" for v in s_single) + f" V, of the joint fit {found.residual_std:.3g} V.",
         "columns": ["coefficient", "joint", "u, type A", "chain", "alone", "unit"],
@@ -240,7 +240,8 @@ def _judged(result: DriftTestResult, s: FourSetup, found: Findings) -> DriftTest
         scale = float(np.mean(found.est.beta[1:20:5]))
         text = (
             f"The first harmonic of the head is not known: {', '.join(BIASED)} of each sensor are biased by K_I D1, "
-            f"{scale * ARCSEC:.2g} V for each arcsecond; the residuals do not show it. Measure it in the same positions."
+            f"{scale * ARCSEC:.2g} V for each arcsecond; the residuals do not show it. Measure it in the same "
+            "positions."
         )
         result.warnings.insert(0, text)
         return uncertainty.withhold(result, [text], ["pass", "fail"], names)
