@@ -42,7 +42,7 @@ ARCSEC, G0 = units.factor("arcsec"), frames.G0
 MEANING = {
     "K_F": ("bias", "V"),
     "K_I": ("scale factor", "V/g"),
-    "K_O": ("K_O + K_I (η + D₀): output axis, misalignment and zero of the head together", "V/g"),
+    "K_O": ("output axis, as K_O + K_I (η + D₀)", "V/g"),
     "K_IO": ("cross term", "V/g²"),
     "K_II": ("square term", "V/g²"),
 }
