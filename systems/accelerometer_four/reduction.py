@@ -89,8 +89,7 @@ def reduce(windows: Mapping[str, Array], setup: FourSetup) -> DriftTestResult:
             f"scale factors {', '.join(f'{k:.4g}' for k in single[:, 1])} V/g: must be positive; turn the sign of a "
             "voltage round, or the sense of the angle, or sensors stand in another order"
         )
-    found = _fitted(alpha, U, setup, single[:, 1])
-    found = _fitted(alpha, U, setup, found.est.beta[1:20:5])
+    found = estimate(alpha, U, setup, single[:, 1])
     reported = found.derive(_quantities(setup), lambda b: b[:20])
     result = linear_result(
         reported,
@@ -114,6 +113,12 @@ def reduce(windows: Mapping[str, Array], setup: FourSetup) -> DriftTestResult:
         random="noise of the voltages",
     )  # fmt: skip
     return _judged(result, setup, found)
+
+
+def estimate(alpha: Array, U: Array, setup: FourSetup, scale: Array) -> Findings:
+    """Return the joint fit of voltages U (n, 4) at the nominal angles; scale (4,): first scale factors, V/g."""
+    first = _fitted(alpha, U, setup, scale)
+    return _fitted(alpha, U, setup, first.est.beta[1:20:5])
 
 
 def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
