@@ -24,9 +24,9 @@ from systems.accelerometer_four import chain
 from systems.accelerometer_four.reduction import FourSetup, estimate, reduce
 
 KNOWN = 5e-7  # rad
-CASES = {
-    "2 arcsec, 3 uV": (2 * ARCSEC, 3e-6, (0.0, 0.0)),
-    "2 arcsec, 0.3 uV": (2 * ARCSEC, 3e-7, (0.0, 0.0)),
+CASES: dict[str, tuple[float, float, tuple[float, float] | None]] = {
+    "2 arcsec, 3 uV": (2 * ARCSEC, 3e-6, None),
+    "2 arcsec, 0.3 uV": (2 * ARCSEC, 3e-7, None),
     "11 arcsec, 3 uV, D1 = 15, -1.9 urad": (11 * ARCSEC, 3e-6, (1.5e-5, -1.9e-6)),
 }
 
@@ -44,11 +44,13 @@ def main() -> None:
         spread: dict[str, list[float]] = {m: [] for m in errors}
         held = []
         for n in range(given.runs):
-            U = voltages(rng, head(rng, size, D1), noise)
+            D = head(rng, size, D1)
+            U = voltages(rng, D, noise)
+            first = (2.0 * float(np.mean(D * np.cos(ALPHA))), 2.0 * float(np.mean(D * np.sin(ALPHA))))
             single, s = chain.alone(ALPHA, U, 1.0)
             errors["alone"].append(single[0] - TRUE[0])
             spread["alone"].append(float(s[0]))
-            measured = (D1[0] + KNOWN * rng.normal(), D1[1] + KNOWN * rng.normal())
+            measured = (first[0] + KNOWN * rng.normal(), first[1] + KNOWN * rng.normal())
             for method, d in (("joint, D1 known", measured), ("joint, D1 ignored", None)):
                 found = estimate(ALPHA, U, FourSetup(gravity=G0, D1=d), single[:, 1])
                 errors[method].append(found.est.beta[:5] - TRUE[0])

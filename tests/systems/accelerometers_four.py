@@ -23,9 +23,13 @@ TRUE = np.array(
 )
 
 
-def head(rng: np.random.Generator, half_range: float, D1: tuple[float, float] = (0.0, 0.0)) -> Array:
-    """Errors of the positions, uniform within the range, without constant and first harmonic but the given one."""
+def head(rng: np.random.Generator, half_range: float, D1: tuple[float, float] | None = (0.0, 0.0)) -> Array:
+    """Errors of the positions, uniform within the range, without constant and first harmonic but the given one; None:
+    with the first harmonic that they have.
+    """
     raw = rng.uniform(-half_range, half_range, N)
+    if D1 is None:
+        return np.asarray(raw - raw.mean())
     low = np.column_stack([np.ones(N), np.cos(ALPHA), np.sin(ALPHA)])
     out: Array = raw - low @ np.linalg.lstsq(low, raw, rcond=None)[0]
     return out + D1[0] * np.cos(ALPHA) + D1[1] * np.sin(ALPHA)
