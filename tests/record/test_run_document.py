@@ -80,7 +80,11 @@ def rows(header: str, count: int) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", MEASURED)
+#: their readers compare the columns of a row; tests/systems/test_table_measured.py has records that fit
+COMPARED = {"angle_system_test", "table_position_test", "table_rate_test"}
+
+
+@pytest.mark.parametrize("name", [n for n in MEASURED if n not in COMPARED])
 def test_a_measured_record_of_every_test_follows_the_schema(name: str, tmp_path: Path) -> None:
     system = load_system(name)
     assert system.measured_data is not None

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
 import gyrobench as gb
+from gyrobench.bench import standard_folder
+from gyrobench.record.record import Record
 from gyrobench.system.system import load_system
 
 ARCSEC = math.pi / 648000
@@ -32,6 +36,16 @@ def write(path: Path, head: str, rows: list[list[float]], swap: tuple[str, str] 
     return path
 
 
+def follows_the_schema(name: str, file: Path) -> None:
+    """The record of a file is saved with a run.json of the published form, and read back."""
+    record = load_system(name).read_measured(file, {"operator": "A. Tester"})
+    folder = record.save(file.parent / "saved")
+    schema = json.loads((standard_folder() / "reports" / "run.schema.json").read_text(encoding="utf-8"))
+    document = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(document)
+    assert document["measured"] and document["operator"] == "A. Tester" and Record.load(folder).run == record.run
+
+
 # ------------------------------------------------------------------------------------------- rates
 def rate_rows(clock: float = 8e-6) -> list[list[float]]:
     """Counts of a table that turns faster by `clock`, errors of the scale 0.3 and 0.15 arcsec once and twice a turn."""
@@ -50,6 +64,7 @@ def rate_rows(clock: float = 8e-6) -> list[list[float]]:
 
 def test_rates_of_a_laboratory(tmp_path: Path) -> None:
     file = write(tmp_path / "rates.csv", template("table_rate_test"), rate_rows())
+    follows_the_schema("table_rate_test", file)
     result = gb.reduce("table_rate_test", file).result
     assert not result.simulated
     clock = result["time base"]
@@ -109,6 +124,7 @@ def position_rows() -> list[list[float]]:
 
 def test_positions_of_a_laboratory(tmp_path: Path) -> None:
     file = write(tmp_path / "positions.csv", template("table_position_test"), position_rows())
+    follows_the_schema("table_position_test", file)
     result = gb.reduce("table_position_test", file).result
     wanted = {"E1 cos": 0.7, "E1 sin": 0.0, "E2 cos": 0.0, "E2 sin": -0.4, "E3 cos": 0.2, "lost motion": 0.1,
               "squareness x": 2.0, "squareness y": -1.0, "tilt 2": -3.0, "tilt 1": 0.0, "wobble cos": 0.5}  # fmt: skip
@@ -170,7 +186,9 @@ def test_angles_of_a_laboratory(tmp_path: Path, reversal: bool) -> None:
     head = template("angle_system_test")
     if reversal:
         head = head.replace("method = two_heads", "method = reversal").replace(",reading_2 [deg]", "")
-    result = gb.reduce("angle_system_test", write(tmp_path / "angles.csv", head, angle_rows(reversal))).result
+    file = write(tmp_path / "angles.csv", head, angle_rows(reversal))
+    follows_the_schema("angle_system_test", file)
+    result = gb.reduce("angle_system_test", file).result
     for k, parts in SCALE.items():
         for name, value in zip((f"cos_{k}", f"sin_{k}"), parts, strict=True):
             c = result[name]
