@@ -16,12 +16,12 @@ class NorthfinderStrapdown(NorthFinder):
         sin theta = f_y / g,   sin gamma = -f_x / (g cos theta)
         psi = atan2(-(w_x cos theta - w_y sin gamma sin theta + w_U sin gamma), (w_y - w_U sin theta) cos gamma)
 
-    with w_U = W sin(latitude); sigma = N / (A sqrt(T)) for a level head.  Taken in two positions, table angles 0 and
-    180 deg, half the differences stand for the means: biases of gyros and accelerometers cancel, if the head
-    turns about its z axis.  bias: of the gyro along y, with two positions.
+    with w_U = W sin(latitude); sigma is that of psi as a function of w_x and w_y, N / (A sqrt(T)) for a level head.
+    Taken in two positions, table angles 0 and 180 deg, half the differences stand for the means: biases of gyros
+    and accelerometers cancel, if the head turns about its z axis. bias: of the gyro along y, with two positions.
 
     Refused: latitude within 5 deg of a pole.  Ill-conditioned: |theta| or |gamma| above 85 deg, or |sin| above 1.
-    Not modelled: misalignments and scale factors of the instruments; sigma at large tilts.
+    Not modelled: misalignments and scale factors of the instruments, noise of the accelerometers in sigma.
     Source: GSP ch. 5, eq. 5-63..5-65, corrected: vertical component w_U in eq. 5-65, atan2.
     """
 
@@ -74,8 +74,11 @@ class NorthfinderStrapdown(NorthFinder):
                 north = (wy - self.up * st) * cos(self.gamma)
                 self.psi = atan2(east, north)
                 # both are A cos(theta) cos(gamma) times sin psi, cos psi
-                self.seen = sqrt(east * east + north * north) / (ct * cos(self.gamma))
-                self.sd = self.density * sqrt(mean) / self.seen
+                square = east * east + north * north
+                self.seen = sqrt(square) / (ct * cos(self.gamma))
+                by_x = north * ct
+                by_y = north * sg * st - east * cos(self.gamma)
+                self.sd = self.density * sqrt(mean * (by_x * by_x + by_y * by_y)) / square
                 if fabs(self.gamma) < STEEP:
                     self.state = VALID
 
