@@ -113,7 +113,7 @@ def test_without_pandas_the_remedy_is_said(run: gb.Run, monkeypatch: pytest.Monk
 def test_out_keeps_record_and_result_and_report_adds_the_pages(folder: Path, run: gb.Run) -> None:
     kept = gb.load(NAME, TINY).run(seed=5, out="r")
     files = {"run.json", "record.parquet", "channels.parquet", "result.json"}
-    assert kept.folder == Path("r") and {f.name for f in (folder / "r").iterdir()} == files
+    assert kept.folder == folder / "r" and {f.name for f in (folder / "r").iterdir()} == files
     assert set(kept.report()) == {"json", "html", "pdf"}
     assert run.folder is None
     paths = run.report("s")  # a run in memory becomes a folder as any other

@@ -41,7 +41,7 @@ def test_an_unknown_unit(fmu: Callable, tmp_path: Path) -> None:
         return text.replace('generationTool="gyrobench"', 'generationTool="other"')
 
     (problem,) = validate(changed(fmu("floated_gyro", "native"), tmp_path / "a.fmu", edit))
-    assert problem.startswith("alpha[1]: unit 'furlong/s2': unknown symbol 'furlong'")
+    assert problem.startswith("ramp: unit 'furlong/s2': unknown symbol 'furlong'")
 
 
 def test_a_wrong_structure(fmu: Callable, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """North finding in co-simulation: random headings, latitudes and attitudes come back, errors of the method as derived.
 
 Noise off the heading is exact to what the sampled windows leave; with noise the finder has the sigma of the closed form
-and the reduction an interval that holds (counted over 3,000 runs by tests/benchmarks/north_finder.py).
+and the reduction an interval that holds (counted over 1000 runs by tests/benchmarks/north_finder.py).
 """
 
 from __future__ import annotations

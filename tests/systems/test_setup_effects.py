@@ -23,7 +23,8 @@ HOUR = 3600.0
 def reduced(record: Record, **options: Any) -> DriftTestResult:
     run = record.run.replace(options={**record.run.options, **options})
     reduction = importlib.import_module(".reduction", type(load_system(record.run.system)).__module__)
-    result = reduction.from_record.__wrapped__(Record(record.windows, {}, run))  # without diagnosis of handling errors
+    examined = getattr(reduction, "_examined", reduction.from_record)
+    result = examined.__wrapped__(Record(record.windows, {}, run))  # without diagnosis of handling errors
     assert isinstance(result, DriftTestResult)
     return result
 
