@@ -86,8 +86,8 @@ def fit(series: Sequence[Json], key: str, alike: Sequence[Json], everything: Seq
     first = series[0]
     axes[0, 0].set_ylabel(axis_label(first["y_name"], first["y_unit"]))
     axes[1, 0].set_ylabel(axis_label("residual", first["y_unit"]))
-    for row, name, others in ((0, "y", alike), (1, "residual", everything)):
-        shared = limits([v for s in others for v in s[name] if v is not None])
+    for row, names, others in ((0, ("y", "shown_fit_y"), alike), (1, ("residual",), everything)):
+        shared = limits([v for s in others for name in names for v in s[name] if v is not None])
         if shared:
             axes[row, 0].set_ylim(*shared)
     fig.align_ylabels(axes[:, 0])
