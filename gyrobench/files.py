@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import functools
 import hashlib
 import os
 import shutil
@@ -12,7 +15,7 @@ from pathlib import Path
 from gyrobench.errors import GyrobenchError
 
 LOCK = ".lock"
-TEMPORARY = "gyrobench-"
+TEMPORARY = "gyrobench-temporary-"  # no user names a folder so
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
@@ -58,27 +61,36 @@ class FolderLock:
     """
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / LOCK
-        self.handle = os.open(self.path, os.O_RDWR | os.O_CREAT)
-        try:
-            _lock(self.handle)
-        except OSError:
-            owner = os.read(self.handle, 20).decode("ascii", "replace").strip()
-            os.close(self.handle)
-            whose = f" (process {owner})" if owner else ""
-            raise FolderInUseError(
-                f"{folder}: another run writes here{whose}; wait for its end, or name another folder: --out"
-            ) from None
+        while True:
+            folder.mkdir(parents=True, exist_ok=True)
+            self.handle = os.open(self.path, os.O_RDWR | os.O_CREAT)
+            try:
+                _lock(self.handle)
+            except OSError:
+                owner = os.read(self.handle, 20).decode("ascii", "replace").strip()
+                os.close(self.handle)
+                whose = f" (process {owner})" if owner else ""
+                raise FolderInUseError(
+                    f"{folder}: another run writes here{whose}; wait for its end, or name another folder: --out"
+                ) from None
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self.handle), os.stat(self.path)):
+                    break
+            os.close(self.handle)  # the process before removed the file between opening and locking it
         os.ftruncate(self.handle, 0)
         os.write(self.handle, str(os.getpid()).encode("ascii"))
 
     def release(self) -> None:
         """Give the folder free."""
         if self.handle >= 0:
-            self.path.unlink(missing_ok=True)
+            if os.name != "nt":  # there an open file cannot be removed, and the lock is that of the open file
+                self.path.unlink(missing_ok=True)
             os.close(self.handle)
             self.handle = -1
+            if os.name == "nt":
+                with contextlib.suppress(OSError):
+                    self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> FolderLock:
         return self
@@ -103,23 +115,34 @@ def _lock(handle: int) -> None:
 
 
 def temporary_folder() -> Path:
-    """Make a folder for the files of this process; those of processes that were killed are removed."""
-    root = Path(tempfile.gettempdir())
-    for old in root.glob(f"{TEMPORARY}*-*"):
-        owner = old.name.removeprefix(TEMPORARY).partition("-")[0]
-        if owner.isdigit() and not _alive(int(owner)):
-            shutil.rmtree(old, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-"))
+    """Make a folder for files of this process; what processes left that were killed is removed once."""
+    return Path(tempfile.mkdtemp(dir=_temporary_root(os.getpid())))
 
 
-def _alive(process: int) -> bool:
-    """Whether a process runs; of Windows it is not known without its tools, and the answer is yes."""
-    if os.name == "nt":
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
+@functools.cache
+def _temporary_root(process: int) -> Path:
+    """Folder of all temporary ones of a process, locked while it lives and removed at its end."""
+    sweep()
+    root = Path(tempfile.mkdtemp(prefix=TEMPORARY))
+    lock = FolderLock(root)
+
+    def remove() -> None:
+        if os.getpid() == process:  # not that of a child
+            lock.release()
+            shutil.rmtree(root, ignore_errors=True)
+
+    atexit.register(remove)
+    return root
+
+
+def sweep() -> None:
+    """Remove the temporary folders of processes that were killed: those with a lock that nobody holds."""
+    for old in Path(tempfile.gettempdir()).glob(f"{TEMPORARY}*"):
+        if not (old / LOCK).is_file():
+            continue
+        try:
+            lock = FolderLock(old)
+        except (OSError, GyrobenchError):
+            continue
+        shutil.rmtree(old, ignore_errors=True)
+        lock.release()

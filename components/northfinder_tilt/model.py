@@ -17,8 +17,8 @@ class NorthfinderTilt(RotatingFinder):
     times tan(latitude).  A bias of the accelerometer is the same at all angles and goes into the constant.
 
     Refused: latitude within 5 deg of a pole; |f_y| >= g.
-    Not modelled: the head is level along x to second order (heading of the projection of y); scale factor and
-    misalignment of the accelerometer, acceleration of the base other than zero mean.
+    Not modelled: terms of second order in the tilt t, which turn the heading by up to 3/8 t2 (0.13' at 10 mrad); scale
+    factor and misalignment of the accelerometer, acceleration of the base other than zero mean.
     Source: GSP ch. 5, eq. 5-57..5-62, corrected: sign of the vertical term, specific force.
     """
 

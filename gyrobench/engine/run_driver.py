@@ -69,7 +69,9 @@ class _CtrlC:
 
     def __enter__(self) -> _CtrlC:
         if threading.current_thread() is threading.main_thread():
-            self.previous = {s: signal.signal(s, self._handle) for s in SIGNALS}
+            # what is ignored stays so: nohup, a job in the background
+            heard = [s for s in SIGNALS if signal.getsignal(s) != signal.SIG_IGN]
+            self.previous = {s: signal.signal(s, self._handle) for s in heard}
         return self
 
     def _handle(self, number: int, frame: FrameType | None) -> None:

@@ -14,6 +14,7 @@ from gyrobench.reduction.run_metadata import Site
 from gyrobench.result import DriftTestResult
 
 NEAR = 0.03  # relative distance
+RATES = ("°/h", "°/h/g", "°/h/g²")
 LEAST = 3.0  # deg/h: smaller multiples (near the pole, at the equator) are the size of drifts
 
 
@@ -27,7 +28,7 @@ def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[str]:
     }
     found = []
     for c in result.coefficients:
-        if not c.unit.startswith("°/h") or "mA" in c.unit:
+        if c.unit not in RATES:
             continue
         near = [
             (abs(abs(c.estimate) / (m * rate) - 1.0), f"{words} {name}, {m * rate:.4g} °/h")

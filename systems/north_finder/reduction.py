@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import plans
-from .model import Place, Problem, of_windows
+from .model import Place, Problem, attitude, of_windows, tilted_heading
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
@@ -176,43 +176,50 @@ def _effects(s: Setup, found: Findings, p: Problem) -> list[Effect]:
     on_heading = np.zeros(q)
     on_heading[0] = 1.0
     out = [Effect("zero of the head against the reference", s.u_angle, "rad", None, values=on_heading)]
-    if p.tilt is None and s.method != "tilt":
+    if p.force is None:
         towards = psi + p.along
         out += [
-            Effect(
-                f"tilt of the head about {n}", s.u_level, "rad", found.error(s.place.up * c), "positive right-handed"
-            )
+            Effect(f"tilt of the head about {n}", s.u_level, "rad", found.error(s.place.up * c), "right-handed")
             for n, c in (("east", np.cos(towards)), ("north", -np.sin(towards)))
         ]
-    if s.method == "tilt":  # a bias of the accelerometer is a constant of the rate
-        out.append(Effect("bias of the accelerometer along y", s.u_accelerometer, "m/s2",
-                          found.error(-s.place.up / s.gravity * np.ones_like(p.y))))  # fmt: skip
     if s.method == "strapdown":
-        theta, gamma = p.tilt or (0.0, 0.0)
         for name, axis in (("x", 0.0), ("y", 1.0)):
             out.append(Effect(f"bias of the gyro along {name}", s.u_bias, "rad/s", found.error((p.axis == axis) * 1.0)))
-        # level head: f_x too large by b reads as right side up by b/g, and so w_U b/g is missing along x
-        for name, axis, cosine in (("x", 0.0, math.cos(gamma)), ("y", 1.0, math.cos(theta))):
-            error = -s.place.up / s.gravity / max(cosine, 1e-3) * (p.axis == axis)
-            out.append(Effect(f"bias of the accelerometer along {name}", s.u_accelerometer, "m/s2", found.error(error),
-                              "of a level head"))  # fmt: skip
-    if s.method in ("two", "tilt", "strapdown", "strapdown two"):
-        out.append(_latitude(s, found, p))
+    if p.force is not None:
+        f = p.force
+        for name, u, moved in (("x", f.u_x, (1.0, 0.0)), ("y", f.u_y, (0.0, 1.0))):
+            values = _by_heading(s, found, p, force=moved)
+            out.append(Effect(f"noise of the accelerometers along {name}", u, "m/s2", None, values=values))
+            if s.method == "strapdown":  # two positions and a turning head take it out
+                size = s.u_accelerometer
+                out.append(Effect(f"bias of the accelerometer along {name}", size, "m/s2", None, values=values))
+        out.append(_latitude(s, _by_heading(s, found, p, latitude=1.0)))
+    elif s.method == "two":
+        on_heading = np.zeros(q)
+        on_heading[0] = -math.tan(s.latitude) * math.cos(psi) / math.sin(psi)  # cos psi = c / A
+        out.append(_latitude(s, on_heading))
     return out
 
 
-def _latitude(s: Setup, found: Findings, p: Problem) -> Effect:
-    """Stated latitude too large by one: two positions take A from it, tilted heads the vertical rate."""
-    values = np.zeros(found.value.size)
-    psi = float(found.value[0])
-    if s.method == "two":
-        values[0] = -math.tan(s.latitude) * math.cos(psi) / math.sin(psi)  # cos psi = c / A
-    elif p.tilt is not None:
-        theta, gamma = p.tilt
-        # dw_U/dphi = A: east part changes by -A sin gamma, north part by -A sin theta cos gamma
-        east, north = -math.sin(gamma), -math.sin(theta) * math.cos(gamma)
-        values[0] = (east * math.cos(psi) - north * math.sin(psi)) / (math.cos(theta) * math.cos(gamma))
+def _latitude(s: Setup, values: Array) -> Effect:
     return Effect("latitude", s.u_latitude, "rad", None, "positive where the stated one is too large", values=values)
+
+
+def _by_heading(
+    s: Setup, found: Findings, p: Problem, force: tuple[float, float] = (0.0, 0.0), latitude: float = 0.0
+) -> Array:
+    """Change (q,) of the values for a unit of the force along x and y as read, or of the latitude as stated."""
+    assert p.force is not None and p.rates is not None
+    rates, step = p.rates(found.est.beta[: p.X.shape[1]]), 1e-6
+
+    def at(sign: float) -> Array:
+        place = replace(s.place, up=s.place.up + sign * step * latitude * s.place.north)
+        x, y = (f + sign * step * d for f, d in zip((p.force.x, p.force.y), force, strict=True))  # type: ignore[union-attr]
+        return np.array(tilted_heading(rates, x, y, place))
+
+    change = (at(1.0) - at(-1.0)) / (2.0 * step)
+    change[0] = math.remainder(change[0] * 2.0 * step, 2.0 * math.pi) / (2.0 * step)
+    return np.concatenate([change, np.zeros(found.value.size - 2)])
 
 
 def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
@@ -222,8 +229,9 @@ def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
             ["horizontal Earth rate of the latitude", s.place.north / DPH, "°/h"],
             ["measured less this, relative", (A / s.place.north - 1.0) * 100.0, "%"],
         ]
-    if p.tilt is not None:
-        rows += [["pitch, up positive", p.tilt[0] / DEG, "°"], ["roll, right side down positive", p.tilt[1] / DEG, "°"]]
+    if p.force is not None:
+        theta, gamma = attitude(p.force.x, p.force.y, s.gravity)
+        rows += [["pitch, up positive", theta / DEG, "°"], ["roll, right side down positive", gamma / DEG, "°"]]
     if s.finder:
         rows += [
             ["heading of the finder in the run", s.finder["heading"] / DEG, "°"],

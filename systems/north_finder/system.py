@@ -215,10 +215,11 @@ class NorthFinder(TableTest):
                 f"The head is tilted by up to {math.degrees(tilted):.3g}°, the method {self.chosen} takes it for "
                 "level: the heading is wrong by the tilt about north times tan(latitude); take tilt or strapdown."
             )
-        if tilted > 0.02 and self.chosen == "tilt":
-            off = math.degrees(tilted**2 / 4.0) * 60.0
+        off = 0.375 * (self["pitch"] ** 2 + self["roll"] ** 2)  # largest, see NORTH-TILT
+        if self.chosen == "tilt" and off > 0.1 * math.radians(1.0 / 60.0):
             found.append(
-                f"Tilt of {math.degrees(tilted):.3g}°: the method tilt is right to first order, its heading wrong by "
-                f"up to {off:.2g}′; take strapdown two."
+                f"Tilt of {math.degrees(tilted):.3g}°: the finder of the method tilt is right to first order, its "
+                f"heading wrong by up to {math.degrees(off) * 60.0:.2g}′; the reduction, and strapdown two, are "
+                "right at any tilt."
             )
         return found

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.reduction.estimation.uncertainty import p_text
+
 Array = NDArray[np.float64]
 LEVEL = 1e-3  # probability that a clean table is contradicted by chance, of each kind
 LARGEST = 0.2  # departure of a K_n from the others, of a torquer
@@ -26,8 +28,8 @@ def contradictions(i: Array, K_n: Array, half: Array, theta: Array) -> tuple[lis
     a, p = asymmetry(i, K_n, half, theta)
     if p >= LEVEL:
         return found, []
-    text = f"half the difference of the senses grows with the current, (K₊ − K₋)/(K₊ + K₋) = {100 * a:.3g} % ("
-    text = text + ("p < 0.001)" if p < 0.001 else f"p = {p:.2g})")
+    text = f"half the difference of the senses grows with the current, (K₊ − K₋)/(K₊ + K₋) = {100 * a:.3g} % "
+    text = f"{text}({p_text(p)})"
     if abs(a) > ASYMMETRY:
         wrong = f"The rates of one sense are mistaken (unit, factor): {text}; a torquer differs by less than "
         return [*found, f"{wrong}{100 * ASYMMETRY:g} %."], []

@@ -17,7 +17,8 @@ import pytest
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE
-from gyrobench.files import LOCK, FolderInUseError, FolderLock, temporary_folder
+from gyrobench.engine.run_driver import _CtrlC
+from gyrobench.files import LOCK, FolderInUseError, FolderLock, sweep
 from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
@@ -106,16 +107,37 @@ def test_the_first_checkpoint_comes_after_seconds() -> None:
     assert checkpoint.FIRST <= 10.0 < checkpoint.PERIOD
 
 
-def test_files_of_killed_processes_are_removed() -> None:
-    gone = subprocess.Popen([sys.executable, "-c", ""])
-    gone.wait()
-    old = Path(tempfile.mkdtemp(prefix=f"gyrobench-{gone.pid}-"))
-    (old / "gyro").mkdir()
-    other = Path(tempfile.mkdtemp(prefix="gyrobench-notes-"))
-    mine = temporary_folder()
-    again = temporary_folder()
+def test_files_of_killed_processes_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that ends removes its own; what a killed one left goes, what a living one has and a user's run stay."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    code = f"import sys; sys.path.insert(0, {ROOT!r})\nimport os, signal, tempfile\n"
+    code += f"tempfile.tempdir = {str(tmp_path)!r}\nfrom gyrobench.files import temporary_folder\n"
+    code += "print(temporary_folder(), flush=True)\n"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    assert list(tmp_path.iterdir()) == []
+    living = subprocess.Popen([sys.executable, "-c", f"{code}input()"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert living.stdout is not None
+    his = Path(living.stdout.readline().decode().strip())
+    killed = f"{code}os.kill(os.getpid(), signal.SIGKILL)"
+    left = Path(subprocess.run([sys.executable, "-c", killed], capture_output=True, text=True).stdout.strip())
+    mine = tmp_path / "gyrobench-run"  # of a run that was killed: a lock that nobody holds
+    mine.mkdir()
+    (mine / LOCK).touch()
+    assert left.is_dir() and his.is_dir()
+    sweep()
+    assert not left.exists() and his.is_dir() and mine.is_dir()
+    living.communicate(b"\n")
+    assert not his.exists()
+
+
+def test_an_ignored_hangup_stays_ignored() -> None:
+    """nohup: the end of the terminal is no end of the run."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        assert not old.exists() and other.is_dir() and mine.is_dir() and again.is_dir()
+        with _CtrlC() as ended:
+            signal.raise_signal(signal.SIGHUP)
+            assert not ended.pressed and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            signal.raise_signal(signal.SIGTERM)
+            assert ended.pressed
     finally:
-        for folder in (mine, again, other):
-            folder.rmdir()
+        signal.signal(signal.SIGHUP, before)

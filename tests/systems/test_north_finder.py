@@ -14,12 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
+from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
 from systems.north_finder import plans
-from systems.north_finder.reduction import from_record
+from systems.north_finder.reduction import Setup, from_record, reduce
 
 Command = Callable[..., tuple[int, str, str]]
 NAME = "north_finder"
@@ -193,3 +195,88 @@ def test_measured_record_is_refused(command: Command, tmp_path: Path, change: tu
     (tmp_path / "lab.csv").write_text(written(2.5, 0.8, "four").replace(*change), encoding="utf-8")
     code, _, err = command("reduce", NAME, "--data", tmp_path / "lab.csv", "--out", tmp_path / "out")
     assert code in (2, 3) and words in " ".join(err.split()) and "Traceback" not in err
+
+
+def windows(
+    method: str, heading: float, latitude: float, pitch: float = 0.0, roll: float = 0.0, noise: float = 0.0
+) -> dict[str, np.ndarray]:
+    """Windows of a method without bias, from v_b = C v_ENU by scipy's rotations."""
+    C = Rotation.from_euler("ZXY", [-heading, pitch, roll]).as_matrix().T
+    angles = plans.targets(method) or [-2.0 * math.pi * k / 36 for k in range(36)]
+    rows = np.repeat(angles, max(32 // len(angles), 1))
+    n, W = rows.size, 7.2921159e-5
+    turned = [Rotation.from_euler("z", a).as_matrix().T @ C for a in rows]
+    rate = np.array([T @ [0.0, W * math.cos(latitude), W * math.sin(latitude)] for T in turned])
+    force = np.array([T @ [0.0, 0.0, 9.80665] for T in turned])
+    rate += noise * np.random.default_rng(3).normal(size=(n, 3))
+    t = 10.0 * np.arange(n)
+    return {"phase": np.ones(n), "t_start": t, "t_end": t + 10.0, "angle_start": rows, "angle_end": rows,
+            "mean_x": rate[:, 0], "mean": rate[:, 1], "f_x": force[:, 0], "f_y": force[:, 1]}  # fmt: skip
+
+
+def heading_of(method: str, w: dict[str, np.ndarray], latitude: float, **u: float) -> DriftTestResult:
+    setup = Setup(method=method, latitude=latitude, gravity=9.80665, rough=1.0, nuisances=False, **u)
+    return reduce(w, setup)
+
+
+@pytest.mark.parametrize("method", ["tilt", "strapdown two"])
+def test_the_reduction_is_right_at_any_tilt(method: str) -> None:
+    """Pitch 0.1, roll -0.3: to first order alone the heading would be off by up to 3/8 (0.01 + 0.09) = 2.1 deg."""
+    for heading in (-2.9, 0.4, 1.7):
+        found = heading_of(method, windows(method, heading, 0.8, 0.1, -0.3), 0.8)
+        assert math.remainder(math.radians(found["ψ"].estimate) - heading, 2.0 * math.pi) == pytest.approx(
+            0.0, abs=1e-9
+        )
+
+
+def test_error_of_the_finder_of_a_tilted_head(sessions: Callable[[str], Session]) -> None:
+    """3/8 tau2 at most, over the directions of a tilt of 0.1 rad: the part is right to first order."""
+    worst = 0.0
+    for k in range(8):
+        values = {"pitch": 0.1 * math.cos(k * math.pi / 4), "roll": 0.1 * math.sin(k * math.pi / 4)}
+        worst = max(worst, abs(off(run(sessions, "tilt", time=12.0, heading=0.3, latitude=1.0, **QUIET, **values))))
+    assert 0.5 * 0.00375 < worst < 1.02 * 0.00375
+
+
+@pytest.mark.parametrize(
+    ("method", "source", "option", "size", "change"),
+    [
+        ("four", "tilt of the head about east", "u_level", 1e-4, {"pitch": ("tilt", 0.0)}),
+        ("four", "tilt of the head about north", "u_level", 1e-4, {"roll": ("tilt", 1.0)}),
+        ("two", "latitude", "u_latitude", 1e-5, {}),
+        ("strapdown", "latitude", "u_latitude", 1e-5, {}),
+        ("tilt", "latitude", "u_latitude", 1e-5, {}),
+        ("strapdown two", "latitude", "u_latitude", 1e-5, {}),
+        ("strapdown", "bias of the gyro along x", "u_bias", 1e-8, {"mean_x": ("add", 1e-8)}),
+        ("strapdown", "bias of the gyro along y", "u_bias", 1e-8, {"mean": ("add", 1e-8)}),
+        ("strapdown", "bias of the accelerometer along x", "u_accelerometer", 1e-4, {"f_x": ("add", 1e-4)}),
+        ("strapdown", "bias of the accelerometer along y", "u_accelerometer", 1e-4, {"f_y": ("add", 1e-4)}),
+    ],
+)  # fmt: skip
+def test_budget_is_what_an_error_does(
+    method: str, source: str, option: str, size: float, change: dict[str, tuple[str, float]]
+) -> None:
+    """Each source of type B, with its sign, against the change of the heading by that error in the record."""
+    heading, latitude, noise = 1.1, 0.8, 1e-10
+    tilts = (0.2, -0.15) if method in ("tilt", "strapdown", "strapdown two") else (0.0, 0.0)
+    w = windows(method, heading, latitude, *tilts, noise=noise)
+    base = heading_of(method, w, latitude, **{option: size})
+    line = next(b for b in base.budget if b.source == source and b.coefficient == "ψ")
+    stated = latitude
+    if source == "latitude":
+        stated += size
+    elif "tilt of the head" in source:  # right-handed about east or north, by its matrix on the axes of the head
+        axis = [1.0, 0.0, 0.0] if "east" in source else [0.0, 1.0, 0.0]
+        C = Rotation.from_euler("ZXY", [-heading, 0.0, 0.0]).as_matrix().T
+        C = C @ Rotation.from_rotvec(size * np.array(axis)).as_matrix().T
+        earth = 7.2921159e-5 * np.array([0.0, math.cos(latitude), math.sin(latitude)])
+        T = [Rotation.from_euler("z", a).as_matrix().T @ C for a in w["angle_start"]]
+        C = Rotation.from_euler("ZXY", [-heading, 0.0, 0.0]).as_matrix().T
+        level = [Rotation.from_euler("z", a).as_matrix().T @ C for a in w["angle_start"]]
+        w = w | {"mean": w["mean"] + np.array([(t - t0)[1] @ earth for t, t0 in zip(T, level, strict=True)])}
+    else:
+        ((column, (_, step)),) = change.items()
+        w = w | {column: w[column] + step}
+    shift = math.radians(heading_of(method, w, stated)["ψ"].estimate - base["ψ"].estimate)
+    assert math.radians(line.sensitivity) * size == pytest.approx(shift, rel=0.02, abs=1e-9)
+    assert line.contribution == pytest.approx(abs(line.sensitivity) * size, rel=1e-9)

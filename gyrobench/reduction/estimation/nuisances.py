@@ -56,7 +56,7 @@ class Candidate:
     def of(
         cls, name: str, meaning: str, unit: str, columns: Array, visible: float = VISIBLE, bound: float = math.inf
     ) -> Candidate:
-        largest = MISTAKEN[unit]
+        largest = MISTAKEN.get(unit, math.inf)
         return cls(
             name, meaning, units.display(unit), units.factor(unit), columns, visible=visible, bound=bound,
             largest=largest,
