@@ -22,11 +22,14 @@ if TYPE_CHECKING:
         Run,
         SuiteExperiment,
         SuiteRun,
+        campaign,
         compare,
+        design,
         load,
         load_suite,
         open_run,
         reduce,
+        sweep,
     )
 
 __all__ = [
@@ -38,11 +41,14 @@ __all__ = [
     "Run",
     "SuiteExperiment",
     "SuiteRun",
+    "campaign",
     "compare",
+    "design",
     "load",
     "load_suite",
     "open_run",
     "reduce",
+    "sweep",
 ]
 
 

@@ -6,13 +6,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import frames
+from gyrobench import frames, reading
 from gyrobench.frames import E, N, U
 
 Array = NDArray[np.float64]
@@ -31,10 +30,10 @@ def parse(text: str, latitude: float) -> Array:
     """
     if text.strip().startswith("["):
         try:
-            rows = np.array(json.loads(text), dtype=float)
+            rows = np.array(reading.json_value(text, "attitude", ValueError), dtype=float)
         except (ValueError, TypeError):
             raise ValueError(
-                f"attitude = {text}: no 3x3 matrix of numbers; write [[a, b, c], [d, e, f], [g, h, i]]"
+                f"attitude = {reading.shorten(text)}: no 3x3 matrix of numbers; write [[a, b, c], [d, e, f], [g, h, i]]"
             ) from None
         return frames.check_rotation(rows, "attitude")
     known, found = directions(latitude), []

@@ -57,13 +57,15 @@ class FolderInUseError(GyrobenchError):
 class FolderLock:
     """The right to write into a folder, for one process at a time; it ends with the process, however that ends.
 
-    Raises FolderInUseError where another process has it.  The folder is made where it does not exist.
+    Raises FolderInUseError where another process has it.  The folder is made where it does not exist.  ``abandoned``:
+    the process that had it before was killed.
     """
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / LOCK
         while True:
             folder.mkdir(parents=True, exist_ok=True)
+            self.abandoned = self.path.exists()
             self.handle = os.open(self.path, os.O_RDWR | os.O_CREAT)
             try:
                 _lock(self.handle)

@@ -317,7 +317,8 @@ class LoopResult(Result):
 class DriftColumn:
     """One column of a drift record: what its report draws and tabulates, in printed units.
 
-    record: {"t", "low", "high", "unit_t"}, extremes of the rate.  deviations: {"kind", "tau", "dev", "low", "high"}.
+    record: {"t", "low", "mean", "high"} of the rate, "smoothed": the same of its drift.
+    deviations: {"kind", "tau", "dev", "low", "high"}.
     model: {"tau", "dev", "f", "S"} of the noise coefficients.  spectrum: {"f", "S", "low", "high"}, one-sided.
     correlation: {"lag", "rho", "partial", "bound"}.  tables, texts: section of the report -> tables as of a Result,
     sentences.

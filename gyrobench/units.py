@@ -117,7 +117,9 @@ def _clean(name: str) -> str:
     return re.sub(r"\s+", "", text)
 
 
-@lru_cache(maxsize=1024)
+LARGEST_POWER = 9
+
+
 def unit(name: str) -> Unit:
     """The unit called ``name``; raises :class:`UnitError` with the offending symbol when it is not one."""
     text = _clean(name)
@@ -168,7 +170,8 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
         why = " (degC has an offset and stands alone; a difference is K)" if head == "degC" else ""
         raise UnitError(f"unit '{name}': unknown symbol '{head}'{why}{hint}")
     if rest and re.fullmatch(r"-?\d+", rest[0]):
-        n = int(rest[0])
+        if abs(n := int(rest[0][:4])) > LARGEST_POWER:
+            raise UnitError(f"unit '{name[:60]}': power {rest[0][:20]}; {LARGEST_POWER} is the largest")
         f, p, rest = f**n, tuple(e * n for e in p), rest[1:]
     return f, p, rest
 

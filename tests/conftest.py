@@ -6,7 +6,9 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -52,3 +54,20 @@ def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         return code, out, err
 
     return run
+
+
+@pytest.fixture
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs that pause after each thousand steps or so, for an interrupt that comes before the end of a short one."""
+    from gyrobench.engine import child, run_driver, supervision
+
+    execute = child.execute
+
+    def pausing(job: Any, instances: Any, board: Any, progress: Any, stopped: Callable[[], bool]) -> Any:
+        return execute(job, instances, board, progress, lambda: time.sleep(0.05) or stopped())
+
+    monkeypatch.setattr(child, "execute", pausing)
+    monkeypatch.setattr(run_driver, "CHUNK", 0.001)
+    monkeypatch.setattr(supervision, "REPORT", 0.0)
+    # a child that is no fork would not have these; the threads that other tests have left hold no lock
+    monkeypatch.setattr(supervision, "can_fork", lambda: True)

@@ -111,7 +111,7 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> engine ->
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
-COMMON = {"errors", "files", "result", "bench", "units", "frames", "attitudes", "drift", "notebook"}
+COMMON = {"errors", "files", "result", "bench", "units", "frames", "attitudes", "drift", "notebook", "reading"}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
     "component": {"errors"},  # a Python FMU carries a copy of both
@@ -127,7 +127,8 @@ ROOMS: dict[str, set[str]] = {
 BELOW = {*ROOMS}
 #: from a request to a result, for the commands and the library
 ROOMS["workflow"] = BELOW
-ROOMS["library"] = BELOW | {"workflow"}
+ROOMS["campaign"] = BELOW | {"workflow"}
+ROOMS["library"] = BELOW | {"workflow", "campaign"}
 
 
 def imports(file: Path) -> set[str]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -61,7 +63,7 @@ def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
     names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
-    assert len(names) == 11
+    assert len(names) == 16
     for name in names:
         code, text, _ = gyrobench(name, "--help")
         assert code == 0
@@ -166,9 +168,9 @@ REFUSED = [
     (["run", NAME, "--part", "gyro=site"], "slot gyro: FMU 'Site' does not fit socket SdfGyro"),
     (["run", NAME, "--map", "gyro=no.toml"], "--map gyro=no.toml: no such file"),
     (["run", NAME, "--spec", "floated_gyr"], "floated_gyr: no such file or acceptance specification; did you mean"),
-    (["run", NAME, "--isolate", "gyr"], "no slot 'gyr'"),
+    (["run", NAME, "--timeout", "1V"], "--timeout"),
     (["run", NAME, "--seed", "-1"], "--seed"),
-    (["run", NAME, "--engine", "fast"], "'native', 'reference'"),
+    (["run", NAME, "--engine", "fast"], "'linked', 'reference'"),
     (["run", NAME, "--out", "full"], "full: holds other files; name a new folder, for example full/run1"),
     (["run", NAME, "--out", "bad.fmu"], "bad.fmu: is a file"),
     (["run", NAME, "--sed", "3"], "No such option: --sed"),
@@ -330,7 +332,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
     assert gyrobench("report", "r")[0] == 0
 
 
-def test_engines_and_isolation_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
+def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
     short = [TINY[0], "rate=60deg/s", *TINY[2:], "--set", "table.index_rate=2"]
     for name, more in (("n", []), ("r", ["--engine", "reference"])):
         assert gyrobench("run", NAME, *short, *more, "--out", name)[0] == 0
@@ -369,7 +371,7 @@ def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
 
 
 def test_interrupt_does_not_replace_a_whole_record(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
 ) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run)[0] == 0
@@ -382,7 +384,7 @@ def test_interrupt_does_not_replace_a_whole_record(
 
 
 def test_interrupted_step_check_still_gives_the_report(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if "step check" in self.label:
@@ -407,9 +409,9 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def test_crash_of_an_isolated_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:
+def test_crash_of_a_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:
     code, out, err = gyrobench(
-        "run", NAME, *TINY, "--part", f"gyro={faulty}", "--isolate", "gyro", "--out", "r",
+        "run", NAME, *TINY, "--part", f"gyro={faulty}", "--out", "r",
         "--set", "gyro.fault=1", "--set", "gyro.at=150", "--set", "rebalance.K_p=0", "--set", "rebalance.K_i=0",
     )  # fmt: skip
     assert code == 3 and out == ""
@@ -445,10 +447,8 @@ def test_progress_in_lines_where_there_is_no_terminal(
 
 
 def test_a_note_on_several_slots_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
-    print_notes(["site: slow: no compiler", "gyro: slow: no compiler", "isolated FMUs run in the reference engine"])
-    assert capsys.readouterr().err == (
-        "note: site, gyro: slow: no compiler\nnote: isolated FMUs run in the reference engine\n"
-    )
+    print_notes(["site: slow: no compiler", "gyro: slow: no compiler", "reference engine"])
+    assert capsys.readouterr().err == ("note: site, gyro: slow: no compiler\nnote: reference engine\n")
 
 
 def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -483,11 +483,28 @@ def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_pa
     assert code == 1 and out
 
 
-def test_export_and_run_of_an_archive(gyrobench: Call, tmp_path: Path) -> None:
-    assert gyrobench("export", NAME, "--to", "ssp", *TINY)[:2] == (0, f"fmus/{NAME}.ssp\n")
-    code, out, _ = gyrobench("run", f"fmus/{NAME}.ssp", "--out", "s")
-    assert (code, out) == (0, "no reduction; record: s\n")
-    assert Record.load(tmp_path / "s").complete
+def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    values = (*TINY, "--set", "gyro.D_I=0.7deg/h/g")
+    assert gyrobench("run", NAME, *values, "--seed", 7, "--out", "r")[0] == 0
+    assert gyrobench("export", NAME, "--to", "ssp", *values, "--seed", 7)[:2] == (0, f"fmus/{NAME}.ssp\n")
+    assert gyrobench("run", f"fmus/{NAME}.ssp", "--out", "s")[0] == 0
+    assert Record.load(tmp_path / "s").same_data(Record.load(tmp_path / "r"))
+    first, again = (json.loads((tmp_path / f / "result.json").read_text(encoding="utf-8")) for f in "rs")
+    assert again["coefficients"] == first["coefficients"]
+    assert again["warnings"] == first["warnings"]
+    # one changed value: the archive is not what was exported, and runs as it is wired
+    with zipfile.ZipFile(tmp_path / "fmus" / f"{NAME}.ssp") as z:
+        entries = {n: z.read(n) for n in z.namelist()}
+    text = entries["resources/gyro.ssv"].decode()
+    entries["resources/gyro.ssv"] = re.sub(r'(name="D_I">\s*<ssv:Real value=")[^"]*', r"\g<1>0.0", text).encode()
+    assert entries["resources/gyro.ssv"] != text.encode()
+    with zipfile.ZipFile(tmp_path / "changed.ssp", "w") as z:
+        for name, data in entries.items():
+            z.writestr(name, data)
+    code, _, err = gyrobench("show", "changed.ssp")
+    assert code == 0, err
+    gyrobench("run", "changed.ssp", "--step", "20ms", "--out", "c")
+    assert "changed.ssp was changed since its export: the archive runs as it is wired, without a reduct" in caplog.text
 
 
 # ------------------------------------------------------------------------------------------- measured

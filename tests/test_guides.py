@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shlex
+import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
@@ -35,6 +36,9 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
         if program == "cd":
             os.chdir(words[0])
             return
+        if program == "pythonfmu":
+            subprocess.run([sys.executable, "-m", program, *words], check=True, stdout=subprocess.DEVNULL)
+            return
         assert program == "gyrobench", line
         monkeypatch.setattr(sys, "argv", [program, *words])
         try:
@@ -54,6 +58,8 @@ def follow(guide: Path, command: Callable[[str], None]) -> tuple[dict[str, Any],
             Path(file).parent.mkdir(parents=True)
             Path(file).write_text(text, encoding="utf-8")
             files[file] = text
+        elif language == "toml":
+            continue
         elif language == "sh":
             for line in text.splitlines():
                 command(line)
@@ -79,6 +85,18 @@ def test_a_part_a_test_and_their_noise(command: Callable[[str], None], tmp_path:
     whiteness = {t.name: t.p for t in names["runs"][0].result.tests}["Ljung-Box, residuals"]
     assert whiteness < 1e-3
     assert model.shape == (5, 6) and names["rms_plain"] > 3.0 * names["rms_model"]
+
+
+def test_a_vendors_fmu(command: Callable[[str], None], tmp_path: Path) -> None:
+    page = (GUIDES / "vendor_fmu.md").read_text(encoding="utf-8")
+    follow(GUIDES / "vendor_fmu.md", command)
+    first = (tmp_path / "first.toml").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```toml\n(.*?)^```$", page, re.M | re.S)
+    assert first.startswith(shown)
+    assert "# pickoff: no dependencies are declared" in first
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    drift = result["coefficients"][0]
+    assert drift["estimate"] == pytest.approx(0.5, abs=1e-3)  # deg/h
 
 
 @pytest.mark.skipif(not README.is_file(), reason="the wheel has no README.md")
@@ -141,3 +159,16 @@ def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -
     )
     simulated = json.loads((tmp_path / "simulated" / "run.json").read_text(encoding="utf-8"))["parameters"]
     assert {n: simulated[f"gyro.{n}"] for n in values} == values
+
+
+def test_many_runs(command: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pandas
+
+    from gyrobench.campaign import clusters
+
+    monkeypatch.setattr(clusters, "_cores", lambda: 1)  # the tests share the cores
+    names, _ = follow(GUIDES / "campaigns.md", command)
+    first = pandas.read_parquet(tmp_path / "first" / "runs")
+    assert len(first) == 12 and set(first["state"]) == {"done"}
+    assert len(pandas.read_parquet(tmp_path / "drift" / "runs")) == 8 and len(names["spread"]) == 3
+    assert names["units"]["in.latitude"] == "°"

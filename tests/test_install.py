@@ -8,11 +8,14 @@ import re
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 NAME = "tumble_single_axis"
@@ -109,3 +112,25 @@ def test_a_copied_part_can_be_changed_built_and_run(command: Path, tmp_path: Pat
     assert d["D_S"]["truth"] == pytest.approx(0.4)
     assert d["D_S"]["estimate"] == pytest.approx(0.8, abs=0.05)
     assert d["D_I"]["estimate"] == pytest.approx(d["D_I"]["truth"], abs=0.05)
+
+
+def declared() -> dict[str, str]:
+    """Requirements of the project and its extras: name -> the whole."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    every = [*project["dependencies"], *(r for extra in project["optional-dependencies"].values() for r in extra)]
+    return {re.split(r"[<>=!\[ ;]", r)[0].lower(): r for r in every}
+
+
+def test_licences_of_all_packages_are_listed() -> None:
+    rows = re.findall(r"^\| ([^|]+) \| [^|]+ \| [^|]+ \|$", (ROOT / "docs/licences.md").read_text("utf-8"), re.M)
+    listed = {name.strip().lower() for row in rows for name in row.split(",")} - {"package", "---"}
+    assert listed == set(declared())
+
+
+def test_constraints_are_within_the_requirements() -> None:
+    """A version for every package but ziglang, whose wheel of 90 MB the tests do without."""
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    pinned = {canonicalize_name(n): v for n, v in (line.split("==") for line in lines if not line.startswith("#"))}
+    for name, requirement in declared().items():
+        if name != "ziglang":
+            assert Requirement(requirement).specifier.contains(pinned[canonicalize_name(name)]), requirement

@@ -189,7 +189,7 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------ stopped and failed
-def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None) -> None:
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -48,12 +48,11 @@ def read_settings(file: Path) -> dict[str, str]:
 
     Raises UsageError.
     """
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"--set @{file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"--set @{file}: not a TOML file: {error}") from None
+
+    def unreadable(why: str) -> UsageError:
+        return UsageError(f"--set @{why}")
+
+    content = reading.toml(reading.read_text(file, unreadable), file, unreadable)
     settings: dict[str, str] = {}
 
     def add(name: str, value: Any) -> None:
@@ -81,9 +80,9 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
     return parts, maps
 
 
-def parse_step(text: str | None) -> float | None:
-    """Return a communication step in s.  Raises InvalidValueError."""
-    return float(parse("--step", text, "s")) if text else None
+def parse_time(option: str, text: str | None) -> float | None:
+    """Return the time given by an option in s.  Raises InvalidValueError."""
+    return float(parse(option, text, "s")) if text else None
 
 
 def load_with_values(name: str, values: Mapping[str, str], step: float | None = None) -> System | Suite:

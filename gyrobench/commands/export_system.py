@@ -1,13 +1,14 @@
-"""A system as an SSP archive or as one container FMU."""
+"""A system as an SSP archive, as one container FMU or as one native FMU."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
 from gyrobench.commands.arguments import load_system
+from gyrobench.packaging.compiler import PLATFORMS
 from gyrobench.workflow.inputs import check_fmu_files, require_slots
 
 
@@ -19,16 +20,30 @@ def export(
     maps: Mapping[str, Path],
     seed: int,
     out: Path | None,
+    expose: Iterable[str] = (),
+    fmi: int = 2,
+    platforms: Iterable[str] = (),
 ) -> Path:
-    """Write the system as an SSP archive (to "ssp") or as one container FMU; return the file."""
-    from gyrobench.exchange import container, ssp_export
+    """Write the system as "ssp", "container" or "fmu"; return the file.  The last three arguments are of "fmu"."""
+    from gyrobench.exchange import container, ssp_export, system_fmu
 
+    if to != "fmu" and (expose or fmi != 2 or platforms):
+        raise UsageError(f"--expose, --fmi and --platform belong to --to fmu, not to --to {to}")
+    if unknown := [p for p in platforms if p not in PLATFORMS]:
+        raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
     suffix = ".ssp" if to == "ssp" else ".fmu"
     system = require_slots(load_system(name, values))
     path = out or Bench.find().products / f"{system.name}{suffix}"
     if path.suffix != suffix:
-        raise UsageError(f"--out {path}: a{'n SSP archive' if to == 'ssp' else ' container FMU'} ends in {suffix}")
+        raise UsageError(f"--out {path}: an {'SSP archive' if to == 'ssp' else 'FMU'} ends in {suffix}")
     check_fmu_files(parts)
-    write = ssp_export.export_ssp if to == "ssp" else container.export_container
-    console.print_notes(write(system, path, parts, maps, None, seed, Bench.find().folder))
+    bench = Bench.find().folder
+    if to == "fmu":
+        notes = system_fmu.export_fmu(
+            system, path, parts, maps, None, seed, bench, expose=expose, fmi=fmi, platforms=tuple(platforms)
+        )
+    else:
+        write = ssp_export.export_ssp if to == "ssp" else container.export_container
+        notes = write(system, path, parts, maps, None, seed, bench)
+    console.print_notes(notes)
     return path

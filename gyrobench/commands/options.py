@@ -63,10 +63,21 @@ Data = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in the folder --out.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue this run from where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
+Store = Annotated[
+    str | None,
+    typer.Option("--out", metavar="DIR|URL", help="Where results are stored; default reports/out/campaigns/NAME."),
+]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Local processes; default: one for each core.", min=1)]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a dask cluster, for example tcp://host:8786.")
+]
+Retry = Annotated[bool, typer.Option("--retry", help="Run again what crashed, hung or had no memory.")]
+WithSite = Annotated[bool, typer.Option("--site", help="Write the site of the campaign, too; see gyrobench site.")]
 
 
 class Engine(StrEnum):
     native = "native"
+    linked = "linked"
     reference = "reference"
 
 
@@ -82,3 +93,4 @@ class Table(StrEnum):
 class Form(StrEnum):
     ssp = "ssp"
     container = "container"
+    fmu = "fmu"

@@ -7,11 +7,12 @@ then about once a minute of wall time, for a process that is killed; it is remov
 checkpoint belongs to one job: parts, parameters, options, seed, step, order and wiring; it is not accepted for any
 other.  Both engines write and read the same file.
 
-Not covered: FMUs that cannot serialize their state, and FMUs in a process of their own (``isolate``).
+Not covered: FMUs that cannot serialize their state.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -24,9 +25,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench.bench import display_path
-from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
+from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import Program
-from gyrobench.engine.reference_engine import Array, RunState, read_outputs
+from gyrobench.engine.reference_engine import RunState, read_outputs
+from gyrobench.engine.run_board import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
@@ -52,50 +54,24 @@ class ResumeError(GyrobenchError):
 def wiring(program: Program) -> str:
     """Return a digest of what goes where between the parts and into the record, unit factors included."""
     calls = [(*p.sets, *p.gets, *p.channel_gets, *p.window_gets) for p in program.parts]
-    parts = [[[g.kind, list(g.references), g.at, g.source, g.scaled] for g in groups] for groups in calls]
-    rows = [[r.names, r.source, r.gain] for r in (program.channel, program.window)]
-    text = json.dumps([parts, rows, program.watch, program.done])
+    parts = [
+        [[g.code, list(g.references), g.sizes, g.at, g.source, g.scaled, g.shifted] for g in groups] for groups in calls
+    ]
+    rows = [[r.names, r.source, r.gain, r.offset] for r in (program.channel, program.window)]
+    text = json.dumps([parts, rows, program.watch, program.done, program.delays, program.constants])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def resume_obstacle(instances: Mapping[str, FmuInstance]) -> str:
-    """Return why a run with these FMUs cannot be resumed; empty where it can."""
-    isolated = [slot for slot, s in instances.items() if not isinstance(s, LocalInstance)]
-    if isolated:
-        return f"{', '.join(isolated)}: an FMU in a process of its own (--isolate) does not give out its state"
+def resume_obstacle(descriptions: Mapping[str, Any]) -> str:
+    """Return why a run with FMUs of these model descriptions cannot be resumed; empty where it can."""
     stateless = [
         slot
-        for slot, s in instances.items()
-        if isinstance(s, LocalInstance)
-        and not (s.description.coSimulation.canGetAndSetFMUstate and s.description.coSimulation.canSerializeFMUstate)
+        for slot, d in descriptions.items()
+        if not (d.coSimulation.canGetAndSetFMUstate and d.coSimulation.canSerializeFMUstate)
     ]
     if stateless:
         return f"{', '.join(stateless)}: the FMU cannot save its state (canSerializeFMUstate is not true)"
     return ""
-
-
-def save_state(instance: LocalInstance) -> bytes:
-    """Return the serialized state of an FMU.  Raises FmuCallError."""
-    try:
-        state = instance.fmu.getFMUstate()
-        try:
-            return bytes(instance.fmu.serializeFMUstate(state))
-        finally:
-            instance.fmu.freeFMUstate(state)
-    except Exception as error:
-        raise instance.fail("serializeFMUstate", error) from None
-
-
-def load_state(instance: LocalInstance, data: bytes) -> None:
-    """Set an initialized FMU to a serialized state.  Raises FmuCallError."""
-    try:
-        state = instance.fmu.deSerializeFMUstate(data)
-        try:
-            instance.fmu.setFMUstate(state)
-        finally:
-            instance.fmu.freeFMUstate(state)
-    except Exception as error:
-        raise instance.fail("deSerializeFMUstate", error) from None
 
 
 def read_job(folder: Path) -> dict[str, Any] | None:
@@ -171,6 +147,7 @@ class CheckpointManager:
         self.source = Path(source or folder)
         self.stop_at = stop_at
         self.period = PERIOD if period is None else period
+        self.remark = ""  # for the user, before the run
         self.resume_hint = ""  # whether and how an interrupted run goes on
         self.resumed_at: list[float] = []  # s
         self.job: dict[str, Any] = {}
@@ -178,12 +155,11 @@ class CheckpointManager:
         self.arrays: dict[str, Array] = {}
         self.due = self.began = time.monotonic()
 
-    def check(self, job: Mapping[str, Any], program: Program, instances: Mapping[str, FmuInstance]) -> None:
+    def check(self, job: Mapping[str, Any], program: Program, descriptions: Mapping[str, Any]) -> None:
         """Read the checkpoint when resuming, before anything runs.  Raises ResumeError when it is not of this job."""
-        self.program, self.instances = program, instances
         job = {**job, "order": program.order, "wiring": wiring(program)}
         self.job = json.loads(json.dumps(job))
-        self.obstacle = resume_obstacle(instances)
+        self.obstacle = resume_obstacle(descriptions)
         if not self.resume:
             return
         if self.obstacle:
@@ -199,18 +175,22 @@ class CheckpointManager:
             raise ResumeError(f"--resume: the interrupted run in {where} is another one; what differs:{lines}")
 
     def notes(self) -> list[str]:
-        """Return notes for a run that starts anew although it could be continued."""
+        """Return notes for a run that starts anew although it could, or was to, be continued."""
+        if self.remark:
+            return [self.remark]
         if self.resume or not (self.source / FILE).is_file():
             return []
         return [
             f"this run starts anew; the interrupted one in {display_path(self.source)} could be continued with --resume"
         ]
 
-    def restore(self, state: RunState) -> RunState:
+    def restore(self, state: RunState, program: Program, instances: Mapping[str, FmuInstance]) -> RunState:
         """Return the state of the run as it was saved, after initialization; ``state`` itself when not resuming.
 
-        Raises FmuCallError, and ResumeError for an FMU whose outputs are not those it had.
+        The state of these instances is saved from now on.  Raises FmuCallError, and ResumeError for an FMU whose
+        outputs are not those it had.
         """
+        self.program, self.instances = program, instances
         self.due = time.monotonic() + min(self.period, FIRST)
         if not self.resume:
             return state
@@ -232,8 +212,7 @@ class CheckpointManager:
             raise ResumeError(f"{self.source / FILE}: not a checkpoint that can be read: {error} is missing") from None
         for p in self.program.parts:
             instance = self.instances[p.slot]
-            assert isinstance(instance, LocalInstance)
-            load_state(instance, states[p.slot])
+            instance.load_state(states[p.slot])
             read_outputs(instance, p.gets, out)
             if any(out[g.at : g.at + g.n].tobytes() != saved[g.at : g.at + g.n].tobytes() for g in p.gets):
                 raise ResumeError(
@@ -242,6 +221,11 @@ class CheckpointManager:
                 )
         out[:] = saved
         return restored
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is a checkpoint to continue from."""
+        return any((folder / FILE).is_file() for folder in (self.folder, self.source))
 
     def last_step(self, h: float) -> int | None:
         """Return the step after which the run is to stop; None for no such request."""
@@ -290,8 +274,8 @@ class CheckpointManager:
 
         try:
             for slot, instance in self.instances.items():
-                assert isinstance(instance, LocalInstance)
-                arrays[f"state.{slot}"] = np.frombuffer(save_state(instance), np.uint8)
+                arrays[f"state.{slot}"] = np.frombuffer(instance.save_state(), np.uint8)
+                instance.status.call = 0
             self.folder.mkdir(parents=True, exist_ok=True)
             write_whole(self.folder / FILE, save)
         except (FmuCallError, OSError) as error:
@@ -301,6 +285,9 @@ class CheckpointManager:
     def remove(self) -> None:
         """Remove the checkpoint, and what a killed process left of one, once the record is complete and saved."""
         remove_checkpoints((self.folder, self.source))
+        for folder in (self.folder, self.source):
+            with contextlib.suppress(OSError):  # a folder of something else than the checkpoint stays
+                folder.rmdir()
 
 
 def remove_checkpoints(folders: Iterable[Path]) -> None:

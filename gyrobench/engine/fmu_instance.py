@@ -1,7 +1,7 @@
 """One FMU instance under FMPy, and the messages it logs.
 
-The engines read and write groups of variables (:class:`gyrobench.engine.program.VariableGroup`); an instance in a
-child process (:mod:`gyrobench.engine.isolated_instance`) has the same methods.
+The engines read and write groups of variables (:class:`gyrobench.engine.program.VariableGroup`).  Before each call the
+instance writes into the status of the run which one it is, for the process that supervises this one.
 """
 
 from __future__ import annotations
@@ -12,14 +12,29 @@ import itertools
 from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from gyrobench.engine.program import VariableGroup
+from gyrobench.engine.run_board import CALLS, GET, SET, STEP, Status
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Bound
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 KEPT = 50  # messages kept for each FMU
+
+
+#: beyond the statuses of FMI: what the engines themselves find in a call
+NO_PROGRESS, ENDED, OUT_OF_RANGE = 100, 101, 102
+FOUND = {
+    NO_PROGRESS: "it returns early and makes no progress",
+    ENDED: "the FMU asks for the end of the simulation",
+}
+
+
+def status_text(code: int) -> str:
+    """Return a status of a call in words."""
+    word = STATUS[code] if 0 <= code < len(STATUS) else "not one of the standard"
+    return FOUND.get(code) or f"status {code} ({word})"
 
 
 class FmuCallError(GyrobenchError):
@@ -35,23 +50,6 @@ class FmuCallError(GyrobenchError):
             super().__init__(f"{text}\n  ({call}: {status})")
         else:
             super().__init__(f"{slot}: {call} failed{when}: {status}" + "".join(f"\n  FMU log: {m}" for m in texts))
-
-
-class FmuInstance(Protocol):
-    """The methods of an FMU instance that the engines call."""
-
-    slot: str
-
-    def instantiate(self) -> None: ...
-    def set_start(self, values: list[tuple[Bound, Any]]) -> None: ...
-    def initialize(self, t0: float) -> None: ...
-    def exit_initialization(self) -> None: ...
-    def write(self, group: VariableGroup) -> None: ...
-    def read(self, group: VariableGroup) -> None: ...
-    def do_step(self, t: float, h: float) -> None: ...
-    def messages(self) -> list[str]: ...
-    def free(self) -> None: ...
-    def close(self) -> None: ...
 
 
 _logs: dict[int, deque[tuple[int, str]]] = {}
@@ -102,31 +100,58 @@ def _callbacks(identity: int) -> Any:
     return callbacks
 
 
-class LocalInstance:
-    """An FMI 2.0 co-simulation FMU in this process.  Instances may follow one another; the library stays loaded."""
+class FmuInstance:
+    """An FMI 2.0 co-simulation FMU in this process.  Instances may follow one another; the library stays loaded.
 
-    def __init__(self, slot: str, description: Any, folder: Path) -> None:
-        from fmpy.fmi2 import FMU2Slave
+    status: of the run, where each call is noted before it is made, under the number ``part``.
+    """
 
+    fmi3 = False
+    prefix = "fmi2"
+
+    def __init__(self, slot: str, description: Any, folder: Path, status: Status | None = None, part: int = 0) -> None:
         self.slot, self.description = slot, description
+        self.status, self.part = Status() if status is None else status, part
         self.identity = next(_ids)
         self.log: deque[tuple[int, str]] = deque(maxlen=KEPT)
         _logs[self.identity] = self.log
         self.time: float | None = None
         self.live = False
         self.initialized = False
+        self.note("loading")
+        identifier = str(description.coSimulation.modelIdentifier)
+        if Path(identifier).name != identifier or "\\" in identifier or ":" in identifier:
+            raise FmuCallError(
+                slot, "loading", f"modelIdentifier '{identifier}' is not the name of a file inside the FMU", None
+            )
         try:
-            self.fmu = FMU2Slave(
+            self.fmu = self.new_slave()(
                 guid=description.guid,
                 unzipDirectory=str(folder),
-                modelIdentifier=description.coSimulation.modelIdentifier,
+                modelIdentifier=identifier,
                 instanceName=slot,
             )
         except Exception as error:
             raise FmuCallError(slot, "loading", str(error), None) from None
-        self.setters = {k: getattr(self.fmu, f"fmi2Set{k}") for k in ("Real", "Integer", "Boolean")}
-        self.getters = {k: getattr(self.fmu, f"fmi2Get{k}") for k in ("Real", "Integer", "Boolean")}
         self.component: Any = None
+        self.functions: dict[str, Any] = {}  # by FMI name without "fmi2", as far as used
+
+    def new_slave(self) -> Any:
+        """Return FMPy's class of such FMUs."""
+        from fmpy.fmi2 import FMU2Slave
+
+        return FMU2Slave
+
+    def function(self, name: str) -> Any:
+        """Return FMPy's function for an FMI function: "SetReal" -> fmi2SetReal."""
+        found = self.functions.get(name)
+        if found is None:
+            found = self.functions[name] = getattr(self.fmu, f"{self.prefix}{name}")
+        return found
+
+    def note(self, call: str) -> None:
+        """Note a call before it is made."""
+        self.status.part, self.status.call = self.part, CALLS.index(call)
 
     def messages(self) -> list[str]:
         """Return the last messages of the FMU: warnings and errors, or all messages where there are none."""
@@ -135,10 +160,11 @@ class LocalInstance:
 
     def fail(self, call: str, error: Exception) -> FmuCallError:
         code = getattr(error, "status", None)
-        status = f"status {code} ({STATUS[code]})" if isinstance(code, int) and code < 6 else str(error)
+        status = status_text(code) if isinstance(code, int) else str(error)
         return FmuCallError(self.slot, call, status, self.time, self.messages())
 
     def call(self, name: str, function: Any, *args: Any, **kwargs: Any) -> None:
+        self.note(name.split()[0])
         try:
             function(*args, **kwargs)
         except Exception as error:
@@ -149,13 +175,16 @@ class LocalInstance:
         self.log.clear()
         self.time = None
         self.initialized = False
-        self.call("instantiate", self.fmu.instantiate, callbacks=_callbacks(self.identity), loggingOn=True)
+        self.create()
         self.live = True
         self.component = self.fmu.component
         words = ("error", "warning", "fatal", "discard")
         categories = [c.name for c in self.description.logCategories if any(w in c.name.lower() for w in words)]
         if categories:
             self.call("setDebugLogging", self.fmu.setDebugLogging, True, categories)
+
+    def create(self) -> None:
+        self.call("instantiate", self.fmu.instantiate, callbacks=_callbacks(self.identity), loggingOn=True)
 
     def set_start(self, values: list[tuple[Bound, Any]]) -> None:
         """Set parameters and start values, in the FMU's own units, before initialization."""
@@ -177,39 +206,73 @@ class LocalInstance:
 
     def write(self, group: VariableGroup) -> None:
         """Set the values of a group."""
+        name = f"Set{group.type.call}"
+        self.status.part, self.status.call = self.part, SET + group.code
         try:
-            self.setters[group.kind](self.component, group.references, group.n, group.values)
+            self.function(name)(self.component, group.references, group.n_references, group.values)
         except Exception as error:
-            raise self.fail(f"set{group.kind}", error) from None
+            raise self.fail(name[0].lower() + name[1:], error) from None
 
     def read(self, group: VariableGroup) -> None:
         """Get the values of a group."""
+        name = f"Get{group.type.call}"
+        self.status.part, self.status.call = self.part, GET + group.code
         try:
-            self.getters[group.kind](self.component, group.references, group.n, group.values)
+            self.function(name)(self.component, group.references, group.n_references, group.values)
         except Exception as error:
-            raise self.fail(f"get{group.kind}", error) from None
+            raise self.fail(name[0].lower() + name[1:], error) from None
 
     def do_step(self, t: float, h: float) -> None:
         """Do one communication step; a status worse than warning is a failure."""
+        self.status.part, self.status.call = self.part, STEP
         try:
             self.fmu.fmi2DoStep(self.component, t, h, 1)
         except Exception as error:
             self.time = t
             raise self.fail("doStep", error) from None
 
-    def pointers(self) -> dict[str, int]:
-        """Return the addresses of the functions that the native engine calls."""
-        names = ["DoStep", *(f"{a}{k}" for a in ("Set", "Get") for k in ("Real", "Integer", "Boolean"))]
-        return {n: ctypes.cast(getattr(self.fmu.dll, f"fmi2{n}"), ctypes.c_void_p).value or 0 for n in names}
+    def pointer(self, name: str) -> int:
+        """Return the address of an FMI function, for the native engine."""
+        return self.address(f"{self.prefix}{name}")
+
+    def address(self, name: str) -> int:
+        """Return the address of a function of the library."""
+        return ctypes.cast(getattr(self.fmu.dll, name), ctypes.c_void_p).value or 0
+
+    def save_state(self) -> bytes:
+        """Return the serialized state.  Raises FmuCallError."""
+        self.note("serializeFMUstate")
+        try:
+            state = self.fmu.getFMUstate()
+            try:
+                return bytes(self.fmu.serializeFMUstate(state))
+            finally:
+                self.fmu.freeFMUstate(state)
+        except Exception as error:
+            raise self.fail("serializeFMUstate", error) from None
+
+    def load_state(self, data: bytes) -> None:
+        """Set the initialized FMU to a serialized state.  Raises FmuCallError."""
+        self.note("deSerializeFMUstate")
+        try:
+            state = self.fmu.deSerializeFMUstate(data)
+            try:
+                self.fmu.setFMUstate(state)
+            finally:
+                self.fmu.freeFMUstate(state)
+        except Exception as error:
+            raise self.fail("deSerializeFMUstate", error) from None
 
     def free(self) -> None:
         """Terminate and free the instance; a second call does nothing."""
         if self.live:
             self.live = False
             if self.initialized:
+                self.note("terminate")
                 with contextlib.suppress(Exception):  # a failed FMU may refuse to terminate; it is freed all the same
                     self.fmu.terminate()
-            self.fmu.fmi2FreeInstance(self.component)
+            self.note("freeInstance")
+            self.function("FreeInstance")(self.component)
 
     def close(self) -> None:
         """Free the instance and the library."""

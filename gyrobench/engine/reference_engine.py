@@ -11,14 +11,13 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from gyrobench.engine.fmu_instance import FmuInstance
+from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import PartProgram, Program, RecordRow, VariableGroup
+from gyrobench.engine.run_board import Array, RunBoard
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 TIMED_EVERY = 1009  # a prime, so that periodic work of the parts is sampled evenly
 TIMED_FIRST = 504  # not step 0, which finds everything cold
 
@@ -37,28 +36,53 @@ class RunState:
     timed_seconds: dict[str, float] = field(default_factory=dict)
 
 
-def gather(group: VariableGroup, out: Array) -> None:
-    """Copy the sources of a set group into its values."""
-    values = group.values
+def gather(group: VariableGroup, out: Array) -> bool:
+    """Copy the sources of a set group into its values; return False for a number that the type does not hold."""
+    numbers = group.numbers
     for j, s in enumerate(group.source):
-        values[j] = out[s] if group.kind == "Real" else int(out[s])
+        numbers[j] = out[s]
     for j, factor in group.scaled:
-        values[j] *= factor
+        numbers[j] *= factor
+    for j, offset in group.shifted:
+        numbers[j] += offset
+    return group.doubles or _convert(group)
+
+
+def _convert(group: VariableGroup) -> bool:
+    values, low, high = group.values, group.type.lowest, group.type.highest
+    if low is None or high is None:
+        values[:] = group.numbers[:]
+        return True
+    for j, x in enumerate(group.numbers):
+        if not low <= x <= high:
+            return False
+        values[j] = int(x)
+    return True
 
 
 def read_outputs(instance: FmuInstance, groups: list[VariableGroup], out: Array) -> None:
-    """Read get groups into ``out``."""
+    """Read get groups into ``out``.  Raises FmuCallError for a number beyond the whole numbers of a double."""
     for g in groups:
         instance.read(g)
-        if g.kind != "Real":
+        if not g.doubles:
+            low, high = g.type.lowest, g.type.highest
+            if low is not None and high is not None and not all(low <= x <= high for x in g.values):
+                raise FmuCallError(instance.slot, f"get{g.type.call}", g.type.refusal, None)
             out[g.at : g.at + g.n] = g.values[:]
 
 
 def write_inputs(instance: FmuInstance, groups: list[VariableGroup], out: Array) -> None:
     """Write set groups from ``out``."""
     for g in groups:
-        gather(g, out)
+        if not gather(g, out):
+            raise FmuCallError(instance.slot, f"set{g.type.call}", g.type.refusal, None)
         instance.write(g)
+
+
+def _delay(program: Program) -> None:
+    """Copy the values that are delayed by a communication step."""
+    for to, source in program.delays:
+        program.out[to] = program.out[source]
 
 
 def propagate_initial_values(program: Program, instances: Mapping[str, FmuInstance]) -> None:
@@ -67,6 +91,7 @@ def propagate_initial_values(program: Program, instances: Mapping[str, FmuInstan
         read_outputs(instances[p.slot], p.gets, program.out)
     for _ in range(len(program.parts) + 1):
         before = program.out.tobytes()
+        _delay(program)
         for p in program.parts:
             write_inputs(instances[p.slot], p.sets, program.out)
             read_outputs(instances[p.slot], p.gets, program.out)
@@ -81,6 +106,7 @@ def initialize(program: Program, instances: Mapping[str, FmuInstance], t0: float
     """
     for p in program.parts:
         instances[p.slot].initialize(t0)
+        read_outputs(instances[p.slot], p.holds, program.out)
     propagate_initial_values(program, instances)
     for p in program.parts:
         instances[p.slot].exit_initialization()
@@ -95,8 +121,10 @@ def read_row(program: Program, instances: Mapping[str, FmuInstance], row: Record
             read_outputs(instances[p.slot], groups, program.out)
     values = np.empty(1 + len(row.source))
     values[0] = t
-    for j, (s, g) in enumerate(zip(row.source, row.gain, strict=True), 1):
+    for j, (s, g, o) in enumerate(zip(row.source, row.gain, row.offset, strict=True), 1):
         values[j] = program.out[s] if g == 1.0 else program.out[s] * g
+        if o != 0.0:
+            values[j] += o
     return values
 
 
@@ -123,16 +151,31 @@ class ReferenceEngine:
 
     name = "reference"
 
-    def __init__(self, program: Program, instances: Mapping[str, FmuInstance]) -> None:
-        self.program, self.instances = program, instances
+    def __init__(self, program: Program, instances: Mapping[str, FmuInstance], board: RunBoard) -> None:
+        self.program, self.instances, self.board = program, instances, board
         self.pairs = [(p, instances[p.slot]) for p in program.parts]
 
     def advance(self, state: RunState, k_end: int, t0: float, h: float, every: int) -> None:
         """Run steps until k_end or done; ``every`` steps a row of the channels.  Raises FmuCallError."""
+        try:
+            self._advance(state, k_end, t0, h, every)
+        except FmuCallError as error:
+            if error.time is not None:
+                raise
+            raise FmuCallError(error.slot, error.call, error.status, t0 + state.k * h, error.messages) from None
+        finally:
+            self.board.status.call = 0
+            self.board.drain(state.channel_rows, state.window_rows)
+
+    def _advance(self, state: RunState, k_end: int, t0: float, h: float, every: int) -> None:
         program, out = self.program, self.program.out
+        board, at = self.board, self.board.status
         clock = time.perf_counter
         for k in range(state.k, k_end):
+            if board.full:
+                board.drain(state.channel_rows, state.window_rows)
             t = t0 + k * h
+            _delay(program)
             if k % TIMED_EVERY == TIMED_FIRST:
                 state.timed += 1
                 for p, instance in self.pairs:
@@ -142,14 +185,16 @@ class ReferenceEngine:
             else:
                 for p, instance in self.pairs:
                     _step(p, instance, out, t, h)
-            state.k = k + 1
+            at.k = state.k = k + 1
             if program.watch >= 0 and out[program.watch] != state.last:
                 state.last = float(out[program.watch])
                 row = read_row(program, self.instances, program.window, "window_gets", t0 + (k + 1) * h)
-                state.window_rows.append(row)
+                board.window[at.window_rows] = row
+                at.window_rows += 1
             if program.channel.names and (k + 1) % every == 0:
                 row = read_row(program, self.instances, program.channel, "channel_gets", t0 + (k + 1) * h)
-                state.channel_rows.append(row)
+                board.channel[at.channel_rows] = row
+                at.channel_rows += 1
             if program.done >= 0 and out[program.done] != 0.0:
                 state.finished = True
                 return

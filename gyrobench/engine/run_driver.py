@@ -60,14 +60,14 @@ class EngineStopped(GyrobenchError):
 SIGNALS = tuple(s for name in ("SIGINT", "SIGTERM", "SIGHUP") if (s := getattr(signal, name, None)) is not None)
 
 
-class _CtrlC:
+class Interrupts:
     """While active, the first such signal only raises a flag, so that no step or row is lost; the second one kills."""
 
     def __init__(self) -> None:
         self.pressed = False
         self.previous: dict[Any, Any] = {}
 
-    def __enter__(self) -> _CtrlC:
+    def __enter__(self) -> Interrupts:
         if threading.current_thread() is threading.main_thread():
             # what is ignored stays so: nohup, a job in the background
             heard = [s for s in SIGNALS if signal.getsignal(s) != signal.SIG_IGN]
@@ -86,46 +86,76 @@ class _CtrlC:
         self._restore()
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """Steps of a run and their end.
+
+    step: s.  every: steps between two rows of the channels.  planned: s, duration of the plan.  stop: s, end of the
+    simulated time, None where the plan ends the run; ``done`` is the output that says so.
+    """
+
+    step: float
+    every: int
+    planned: float
+    stop: float | None
+    done: str | None
+
+    @classmethod
+    def of(cls, system: System) -> Schedule:
+        """Return the schedule of a system."""
+        every = max(1, round(system.channel_period / system.step))
+        return cls(system.step, every, system.plan().duration(), system.stop, system.done)
+
+    @property
+    def total(self) -> float:
+        """Expected end of the simulated time, s."""
+        return self.planned if self.stop is None else self.stop
+
+    @property
+    def limit(self) -> int:
+        """Steps after which the run ends, whatever the plan says."""
+        longest = PATIENCE * self.planned + GRACE if self.stop is None else self.stop
+        return max(1, round(longest / self.step))
+
+
 def run_to_end(
     engine: Any,
     state: RunState,
-    system: System,
-    every: int,
+    schedule: Schedule,
     progress: Callable[[ProgressReport], None] | None,
+    stopped: Callable[[], bool],
     checkpoints: CheckpointManager | None = None,
 ) -> None:
-    """Run the engine to the end.
+    """Run the engine to the end; ``stopped`` says whether the user wants it to end before.
 
     Raises FmuCallError from the engine, EngineStopped when stopped or when the plan never ends.
     """
-    h = system.step
-    planned = system.plan().duration()
-    total = system.stop if system.stop is not None else planned
-    limit = total if system.stop is not None else PATIENCE * planned + GRACE
-    k_limit = max(1, round(limit / h))
+    h, k_limit = schedule.step, schedule.limit
     k_asked = checkpoints.last_step(h) if checkpoints is not None else None
     k_stop = k_limit if k_asked is None else min(k_limit, max(k_asked, state.k))
     chunk, k_first = 256, state.k
     began = time.perf_counter()
-    with _CtrlC() as ctrl_c:
-        while not state.finished and state.k < k_stop:
-            chunk_began, k_before = time.perf_counter(), state.k
-            engine.advance(state, min(k_stop, state.k + chunk), 0.0, h, every)
-            now = time.perf_counter()
-            rate = (state.k - k_before) / max(now - chunk_began, 1e-9)
-            chunk = max(16, min(8 * chunk, int(rate * CHUNK)))
-            if progress is not None:
-                windows = sum(len(r) if r.ndim == 2 else 1 for r in state.window_rows)
-                progress(ProgressReport(state.k * h, total, state.k - k_first, windows, rate, now - began, k_first * h))
-            if ctrl_c.pressed:
-                raise EngineStopped(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
-            if checkpoints is not None:
-                checkpoints.save_if_due(state)
+    while not state.finished and state.k < k_stop:
+        chunk_began, k_before = time.perf_counter(), state.k
+        engine.advance(state, min(k_stop, state.k + chunk), 0.0, h, schedule.every)
+        now = time.perf_counter()
+        rate = (state.k - k_before) / max(now - chunk_began, 1e-9)
+        chunk = max(16, min(8 * chunk, int(rate * CHUNK)))
+        if progress is not None:
+            windows = sum(len(r) if r.ndim == 2 else 1 for r in state.window_rows)
+            progress(
+                ProgressReport(state.k * h, schedule.total, state.k - k_first, windows, rate, now - began, k_first * h)
+            )
+        if stopped():
+            raise EngineStopped(f"interrupted at t = {state.k * h:.9g} s", by_user=True)
+        if checkpoints is not None:
+            checkpoints.save_if_due(state)
     if not state.finished and state.k < k_limit:
         raise EngineStopped(f"stopped at t = {state.k * h:.9g} s, as asked for", by_user=True)
-    if not state.finished and system.stop is None:
+    if not state.finished and schedule.stop is None:
         raise EngineStopped(
-            f"the plan has not ended at t = {state.k * h:.9g} s, {PATIENCE:g} times its duration of {planned:.6g} s: "
-            f"does the table reach its targets? (last values of {system.done} stayed 0)",
+            f"the plan has not ended at t = {state.k * h:.9g} s, {PATIENCE:g} times its duration of "
+            f"{schedule.planned:.6g} s: "
+            f"does the table reach its targets? (last values of {schedule.done} stayed 0)",
             by_user=False,
         )

@@ -14,12 +14,15 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.engine.checkpoint import CheckpointManager
-from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance, LocalInstance
+from gyrobench.engine.checkpoint import CheckpointManager, ResumeError
+from gyrobench.engine.execution import Ending, Job, execute
+from gyrobench.engine.fmi3_instance import new_instance
+from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.limits import limit_flags, limits_reached
 from gyrobench.engine.program import build_program
-from gyrobench.engine.reference_engine import ReferenceEngine, initial_state, initialize
-from gyrobench.engine.run_driver import EngineStopped, ProgressReport, run_to_end
+from gyrobench.engine.reference_engine import RunState
+from gyrobench.engine.run_board import RunBoard
+from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressReport, Schedule
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
@@ -31,6 +34,8 @@ from gyrobench.system.setup_errors import setup_errors
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
+
+TIMEOUT = 60.0  # s
 
 
 class RunError(GyrobenchError):
@@ -54,12 +59,19 @@ class ParameterRefusedError(RunError):
     exit_code = 2
 
 
+ENGINES = ("native", "linked", "reference")
+
+
 class Session:
     """A system with its FMUs unzipped and loaded, for one run or a thousand.
 
     parts: slot -> path of an FMU or name of a part (default: the slot's).  maps: slot -> mapping file.
-    engine: "native", "reference" or None (native where it can).  isolate: slots whose FMU runs in a child process.
-    target: of the parts that are built, "native" or "python".  timeout: s for one call of an isolated FMU.
+    engine: "native" (FMI calls), "linked" (native parts of the bench: :mod:`gyrobench.engine.linked_system`),
+    "reference" or None (native where it can, linked where it is worth it).  target: of the parts that are built,
+    "native" or "python".  child: each run happens in a child process that loads the FMUs, see
+    :mod:`gyrobench.engine.supervision`; else in this one, which a crash of an FMU ends: for workers whose death is
+    seen.  timeout: s for one call of an FMU in a child.  prebuilt: part of the bench -> its FMU, where it was built
+    elsewhere.
     Use as a context manager, or call :meth:`close`.
     Raises BenchError, BuildError, SocketMismatchError, WiringError, AlgebraicLoopError before anything is loaded.
     """
@@ -71,20 +83,18 @@ class Session:
         maps: Mapping[str, Path] | None = None,
         *,
         engine: str | None = None,
-        isolate: Iterable[str] = (),
         target: str = "native",
         bench: Path | None = None,
-        timeout: float = 10.0,
+        child: bool = False,
+        timeout: float = TIMEOUT,
+        prebuilt: Mapping[str, Path] | None = None,
     ) -> None:
-        if engine not in (None, "native", "reference"):
-            raise InvalidValueError(f"engine '{engine}': one of native, reference")
+        if engine not in (None, *ENGINES):
+            raise InvalidValueError(f"engine '{engine}': one of {', '.join(ENGINES)}")
         self.system = load_system(system, bench) if isinstance(system, str) else system
-        self.isolate = tuple(isolate)
-        for slot in self.isolate:
-            if slot not in self.system.slots:
-                raise InvalidValueError(f"isolate: no slot '{slot}'; slots: {', '.join(self.system.slots)}")
+        self.child, self.timeout = child, timeout
         self.notes: list[str] = []
-        paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes)
+        paths, self.built = resolve_parts(self.system, parts or {}, target, bench, self.notes, prebuilt)
         self.swaps = {slot: Path(part).stem for slot, part in (parts or {}).items()}
         self.swapped = sorted(self.swaps)
         self.warned: set[str] = set()
@@ -93,15 +103,21 @@ class Session:
         self.assembly: Assembly = assemble(self.system, paths, maps)
         self.notes += self.assembly.notes
         self.program = build_program(self.assembly)
-        self.gains = [c.gain for c in self.assembly.connections]
+        self.gains = [(c.gain, c.offset) for c in self.assembly.connections]
         self.base = defaults(self.assembly)
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
+        foreign = [slot for slot in paths if slot not in self.built]
+        self.notes += [f"{s}: {paths[s].name} is not of this bench: SHA-256 {self.hashes[s]}" for s in foreign]
         self.engine = self._choose(engine)
+        self.linkable = self.engine != "reference" and engine != "native" and not self._obstacle()
         self.folder = temporary_folder()
         self.instances: dict[str, FmuInstance] = {}
+        self.board: RunBoard | None = None
         try:
             for slot, path in paths.items():
-                self.instances[slot] = self._load_instance(slot, path, timeout)
+                unzip_fmu(path, self.folder / slot)
+            if not child:
+                self._load()
         except BaseException as error:
             self.close()
             if isinstance(error, FmuCallError):
@@ -109,10 +125,6 @@ class Session:
             raise
 
     def _choose(self, engine: str | None) -> str:
-        if self.isolate:
-            if engine == "native":
-                self.notes.append("isolated FMUs run in the reference engine")
-            return "reference"
         if engine == "reference":
             return engine
         from gyrobench.engine.engine_library import engine_library
@@ -123,16 +135,52 @@ class Session:
         except CompilerError as error:
             self.notes.append(f"reference engine (about a hundred times slower than native): {error}")
             return "reference"
-        return "native"
+        if engine == "linked" and (why := self._obstacle()):
+            raise InvalidValueError(f"engine 'linked': {why}")
+        return engine or "native"
 
-    def _load_instance(self, slot: str, path: Path, timeout: float) -> FmuInstance:
-        folder = self.folder / slot
-        unzip_fmu(path, folder)
-        if slot in self.isolate:
-            from gyrobench.engine.isolated_instance import IsolatedInstance
+    def _obstacle(self) -> str:
+        from gyrobench.engine.linked_system import obstacle
 
-            return IsolatedInstance(slot, folder, timeout)
-        return LocalInstance(slot, self.assembly.descriptions[slot], folder)
+        native = {slot: name for slot, name in self.names.items() if self.built[slot] == "native"}
+        guids = {slot: d.guid for slot, d in self.assembly.descriptions.items()}
+        return obstacle(self.program, native, guids, self.bench)
+
+    def _library(self, system: System) -> tuple[Path | None, bool]:
+        """Return the file of the loop in C, None for the reference engine, and whether it is that of the linked form:
+        where that is asked for or worth it.
+        """
+        from gyrobench.engine.engine_library import engine_library
+        from gyrobench.engine.linked_system import linked_library
+
+        if self.engine == "reference":
+            return None, False
+        if self.linkable:
+            steps = (system.stop or system.plan().duration()) / system.step
+            if library := linked_library(self.program, None if self.engine == "linked" else steps):
+                return library, True
+        return engine_library(), False
+
+    def _load(self) -> None:
+        """Load the FMUs into this process."""
+        self.board = RunBoard(self.program)
+        for part, slot in enumerate(self.program.order):
+            description = self.assembly.descriptions[slot]
+            self.instances[slot] = new_instance(slot, description, self.folder / slot, self.board.status, part)
+
+    def _execute(self, job: Job, progress: Callable[[ProgressReport], None] | None) -> Ending:
+        if self.child:
+            from gyrobench.engine.supervision import supervise
+
+            fmus = {slot: (self.assembly.descriptions[slot], self.folder / slot) for slot in self.program.order}
+            return supervise(job, fmus, self.folder, progress, self.timeout)
+        assert self.board is not None
+        try:
+            with Interrupts() as interrupts:
+                return execute(job, self.instances, self.board, progress, lambda: interrupts.pressed)
+        finally:
+            for instance in self.instances.values():
+                instance.free()
 
     def __enter__(self) -> Session:
         return self
@@ -169,53 +217,34 @@ class Session:
         errors = setup_errors(self.assembly, system, seed, self.base, parameters)
         self._warn(system, [f"simulated set-up error: {e.sentence()}" for e in errors])
         self._warn(system, [*notes, *system.warnings()])
-        if [c.gain for c in self.assembly.connections] != self.gains:  # factors of wires follow the parts
-            self.program, self.gains = build_program(self.assembly), [c.gain for c in self.assembly.connections]
+        gains = [(c.gain, c.offset) for c in self.assembly.connections]
+        if gains != self.gains:  # factors of wires follow the parts
+            self.program, self.gains = build_program(self.assembly), gains
         linear = self._linear(system, parameters, notes) if system.loops else None
         document = self._document(system, seed, parameters, notes)
         if errors:
             document.setup_errors = errors
         if linear is not None:
             document.linear = linear
-        every = max(1, round(system.channel_period / system.step))
+        schedule = Schedule.of(system)
         if checkpoints is not None:
             job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
-            checkpoints.check(
-                {**job, "parts": parts, "stop": system.stop, "every": every}, self.program, self.instances
-            )
-        self.program.out[:] = 0.0
-        state = None
-        engine: Any = None
-        problem: Exception | None = None
-        try:
-            for slot in self.program.order:
-                self.instances[slot].instantiate()
-                self.instances[slot].set_start(starts[slot])
-            initialize(self.program, self.instances, 0.0)
-            state = initial_state(self.program, self.instances, 0.0)
-            if checkpoints is not None:
-                state = checkpoints.restore(state)
-            if self.engine == "native":
-                from gyrobench.engine.native_engine import NativeEngine
-
-                engine = NativeEngine(self.program, self.instances)  # type: ignore[arg-type]
-            else:
-                engine = ReferenceEngine(self.program, self.instances)
-            run_to_end(engine, state, system, every, progress, checkpoints)
-        except (FmuCallError, EngineStopped) as error:
-            problem = error
-            if checkpoints is not None and state is not None and isinstance(error, EngineStopped) and error.by_user:
-                checkpoints.save_on_interrupt(state)
-        finally:
-            if engine is not None:
-                engine.close()
-            for instance in self.instances.values():
-                instance.free()
-        if state is None:
-            refused = isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status
-            raise (ParameterRefusedError if refused else RunError)(str(problem))
-        return self._finish(state, system, document, out, problem, checkpoints)
+            job |= {"parts": parts, "stop": system.stop, "every": schedule.every}
+            checkpoints.check(job, self.program, self.assembly.descriptions)
+        library, document.linked = self._library(system)
+        ending = self._execute(Job(self.program, starts, schedule, library, checkpoints), progress)
+        self._warn(system, ending.remarks)
+        document.notes += ending.remarks
+        problem = ending.problem
+        if isinstance(problem, ResumeError):
+            raise problem
+        if ending.state is None:
+            if isinstance(problem, FmuCallError) and problem.messages and "(Error)" in problem.status:
+                raise ParameterRefusedError(str(problem))
+            if not self.child:
+                raise RunError(str(problem))
+        return self._finish(ending.state or RunState(), system, document, out, problem, checkpoints)
 
     def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
         """Return the linear models for run.json; their warnings are logged immediately, and noted."""
@@ -313,7 +342,6 @@ class Session:
             seed=seed,
             step=system.step,
             engine=self.engine,
-            isolated=list(self.isolate),
             **self.assembly.order.as_dict(system.step),
             parts=parts,
             parameters=parameters,
@@ -336,11 +364,11 @@ def run(
     engine: str | None = None,
     out: Path | None = None,
     step: float | None = None,
-    isolate: Iterable[str] = (),
     progress: Callable[[ProgressReport], None] | None = None,
     target: str = "native",
     bench: Path | None = None,
-    timeout: float = 10.0,
+    child: bool = False,
+    timeout: float = TIMEOUT,
     resume: bool = False,
     stop_at: float | None = None,
 ) -> Record:
@@ -359,7 +387,7 @@ def run(
         raise InvalidValueError("resume and stop_at: name the folder of the run in out")
     checkpoints = CheckpointManager(out, resume, stop_at=stop_at) if out is not None else None
     with Session(
-        system, parts, maps, engine=engine, isolate=isolate, target=target, bench=bench, timeout=timeout
+        system, parts, maps, engine=engine, target=target, bench=bench, child=child, timeout=timeout
     ) as session:
         return session.run(values, seed, step, out, progress, checkpoints)
 

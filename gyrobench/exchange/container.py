@@ -35,12 +35,16 @@ def export_container(
     except ImportError:
         raise ExportError("container: needs fmu-manipulation-toolbox; pip install gyrobench[container]") from None
     assembly, starts, notes = prepare(system, parts, maps, values, seed, bench)
-    scaled = sorted({c.wire for c in assembly.connections if c.gain != 1.0})
+    scaled = sorted({c.wire for c in assembly.connections if c.gain != 1.0 or c.offset})
     if scaled:
         raise ExportError(
-            f"container: a container FMU copies values and cannot apply the factors of {', '.join(scaled)}; "
+            f"container: a container FMU copies values and cannot apply the factors and offsets of "
+            f"{', '.join(scaled)}; "
             "use a part in SI units, or export to SSP"
         )
+    if late := sorted({c.wire for c in assembly.connections if c.delayed}):
+        raise ExportError(f"container: a container FMU cannot carry the delay of {', '.join(late)}; export to SSP")
+    wires = [c for c in assembly.connections if c.output.constant is None]
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="gyrobench-") as name:
@@ -56,9 +60,9 @@ def export_container(
         for slot in assembly.order.order:
             shutil.copyfile(assembly.paths[slot], folder / f"{slot}.fmu")
             node.add_fmu(f"{slot}.fmu")
-        for c in assembly.connections:
+        for c in wires:
             node.add_link(f"{c.source}.fmu", c.output.variable, f"{c.target}.fmu", c.input.variable)
-        wired = {(c.source, c.output.variable) for c in assembly.connections}
+        wired = {(c.source, c.output.variable) for c in wires}
         for port, (slot, bound) in recorded(assembly).items():
             if (slot, bound.variable) not in wired:  # a wired output is a local of that name by itself
                 node.add_output(f"{slot}.fmu", bound.variable, port)

@@ -1,6 +1,7 @@
-"""A system as SSP 1.0 archive: structure (SSD), parameter values (SSV) and the FMUs, without vendor annotations.
+"""A system as SSP 1.0 archive: structure (SSD), parameter values (SSV) and the FMUs.
 
-``SystemStructure.ssd``       components in execution order, connectors with units, connections
+``SystemStructure.ssd``       components in execution order, connectors with units, connections; the communication step
+                              as the annotation that OMSimulator reads (SSP has no other place for it)
 ``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
 ``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
 ``resources/<slot>.fmu``      one FMU for each slot
@@ -19,6 +20,8 @@ What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 
 from __future__ import annotations
 
+import io
+import re
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -27,16 +30,17 @@ from xml.etree import ElementTree as ET
 
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
+from gyrobench.exchange.ssp_annotation import annotate
+from gyrobench.exchange.ssp_values import SSC, SSD, SSV
 from gyrobench.system.binding import Bound
 from gyrobench.system.parameters import Starts, defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.system import System
 from gyrobench.system.wiring import Assembly, assemble
 
-SSP = "http://ssp-standard.org/SSP1/"
-SSD, SSC, SSV = (f"{SSP}SystemStructure{n}" for n in ("Description", "Common", "ParameterValues"))
 PARAMETERS = "resources/parameters.ssv"
 STAMP = (1980, 1, 1, 0, 0, 0)
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
 class ExportError(GyrobenchError):
@@ -58,6 +62,11 @@ def prepare(
     paths, _ = resolve_parts(chosen, parts or {}, "native", bench, notes)
     assembly = assemble(chosen, paths, maps)
     starts, _, parameter_notes = resolve(assembly, chosen, seed, defaults(assembly))
+    for c in assembly.connections:
+        if c.output.constant is not None:
+            value = c.gain * c.output.constant + c.offset
+            kind = {"Integer": int, "Boolean": bool}.get(c.input.kind, float)
+            starts[c.target].append((c.input, kind(value)))
     return assembly, starts, [*notes, *assembly.notes, *parameter_notes]
 
 
@@ -91,25 +100,88 @@ def export_ssp(
     Raises what a run would raise before it runs (misfit, wires, algebraic loop, values).
     """
     assembly, starts, notes = prepare(system, parts, maps, values, seed, bench)
-    scaled = sorted({c.wire for c in assembly.connections if c.gain != 1.0})
+    varying = [c for c in assembly.connections if c.output.constant is None]
+    scaled = sorted({c.wire for c in varying if c.gain != 1.0 or c.offset})
     if scaled:
         notes.append(
             f"factors are LinearTransformations, which FMPy's simulate_ssp ignores (results are wrong there): "
             f"{', '.join(scaled)}"
         )
+    late = sorted({c.wire for c in assembly.connections if c.delayed})
+    if late:
+        notes.append(f"delays stated in a mapping file are not in the archive: {', '.join(late)}")
+    initial, missing = initial_inputs(assembly, parts, maps, seed, bench)
+    notes += missing
+    values_of = {slot: [*initial.get(slot, ()), *v] for slot, v in starts.items()}
+    files = {
+        PARAMETERS: _xml(_values(assembly.system.name, values_of, prefix=True)),
+        **{f"resources/{s}.ssv": _xml(_values(assembly.system.name, {s: v})) for s, v in values_of.items() if v},
+        **{f"resources/{slot}.fmu": _with_step(assembly, slot) for slot in assembly.paths},
+        **{f"resources/{slot}.toml": Path(file).read_bytes() for slot, file in (maps or {}).items()},
+    }
+    root = _structure(assembly, values_of)
+    if assembly.system.folder is not None:  # a system of a bench
+        chosen = {slot: str((parts or {}).get(slot, s.part)) for slot, s in assembly.system.slots.items()}
+        own = {slot: name for slot, name in chosen.items() if not name.endswith(".fmu")}
+        annotate(root, assembly, own, maps or {}, seed, files)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(path.suffix + ".part")
     with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in (
-            ("SystemStructure.ssd", _xml(_structure(assembly, starts))),
-            (PARAMETERS, _xml(_values(system.name, starts, prefix=True))),
-            *((f"resources/{slot}.ssv", _xml(_values(slot, {slot: v}))) for slot, v in starts.items() if v),
-            *((f"resources/{slot}.fmu", p.read_bytes()) for slot, p in assembly.paths.items()),
-        ):
+        for name, data in ("SystemStructure.ssd", _xml(root)), *files.items():
             archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
     temporary.replace(path)
     return notes
+
+
+def initial_inputs(
+    assembly: Assembly,
+    parts: Mapping[str, Path | str] | None,
+    maps: Mapping[str, Path] | None,
+    seed: int,
+    bench: Path | None,
+) -> tuple[Starts, list[str]]:
+    """Return the values of the connected inputs at the start, in the FMUs' units, and notes.
+
+    They are what the outputs give after initialization, from a run of one step in a child process: tools that do not
+    propagate initial outputs begin with them.  A system whose parts do not start has none, with a note.
+    """
+    from gyrobench.engine.session import RunError, run
+
+    system = assembly.system.with_values({})
+    varying = [c for c in assembly.connections if c.output.constant is None]
+    outputs = tuple(dict.fromkeys(f"{c.source}.{c.output.element}" for c in varying))
+    short = {"channels": outputs, "windows": None, "done": None, "stop": system.step, "channel_period": system.step}
+    cls = type(system)
+    system.__class__ = type(cls.__name__, (cls,), {"loops": {}, **short})
+    for name in short:
+        vars(system).pop(name, None)
+    try:
+        found = run(system, parts, maps, seed=seed, bench=bench, child=True).channels
+    except RunError as error:
+        return {}, [f"start values of inputs are not in the archive: {error}"]
+    starts: Starts = {}
+    for c in varying:
+        value = c.gain * c.output.own(found[f"{c.source}.{c.output.element}"][0]) + c.offset
+        kind = {"Integer": int, "Boolean": bool}.get(c.input.kind, float)
+        starts.setdefault(c.target, []).append((c.input, kind(value)))
+    return starts, []
+
+
+def _with_step(assembly: Assembly, slot: str) -> bytes:
+    """Return the file of an FMU; the DefaultExperiment of one of the bench's own has the system's step."""
+    path = assembly.paths[slot]
+    if assembly.descriptions[slot].generationTool != "gyrobench":
+        return path.read_bytes()
+    with zipfile.ZipFile(path) as source:
+        entries = [(info, source.read(info)) for info in source.infolist()]
+    changed = io.BytesIO()
+    with zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as target:
+        for info, data in entries:
+            if info.filename == "modelDescription.xml":
+                data = re.sub(rb'stepSize="[^"]*"', f'stepSize="{assembly.system.step!r}"'.encode(), data, count=1)
+            target.writestr(info, data, zipfile.ZIP_DEFLATED)
+    return changed.getvalue()
 
 
 def _xml(root: ET.Element) -> bytes:
@@ -118,10 +190,11 @@ def _xml(root: ET.Element) -> bytes:
     return data
 
 
-def _type(parent: ET.Element, bound: Bound, namespace: str = SSC, **attributes: str) -> None:
-    if bound.unit and bound.kind == "Real":
-        attributes["unit"] = bound.unit
-    ET.SubElement(parent, f"{{{namespace}}}{bound.kind}", attributes)
+def _unit(assembly: Assembly, slot: str, bound: Bound) -> str:
+    """Return the unit of a connector; none where the socket takes any: its FMU says "1", which others compare."""
+    connector = assembly.bindings[slot].socket.connector(bound.element.split("[")[0])
+    anything = connector is not None and not connector.unit
+    return "" if bound.kind != "Real" or anything else bound.unit
 
 
 def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
@@ -145,14 +218,17 @@ def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
         ports = ET.SubElement(component, f"{{{SSD}}}Connectors")
         for kind, bound in _ports(assembly, slot):
             connector = ET.SubElement(ports, f"{{{SSD}}}Connector", name=bound.variable, kind=kind)
-            _type(connector, bound)
-            used.add(bound.unit)
+            unit = _unit(assembly, slot, bound)
+            ET.SubElement(connector, f"{{{SSC}}}{bound.kind}", {"unit": unit} if unit else {})
+            used.add(unit)
         if starts[slot]:
             bindings = ET.SubElement(component, f"{{{SSD}}}ParameterBindings")
             kind = "application/x-ssp-parameter-set"
             ET.SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=kind, source=f"resources/{slot}.ssv")
     connections = ET.SubElement(top, f"{{{SSD}}}Connections")
     for c in assembly.connections:
+        if c.output.constant is not None:
+            continue  # a start value
         element = ET.SubElement(
             connections,
             f"{{{SSD}}}Connection",
@@ -161,19 +237,33 @@ def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
             endElement=c.target,
             endConnector=c.input.variable,
         )
-        if c.gain != 1.0:
+        if c.gain != 1.0 or c.offset:
             element.set("suppressUnitConversion", "true")
-            ET.SubElement(element, f"{{{SSC}}}LinearTransformation", factor=repr(c.gain))
+            attributes = {"factor": repr(c.gain)} | ({"offset": repr(c.offset)} if c.offset else {})
+            ET.SubElement(element, f"{{{SSC}}}LinearTransformation", attributes)
+    _fixed_step(top, system.step)
     _units(root, assembly, used)
     ET.SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0", stopTime=repr(stop_time(system)))
     return root
 
 
+def _fixed_step(top: ET.Element, step: float) -> None:
+    """Annotate the step; OMSimulator does not simulate without it, others read past it."""
+    ET.register_namespace("oms", OMS)
+    annotations = ET.SubElement(top, f"{{{SSD}}}Annotations")
+    one = ET.SubElement(annotations, f"{{{SSC}}}Annotation", type="org.openmodelica")
+    information = ET.SubElement(ET.SubElement(one, f"{{{OMS}}}Annotations"), f"{{{OMS}}}SimulationInformation")
+    attributes = {"description": "oms-ma", "stepSize": repr(step)}
+    attributes |= {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
+    ET.SubElement(information, f"{{{OMS}}}FixedStepMaster", attributes)
+
+
 def _ports(assembly: Assembly, slot: str) -> Iterable[tuple[str, Bound]]:
     """Return connected inputs, connected and recorded outputs; an input that is not connected keeps its start value."""
-    inputs = {c.input.variable: c.input for c in assembly.connections if c.target == slot}
-    outputs = {c.output.variable: c.output for c in assembly.connections if c.source == slot}
-    outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == slot}
+    varying = [c for c in assembly.connections if c.output.constant is None]
+    inputs = {c.input.variable: c.input for c in varying if c.target == slot}
+    outputs = {c.output.variable: c.output for c in varying if c.source == slot}
+    outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == slot and b.constant is None}
     return [*(("input", b) for b in inputs.values()), *(("output", b) for b in outputs.values())]
 
 

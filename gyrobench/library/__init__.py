@@ -10,6 +10,8 @@
     gb.compare(run, test.run(seed=4))            # shows itself in a notebook, prints as a table
     gb.reduce("tumble_single_axis", "data.csv", latitude="45.75deg", k="17.2deg/h/mA")
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
+    gb.sweep("tumble_single_axis", {"latitude": "0deg..80deg:9"}, seeds=20)   # a data frame, a row a run
+    gb.campaign("campaign.toml", out="folder")
 
 The bench is the nearest folder above the working folder with components/, systems/ and reports/, as for the command.
 Every error with a message for the user is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a
@@ -20,17 +22,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.library.experiment import Experiment, File, Run, open_run
+from gyrobench.library.many_runs import campaign, sweep
 from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
 from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
+
+if TYPE_CHECKING:
+    from gyrobench.campaign.design.plan_runs import DesignedTest
 
 __all__ = [
     "Comparison",
@@ -41,11 +47,14 @@ __all__ = [
     "Run",
     "SuiteExperiment",
     "SuiteRun",
+    "campaign",
     "compare",
+    "design",
     "load",
     "load_suite",
     "open_run",
     "reduce",
+    "sweep",
 ]
 
 
@@ -115,3 +124,37 @@ def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparis
         named = [r.name for r in opened]
         named = [n if named.count(n) == 1 else f"{n} ({k})" for k, n in enumerate(named, 1)]
     return compare_results(list(zip(named, results, strict=True)))
+
+
+def design(
+    name: str,
+    wants: Mapping[str, str | float],
+    *,
+    time: float | str | None = None,
+    criterion: str = "minimax",
+    instruments: int = 1,
+    noise: File | None = None,
+    count: int = 0,
+    seed: int = 1,
+    values: Mapping[str, Any] | None = None,
+    parts: Mapping[str, File] | None = None,
+    maps: Mapping[str, File] | None = None,
+    **options: Any,
+) -> DesignedTest:
+    """Return the plan of a system that reaches ``wants`` (name -> standard uncertainty with its unit) soonest.
+
+    time: s, or a text with its unit: the best plan in this time.  criterion: "minimax", "A" or "D".  instruments: noise
+    models of a population, the worst of which counts.  noise: folder of a run whose estimated noise is taken.  count:
+    runs in which the prediction is counted.  values, options, parts, maps: as of :func:`load`.  ``print`` shows the
+    plan as a command.  Raises errors of type GyrobenchError.
+    """
+    from gyrobench.campaign.design.shortest_test import design_test
+    from gyrobench.library.experiment import mapping_files, time_of
+
+    given = {**(values or {}), **options}
+    test = load(name, given, parts=parts, maps=maps)
+    return design_test(
+        test.system, wants, time=time_of("time", time), criterion=criterion, instruments=instruments,
+        noise_of=None if noise is None else Path(noise), parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
+        count=count, given={k: str(v) for k, v in given.items()},
+    )  # fmt: skip

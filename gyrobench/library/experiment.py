@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import operator
 import weakref
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -89,9 +89,9 @@ class Run:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """The session of an experiment, for its next run; key: engine and isolated slots."""
+    """The session of an experiment, for its next run; key: engine and timeout."""
 
-    key: tuple[str | None, tuple[str, ...]]
+    key: tuple[str | None, float | None]
     system: System
     session: Session
     close: Callable[[], object]
@@ -138,7 +138,7 @@ class Experiment:
         step: float | str | None = None,
         engine: str | None = None,
         check_step: bool | None = None,
-        isolate: Iterable[str] = (),
+        timeout: float | str | None = None,
         spec: File | None = None,
         out: File | None = None,
         force: bool = False,
@@ -147,34 +147,31 @@ class Experiment:
     ) -> Run:
         """Run the system and reduce its record.
 
-        seed: of all noise.  step: s, or a text with its unit.  engine: "native" or "reference".  check_step: find by
-        two further runs without noise what the step does, and take it into u; None: by two short ones for a system with
-        loops.  isolate: slots that run in a process of their own.  spec: name or file of an acceptance specification.
-        out: folder for record and result.json; without it nothing is written.  force: replace another run there.
-        resume: go on with an interrupted run there.  progress: called about five times a second.
+        seed: of all noise.  step: s, or a text with its unit.  engine: "native", "linked" or "reference".
+        check_step: find by two further runs without noise what the step does, and take it into u; None: by two short
+        ones for a system with loops.  timeout: s or a text with its unit, for one call of an FMU; default 60 s.
+        spec: name or file of an acceptance specification.  out: folder for record and result.json; without it nothing
+        is written.  force: replace another run there.  resume: go on with an interrupted run there.  progress: called
+        about five times a second.
 
+        The run happens in a child process: whatever an FMU does, this one goes on, with an error that says what it was.
         Raises errors of type GyrobenchError; one that comes after the first step holds what was recorded in its
         attribute ``record``.
         """
         if out is None and (force or resume):
             raise UsageError("force, resume: name the folder of the run in out")
         request = RunRequest(
-            parts=self.parts, maps=self.maps, seed=checked_seed(seed), engine=engine, step=step_of(step),
+            parts=self.parts, maps=self.maps, seed=checked_seed(seed), engine=engine, step=time_of("step", step),
             out=path_of(out), force=force, resume=resume, spec=spec,
-            check_step=check_step, isolate=tuple(isolate), in_memory=out is None, formats=KEPT,
+            check_step=check_step, timeout=time_of("timeout", timeout), in_memory=out is None, formats=KEPT,
         )  # fmt: skip
-        key = (engine, request.isolate)
+        key = (engine, request.timeout)
         if self._prepared is None or self._prepared.key != key:
             self._release()
             system = self.system.with_values({})
             session = open_session(request, system)
             self._prepared = _Prepared(key, system, session, weakref.finalize(self, session.close))
-        try:
-            outcome = execute_run(request, self._prepared.system, feedback_of(progress), self._prepared.session)
-        except BaseException:  # an isolated FMU may be gone
-            self._release()
-            raise
-        return finished(outcome)
+        return finished(execute_run(request, self._prepared.system, feedback_of(progress), self._prepared.session))
 
     def _release(self) -> None:
         """Free the FMUs of the run before."""
@@ -264,8 +261,8 @@ def path_of(file: File | None) -> Path | None:
     return None if file is None else Path(file)
 
 
-def step_of(step: float | str | None) -> float | None:
-    return None if step is None else float(parse("step", step, "s"))
+def time_of(name: str, value: float | str | None) -> float | None:
+    return None if value is None else float(parse(name, value, "s"))
 
 
 def mapping_files(maps: Mapping[str, File]) -> dict[str, Path]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from gyrobench.bench import UsageError
-from gyrobench.library.experiment import File, Run, checked_seed, feedback_of, mapping_files, open_run, step_of
+from gyrobench.library.experiment import File, Run, checked_seed, feedback_of, mapping_files, open_run, time_of
 from gyrobench.notebook import html
 from gyrobench.report.plain_text import format_result
 from gyrobench.result import SuiteResult
@@ -79,8 +79,8 @@ class SuiteExperiment:
         ``failed`` of what is returned names the tests without a result.  Raises errors of type GyrobenchError.
         """
         request = RunRequest(
-            parts=self.parts, maps=self.maps, seed=checked_seed(seed), step=step_of(step), out=Path(out), force=force,
-            resume=resume, spec=spec,
+            parts=self.parts, maps=self.maps, seed=checked_seed(seed), step=time_of("step", step), out=Path(out),
+            force=force, resume=resume, spec=spec,
         )  # fmt: skip
         return _suite_run(execute_suite(request, self.suite, feedback_of(progress)))
 

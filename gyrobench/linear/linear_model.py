@@ -100,7 +100,9 @@ def operating_point(
     def feed(slot: str) -> None:
         for c in assembly.connections:
             if c.target == slot:
-                parts[slot].set(c.input.variable, c.gain * parts[c.source].get(c.output.variable))
+                constant = c.output.constant
+                value = parts[c.source].get(c.output.variable) if constant is None else constant
+                parts[slot].set(c.input.variable, c.gain * value + c.offset)
 
     for slot in assembly.order.order:
         feed(slot)
@@ -117,8 +119,11 @@ class Linear:
     def __init__(self, assembly: Assembly, parts: Mapping[str, Component], step: float) -> None:
         self.step = step
         system = assembly.system
+        if late := [c.wire for c in assembly.connections if c.delayed]:
+            raise LinearizationError(f"a mapping file delays {', '.join(dict.fromkeys(late))}")
         sources = [s for s, d in system.slots.items() if socket(d.socket).name == "Excitation"]
-        self.connections = [c for c in assembly.connections if c.target not in sources]
+        varying = [c for c in assembly.connections if c.output.constant is None]
+        self.connections = [c for c in varying if c.target not in sources]
         self.outside = list(
             dict.fromkeys(f"{c.source}.{c.output.variable}" for c in self.connections if c.source in sources)
         )

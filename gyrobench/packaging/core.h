@@ -4,15 +4,7 @@
  * the counts and the tables used here, includes this file, and goes on with the equations.  Each operation below
  * stands in the same order in gyrobench/component/component.py and numerics.py: the two targets agree bit for bit.
  */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#define GAMMA 0x9E3779B97F4A7C15u
-#define AHEAD 64
+#include "functions.h"
 
 typedef struct {
     Vars v;
@@ -25,12 +17,13 @@ typedef struct {
 
 typedef struct { /* what follows from the numbers, kept because it seldom changes */
     double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
-    int n, keyed;
-    double seed; /* the seed that the keys of the noise streams were made for */
-    uint64_t key[N_STREAMS + 1], first[N_STREAMS + 1];
-    double ahead[N_STREAMS + 1][AHEAD]; /* normal numbers of the counts first, first + 1, ... */
+    int n, keyed; /* keyed: what follows belongs to the values */
+    int n_drawn; /* the streams that are drawn in steps; of each: where its sample stands, whether it is a density */
+    struct { int sample, density; double size; uint64_t key; } drawn[N_STREAMS + 1];
+    uint64_t first;
+    double ahead[AHEAD * (N_STREAMS + 1)]; /* size times normal number of the counts first, first + 1, ...: rows of n_drawn */
     double seen[N_FOLLOWED > 0 ? N_FOLLOWED : 1]; /* what the outputs were last made from, while `settled` */
-    int settled;
+    int settled, changes; /* changes: steps since the outputs were last found as they were */
 } Kept;
 
 typedef struct {
@@ -51,8 +44,6 @@ static inline void outputs_d(Part *part, Vars *seed);
 static double *value(Part *p) { return (double *)&p->n.v; }
 
 /* ------------------------------------------------------------------------------------- refusals */
-static double plain(double x) { return x != x ? (double)NAN : x; } /* prints "nan", never "-nan" */
-
 static void vfail(Part *p, const char *format, va_list a) {
     char text[512];
     if (p->failed) return; /* the first reason is the reason */
@@ -69,49 +60,78 @@ static void fail(Part *p, const char *format, ...) {
 }
 
 /* An index that is known only when it runs. */
-static inline int whole(double x) { return x > -1e9 && x < 1e9 ? (int)x : -1; }
 static inline int at(Part *p, int i, int n) {
     if (i >= 0 && i < n) return i;
     fail(p, "an index is %d, not in 0 to %d (t = %.9g s)", i, n - 1, p->n.v.t);
     return 0;
 }
 
-/* -------------------------------------------------------------------------------------- functions */
-static inline double f_fabs(double x) { return x < 0.0 ? -x : x; }
-static inline double f_minimum(double a, double b) { return a < b ? a : b; }
-static inline double f_maximum(double a, double b) { return a > b ? a : b; }
-static inline double f_clip(double x, double lo, double hi) { return x < lo ? lo : (x > hi ? hi : x); }
-static inline double f_sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
-
-/* A value and its derivative along one direction: see Dual in gyrobench/component/math.py. */
-typedef struct { double v, d; } dual;
-static inline dual d_con(double x) { dual r = {x, 0.0}; return r; }
-static inline dual d_of(double v, double d) { dual r = {v, d}; return r; }
-static inline dual d_add(dual a, dual b) { return d_of(a.v + b.v, a.d + b.d); }
-static inline dual d_sub(dual a, dual b) { return d_of(a.v - b.v, a.d - b.d); }
-static inline dual d_mul(dual a, dual b) { return d_of(a.v * b.v, a.d * b.v + a.v * b.d); }
-static inline dual d_div(dual a, dual b) { double q = a.v / b.v; return d_of(q, (a.d - q * b.d) / b.v); }
-static inline dual d_neg(dual a) { return d_of(-a.v, -a.d); }
-static inline dual d_sin(dual x) { return d_of(sin(x.v), cos(x.v) * x.d); }
-static inline dual d_cos(dual x) { return d_of(cos(x.v), -sin(x.v) * x.d); }
-static inline dual d_tan(dual x) { double y = tan(x.v); return d_of(y, (1.0 + y * y) * x.d); }
-static inline dual d_asin(dual x) { return d_of(asin(x.v), x.d / sqrt(1.0 - x.v * x.v)); }
-static inline dual d_atan(dual x) { return d_of(atan(x.v), x.d / (1.0 + x.v * x.v)); }
-static inline dual d_atan2(dual a, dual b) {
-    return d_of(atan2(a.v, b.v), (b.v * a.d - a.v * b.d) / (b.v * b.v + a.v * a.v));
+/* ------------------------------------------------------------------------------------------ noise */
+/* The streams that are drawn in steps: those of ports that are not off, with a sample of 0 already.  Sizes and seed do
+   not change while the part runs. */
+static void prepare_noise(Part *p) {
+    p->kept.keyed = 1;
+    p->kept.n_drawn = 0;
+    p->kept.first = (uint64_t)1 << 63; /* none made: far from every count */
+#if N_PORTS > 0
+    const double *a = value(p);
+    int i, j;
+    for (i = 0; i < N_PORTS; i++)
+        for (j = 0; j < ports[i].streams; j++) {
+            const double size = a[ports[i].parameter];
+            if (ports[i].per == ONCE || (size == 0.0 && a[ports[i].sample + j] == 0.0)) continue;
+            p->kept.drawn[p->kept.n_drawn].sample = ports[i].sample + j;
+            p->kept.drawn[p->kept.n_drawn].density = ports[i].per == PER_SECOND;
+            p->kept.drawn[p->kept.n_drawn].size = size;
+            p->kept.drawn[p->kept.n_drawn].key = key_of((uint64_t)p->n.v.seed, ports[i].stream + j);
+            p->kept.n_drawn++;
+        }
+#endif
 }
-static inline dual d_sqrt(dual x) { double y = sqrt(x.v); return d_of(y, x.d / (2.0 * y)); }
-static inline dual d_exp(dual x) { double y = exp(x.v); return d_of(y, y * x.d); }
-static inline dual d_log(dual x) { return d_of(log(x.v), x.d / x.v); }
-static inline dual d_tanh(dual x) { double y = tanh(x.v); return d_of(y, (1.0 - y * y) * x.d); }
-static inline dual d_floor(dual x) { return d_con(floor(x.v)); }
-static inline dual d_fabs(dual x) { return x.v < 0.0 ? d_neg(x) : x; }
-static inline dual d_minimum(dual a, dual b) { return a.v < b.v ? a : b; }
-static inline dual d_maximum(dual a, dual b) { return a.v > b.v ? a : b; }
-static inline dual d_clip(dual x, dual lo, dual hi) { return x.v < lo.v ? lo : (x.v > hi.v ? hi : x); }
-static inline dual d_sign(dual x) { return d_con(f_sign(x.v)); }
 
-#include "noise.h"
+static void make_noise(Part *p, uint64_t count) {
+    double numbers[AHEAD];
+    const int n = p->kept.n_drawn;
+    int i, k;
+    for (i = 0; i < n; i++) {
+        const double size = p->kept.drawn[i].size;
+        if (size != 0.0) normals(p->kept.drawn[i].key, count, numbers);
+        for (k = 0; k < AHEAD; k++) p->kept.ahead[k * n + i] = size != 0.0 ? size * numbers[k] : 0.0;
+    }
+    p->kept.first = count;
+}
+
+static void draw_start(Part *p) { /* what is drawn once, and the first samples of what is drawn per step */
+#if N_PORTS > 0
+    double *a = value(p), numbers[AHEAD];
+    int i, j;
+    for (i = 0; i < N_PORTS; i++)
+        for (j = 0; ports[i].per != PER_SECOND && j < ports[i].streams; j++) {
+            const double size = a[ports[i].parameter];
+            if (size != 0.0) normals(key_of((uint64_t)p->n.v.seed, ports[i].stream + j), 0, numbers);
+            a[ports[i].sample + j] = size != 0.0 ? size * numbers[0] : 0.0;
+        }
+#endif
+    p->kept.keyed = 0;
+}
+
+static inline void draw(Part *p) { /* the samples of an internal step */
+#if N_PORTS > 0
+    const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
+    const double *ahead;
+    int i, n;
+    if (!p->kept.keyed) prepare_noise(p);
+    n = p->kept.n_drawn;
+    if (count - p->kept.first >= AHEAD) make_noise(p, count); /* unsigned: before the first too */
+    ahead = p->kept.ahead + (count - p->kept.first) * n;
+    for (i = 0; i < n; i++)
+        value(p)[p->kept.drawn[i].sample] = p->kept.drawn[i].density ? ahead[i] / p->kept.root : ahead[i];
+#else
+    (void)p;
+    (void)prepare_noise;
+    (void)make_noise;
+#endif
+}
 
 /* ------------------------------------------------------------------------------------ integration */
 #if N_X > 0
@@ -215,22 +235,6 @@ static void advance(Part *p, double h) {
 #endif
 
 /* --------------------------------------------------------------------------------------- stepping */
-/* 0 when one is not finite, or when large ones add up to more than a double holds: told_finite knows. */
-static inline int all_finite(const double *a, int n) {
-    double sum[4] = {0.0, 0.0, 0.0, 0.0}; /* four, for each addition waits for the one before it */
-    int i;
-    for (i = 0; i + 3 < n; i += 4) {
-        sum[0] = sum[0] + a[i];
-        sum[1] = sum[1] + a[i + 1];
-        sum[2] = sum[2] + a[i + 2];
-        sum[3] = sum[3] + a[i + 3];
-    }
-    if (i < n) sum[0] = sum[0] + a[i];
-    if (i + 1 < n) sum[1] = sum[1] + a[i + 1];
-    if (i + 2 < n) sum[2] = sum[2] + a[i + 2];
-    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) * 0.0 == 0.0;
-}
-
 static int told_finite(Part *p, int from, int n, const char *what) {
     const double *a = value(p);
     int i;
@@ -255,20 +259,33 @@ static inline int renew(Part *p) {
     int i = 0;
     if (p->kept.settled) {
         while (i < N_FOLLOWED && memcmp(&a[followed[i]], &p->kept.seen[i], sizeof *a) == 0) i++; /* tells 0 from -0 */
-        if (i == N_FOLLOWED) return 0;
+        if (i == N_FOLLOWED) {
+            p->kept.changes = 0;
+            return 0;
+        }
+        p->kept.settled = 0;
     }
-    for (i = 0; i < N_FOLLOWED; i++) p->kept.seen[i] = a[followed[i]];
-    p->kept.settled = 1;
+    if (p->kept.changes++ % PATIENCE == 0) { /* what has changed in this step is likely to change in the next */
+        for (i = 0; i < N_FOLLOWED; i++) p->kept.seen[i] = a[followed[i]];
+        p->kept.settled = 1;
+    }
 #endif
     outputs(p);
     if (p->failed) p->kept.settled = 0;
     return 1;
 }
 
+static void begin(Part *p, const char *name) { /* as instantiated */
+    memset(p, 0, sizeof *p);
+    snprintf(p->name, sizeof p->name, "%s", name ? name : "");
+    memcpy(value(p), starts, N_REFERENCES * sizeof(double));
+    p->n.dirty = 1.0;
+}
+
 static void evaluate_start(Part *p) {
     p->n.v.tick = 0.0;
     p->kept.settled = 0;
-    draw(p, ONCE, PER_STEP);
+    draw_start(p);
     start(p);
     if (!p->failed) outputs(p);
     p->n.dirty = 0.0;
@@ -313,15 +330,9 @@ static void initialize(Part *p, double t0) {
     if (!p->failed && tell_finite(p)) p->n.running = 1.0;
 }
 
-static void do_step(Part *p, double t, double step) {
+static NEVER_INLINE void proceed(Part *p, double t, double step) { /* do_step after the checks of its arguments */
     double largest, h;
     int k, n;
-    if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
-        fail(p, "a step must be positive and finite, not %g s", plain(step));
-        return;
-    }
-    p->n.v.t = t;
-    if (!all_finite(value(p) + U0, N_U) && !told_finite(p, U0, N_U, "input")) return;
     largest = LARGEST_STEP(p, step);
     if (step != p->kept.step || largest != p->kept.largest) {
         n = (int)ceil(step / largest - 1e-9);
@@ -339,7 +350,7 @@ static void do_step(Part *p, double t, double step) {
     for (k = 0; k < n; k++) {
         p->n.v.t = t + k * h;
         p->n.v.tick = p->n.v.tick + 1.0;
-        draw(p, PER_STEP, PER_SECOND);
+        draw(p);
 #if N_X > 0
         advance(p, h);
 #endif
@@ -353,4 +364,17 @@ static void do_step(Part *p, double t, double step) {
     if (anew && !all_finite(value(p) + Y0, DX0 - Y0)) tell_finite(p); /* outputs and states */
     for (k = 0; k < N_STEPPED; k++)
         if (!all_finite(value(p) + stepped[k].from, stepped[k].n)) tell_finite(p);
+}
+
+static int inputs_are_finite(Part *p) {
+    return all_finite(value(p) + U0, N_U) || told_finite(p, U0, N_U, "input");
+}
+
+static void do_step(Part *p, double t, double step) {
+    if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
+        fail(p, "a step must be positive and finite, not %g s", plain(step));
+        return;
+    }
+    p->n.v.t = t;
+    if (inputs_are_finite(p)) proceed(p, t, step);
 }

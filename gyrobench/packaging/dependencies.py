@@ -6,12 +6,12 @@ import ast
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
-from gyrobench.component import Discrete, Input, Output, State
+from gyrobench.component import Discrete, Input, Output, Parameter, State
 from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
 from gyrobench.packaging.source import Code, Source
 
-Reach: TypeAlias = dict[str, set[str]]  # variable -> the inputs it follows
+Reach: TypeAlias = dict[str, set[str]]  # variable -> the known variables it follows
 
 
 def called(e: ast.AST, code: Code, source: Source) -> Code | None:
@@ -31,26 +31,30 @@ def called(e: ast.AST, code: Code, source: Source) -> Code | None:
 
 
 class Dependencies:
-    """The inputs (declared names) that the variables written by one kind of equation depend on."""
+    """The known variables (declared names) that the variables written by some kinds of equations depend on.
 
-    def __init__(self, source: Source, kind: str) -> None:
+    reach: what is known of them before.
+    """
+
+    def __init__(self, source: Source, kinds: Iterable[str], known: Iterable[str], reach: Reach | None = None) -> None:
         self.source = source
-        self.inputs = {n for n, d in source.cls.declarations.items() if isinstance(d, Input)}
-        self.reach: Reach = {}
+        self.known = set(known)
+        self.reach: Reach = reach or {}
         before: Reach | None = None
         while before != self.reach:  # until nothing changes: loops carry values from one turn to the next
             before = {k: set(v) for k, v in self.reach.items()}
-            for _, code in source.equations[kind]:
-                self.run(code.node.body, code, {}, set())
+            for kind in kinds:
+                for _, code in source.equations[kind]:
+                    self.run(code.node.body, code, {}, set())
 
     def read(self, e: ast.AST, code: Code, locals_: Reach) -> set[str]:
-        """Return the inputs that an expression follows."""
+        """Return the known variables that an expression follows."""
         if isinstance(e, ast.Name):
             return set(locals_.get(e.id, set()))
         if isinstance(e, ast.Attribute):
             name = flat_name(e, code)
             if name is not None:
-                return self.reach.get(name, set()) | ({name} & self.inputs)
+                return self.reach.get(name, set()) | ({name} & self.known)
         inputs: set[str] = set()
         callee = called(e, code, self.source)
         if callee is not None:
@@ -139,10 +143,27 @@ def written_names(code: Code, source: Source) -> set[str]:
     return names
 
 
-def dependencies(source: Source, kind: str = "outputs") -> dict[str, set[str]]:
+def _declared(source: Source, *kinds: type) -> list[str]:
+    return [n for n, d in source.cls.declarations.items() if isinstance(d, kinds)]
+
+
+def dependencies(source: Source) -> dict[str, set[str]]:
     """Return output (declared name) -> the inputs that it follows without delay."""
-    reach = Dependencies(source, kind).reach
-    return {n: reach.get(n, set()) for n, d in source.cls.declarations.items() if isinstance(d, Output)}
+    reach = Dependencies(source, ["outputs"], _declared(source, Input)).reach
+    return {n: reach.get(n, set()) for n in _declared(source, Output)}
+
+
+def initial_dependencies(source: Source) -> dict[str, set[str]]:
+    """Return what outputs ("y") and derivatives ("der.x") follow during initialization, declared names.
+
+    Parameters, inputs and start values of states; there the equations of the start, of the outputs and of the
+    derivatives are evaluated one after another.
+    """
+    known = _declared(source, Parameter, Input, State)
+    drawn = {f"noise.{n.name}": {n.name, "seed"} & set(known) for n in source.cls.noises}
+    reach = Dependencies(source, ["start", "outputs", "flow"], known, drawn).reach
+    names = [*_declared(source, Output), *(f"der.{n}" for n in _declared(source, State))]
+    return {n: reach.get(n, set()) for n in names}
 
 
 def written(source: Source) -> set[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.dependencies import dependencies
+from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.source import Source
 from gyrobench.units import base_unit
 
@@ -37,7 +37,7 @@ def unit_name(s: Scalar) -> str:
     return f"{s.decl.unit}/s" if s.section == "derivative" else s.decl.unit
 
 
-def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     causality, variability, initial = ATTRIBUTES[s.section]
     d = s.decl
     kind = TYPES[d.type]
@@ -129,7 +129,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})
     variables = ET.SubElement(root, "ModelVariables")
     for s in cls.layout:
-        _variable(variables, cls, s)
+        add_variable(variables, cls, s)
     _structure(ET.SubElement(root, "ModelStructure"), cls, source)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
@@ -137,15 +137,12 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
 
 def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
     """Add the outputs with the inputs and states they follow without delay, derivatives and initial unknowns."""
-    depends = {
-        "output": dependencies(source, "outputs"),
-        "derivative": {},
-    }
+    follows = dependencies(source)
     outputs = [s for s in cls.layout if s.section == "output"]
     derivatives = [s for s in cls.layout if s.section == "derivative"]
     node = ET.SubElement(parent, "Outputs") if outputs else None
     for s in outputs:
-        on = depends["output"].get(s.decl.name, set())
+        on = follows.get(s.decl.name, set())
         indices = [x.reference + 1 for x in cls.layout if x.section == "input" and x.decl.name in on]
         indices += [x.reference + 1 for x in cls.states]
         assert node is not None
@@ -156,5 +153,19 @@ def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None
             ET.SubElement(node, "Unknown", {"index": str(s.reference + 1)})
     if outputs or derivatives:
         node = ET.SubElement(parent, "InitialUnknowns")
+        known = initial_references(cls, source)
         for s in (*outputs, *derivatives):
-            ET.SubElement(node, "Unknown", {"index": str(s.reference + 1)})
+            on_index = " ".join(str(r + 1) for r in known[s.name])
+            ET.SubElement(node, "Unknown", {"index": str(s.reference + 1), "dependencies": on_index})
+
+
+def initial_references(cls: type[Component], source: Source) -> dict[str, list[int]]:
+    """Return the places of the variables that outputs and derivatives depend on during initialization, by name."""
+    follows = initial_dependencies(source)
+    known = [x for x in cls.layout if x.section in ("parameter", "input", "state")]
+    found = {}
+    for s in cls.layout:
+        if s.section in ("output", "derivative"):
+            on = follows[s.decl.name if s.section == "output" else f"der.{s.decl.name}"]
+            found[s.name] = [x.reference for x in known if x.decl.name in on]
+    return found

@@ -1,7 +1,7 @@
 """modelDescription.xml (FMI 3.0) of a part.
 
-The variables are the scalars of the FMI 2.0 description, with the same structured names and value references
-(arrays are not declared as such), and the independent variable after them.
+The variables are the independent variable, whose value reference is 0, and the scalars of the FMI 2.0 description, with
+the same structured names and references larger by one (arrays are not declared as such).
 """
 
 from __future__ import annotations
@@ -10,10 +10,15 @@ import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
-from gyrobench.packaging.description import ATTRIBUTES, number, summary, unit_name, units
+from gyrobench.packaging.description import ATTRIBUTES, initial_references, number, summary, unit_name, units
 from gyrobench.packaging.source import Source
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
+
+
+def reference(s: Scalar) -> str:
+    """Return the value reference of a scalar: 0 is the time's."""
+    return str(s.reference + 1)
 
 
 def time_name(cls: type[Component]) -> str:
@@ -28,22 +33,22 @@ def build_description(identifier: str) -> str:
     one = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     files = ET.SubElement(one, "SourceFileSet", {"language": "C11"})
     ET.SubElement(files, "SourceFile", {"name": "fmi3.c"})
-    return _text(root)
+    return xml_text(root)
 
 
-def _text(root: ET.Element) -> str:
+def xml_text(root: ET.Element) -> str:
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     causality, variability, initial = ATTRIBUTES[s.section]
     kind = TYPES[s.decl.type]
     if kind != "Float64" and variability == "continuous":
         variability = "discrete"
     attributes = {
         "name": s.name,
-        "valueReference": str(s.reference),
+        "valueReference": reference(s),
         "causality": causality,
         "variability": variability,
     }
@@ -56,7 +61,7 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
             attributes["quantity"] = s.decl.quantity
         attributes["unit"] = unit_name(s)
     if s.section == "derivative":
-        attributes["derivative"] = str(next(x for x in cls.states if x.name == s.name[4:-1]).reference)
+        attributes["derivative"] = reference(next(x for x in cls.states if x.name == s.name[4:-1]))
     if s.section in ("parameter", "input", "state"):
         lo = s.decl.min if s.decl.min is not None else s.decl.above
         hi = s.decl.max if s.decl.max is not None else s.decl.below
@@ -66,6 +71,12 @@ def _variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
             attributes["max"] = number(hi, s.decl.type)
         attributes["start"] = number(s.start, s.decl.type)
     ET.SubElement(parent, kind, attributes)
+
+
+def add_time(parent: ET.Element, cls: type[Component]) -> None:
+    """Add the independent variable, of reference 0."""
+    time = {"valueReference": "0", "causality": "independent", "variability": "continuous"}
+    ET.SubElement(parent, "Float64", {"name": time_name(cls), **time, "unit": "s"})
 
 
 def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
@@ -99,22 +110,22 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})
     variables = ET.SubElement(root, "ModelVariables")
+    add_time(variables, cls)
     for s in cls.layout:
-        _variable(variables, cls, s)
-    time = {"valueReference": str(len(cls.layout)), "causality": "independent", "variability": "continuous"}
-    ET.SubElement(variables, "Float64", {"name": time_name(cls), **time, "unit": "s"})
+        add_variable(variables, cls, s)
 
     structure = ET.SubElement(root, "ModelStructure")
-    follows = dependencies(Source(cls))
+    source = Source(cls)
+    follows, initial = dependencies(source), initial_references(cls, source)
     outputs = [s for s in cls.layout if s.section == "output"]
     derivatives = [s for s in cls.layout if s.section == "derivative"]
     for s in outputs:
-        on = [x.reference for x in cls.layout if x.section == "input" and x.decl.name in follows[s.decl.name]]
-        on += [x.reference for x in cls.states]
-        reference = {"valueReference": str(s.reference), "dependencies": " ".join(map(str, on))}
-        ET.SubElement(structure, "Output", reference)
+        on = [x for x in cls.layout if x.section == "input" and x.decl.name in follows[s.decl.name]]
+        known = " ".join(reference(x) for x in (*on, *cls.states))
+        ET.SubElement(structure, "Output", {"valueReference": reference(s), "dependencies": known})
     for s in derivatives:
-        ET.SubElement(structure, "ContinuousStateDerivative", {"valueReference": str(s.reference)})
+        ET.SubElement(structure, "ContinuousStateDerivative", {"valueReference": reference(s)})
     for s in (*outputs, *derivatives):
-        ET.SubElement(structure, "InitialUnknown", {"valueReference": str(s.reference)})
-    return _text(root)
+        known = " ".join(str(r + 1) for r in initial[s.name])
+        ET.SubElement(structure, "InitialUnknown", {"valueReference": reference(s), "dependencies": known})
+    return xml_text(root)

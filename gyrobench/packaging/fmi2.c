@@ -4,6 +4,7 @@
 #include "fmi2Functions.h"
 
 typedef fmi2CallbackLogger Logger;
+#define FIRST_REFERENCE 0u
 #include "instance.h"
 
 static void say(Instance *m, const char *message) {

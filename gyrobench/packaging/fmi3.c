@@ -1,12 +1,13 @@
 /* FMI 3.0 co-simulation face of a native component.  Compiled as one unit: model.c is generated.
  *
- * The variables are scalars with the value references of the FMI 2.0 face; the one after them is the time.
+ * The time has the value reference 0; after it come the variables as scalars, in the order of the FMI 2.0 face.
  */
 #include "model.c"
 
 #include "fmi3Functions.h"
 
 typedef fmi3LogMessageCallback Logger;
+#define FIRST_REFERENCE 1u
 #include "instance.h"
 
 #if defined(__GNUC__)
@@ -84,7 +85,7 @@ static const char *const counts = "as many values as value references are expect
         if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                               \
         for (i = 0; i < n; i++) {                                                                                    \
             double x = m->part.n.v.t;                                                                                \
-            if (vr[i] != (unsigned)N_REFERENCES && get_value(m, vr[i], &x)) return fmi3Error;                        \
+            if (vr[i] != 0 && get_value(m, vr[i], &x)) return fmi3Error;                        \
             out[i] = expression;                                                                                     \
         }                                                                                                            \
         return told(m);                                                                                              \

@@ -21,14 +21,16 @@ from gyrobench.packaging.loading import BuildError, load_part, sources
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
 
-def _hash(*texts: str) -> str:
+def content_hash(*texts: str) -> str:
+    """Return the SHA-256 of texts."""
     h = hashlib.sha256()
     for t in texts:
         h.update(t.encode() + b"\0")
     return h.hexdigest()
 
 
-def _guid(digest: str) -> str:
+def guid_of(digest: str) -> str:
+    """Return the GUID that stands for a digest."""
     return "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]))
 
 
@@ -36,13 +38,25 @@ def _guid(digest: str) -> str:
 def _tool_text() -> str:
     """Return all files whose text determines what a build writes; they stay as they are while the process runs."""
     here = Path(__file__).parent
-    after = ("__init__", "instance", "reference", "validate")  # these run what was built
+    after = ("__init__", "instance", "linked_parts", "reference", "validate")  # these use what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
-    files += [*python_target.RUNTIME, here.parent / "units.py"]
+    files = [f for f in files if f.name != "system_core.h"] + [*python_target.RUNTIME, here.parent / "units.py"]
     return "".join(f.read_text(encoding="utf-8") for f in files)
 
 
-def _zip(path: Path, entries: dict[str, bytes]) -> None:
+def _content(cls: type[Component], name: str, target: str, fmi: int) -> str:
+    """Return the hash of all that determines what an FMU computes."""
+    texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in sources(cls).items()]
+    return content_hash(*texts, _tool_text(), target, str(fmi), name)
+
+
+def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
+    """Return the GUID of the native FMU that a build of this part makes now."""
+    return guid_of(_content(cls, name, "native", fmi))
+
+
+def write_archive(path: Path, entries: dict[str, bytes]) -> None:
+    """Write a zip archive; the same entries give the same file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
     os.close(handle)
@@ -56,10 +70,8 @@ def _zip(path: Path, entries: dict[str, bytes]) -> None:
     os.replace(temporary, path)  # a build that is stopped leaves no half file
 
 
-def _native_entries(
-    cls: type[Component], guid: str, name: str, platforms: tuple[str, ...], fmi: int
-) -> dict[str, bytes]:
-    files = native_target.source_files(cls, guid, fmi)
+def native_entries(files: dict[str, str], name: str, platforms: tuple[str, ...], fmi: int) -> dict[str, bytes]:
+    """Return sources and compiled binaries as entries of an FMU; fmi2.c (or fmi3.c) of the files is compiled."""
     entries = {f"sources/{n}": t.encode() for n, t in files.items()}
     with tempfile.TemporaryDirectory() as folder:
         for n, t in files.items():
@@ -115,22 +127,21 @@ def build(
     cls = load_part(part, bench) if isinstance(part, str) else part
     name = part if isinstance(part, str) else sources(cls)["model"].parent.name
     identifier = name
-    files = sources(cls)
-    texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in files.items()]
-    what = _hash(*texts, _tool_text(), target, str(fmi), name)
-    readme = files["model"].parent / "README.md"
+    what = _content(cls, name, target, fmi)
+    readme = sources(cls)["model"].parent / "README.md"
     documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
     if target == "native":
         how = "".join(p + compiler.identity(p) for p in platforms)
     else:
         how = importlib.metadata.version("pythonfmu")
-    guid = _guid(what)
+    guid = guid_of(what)
     home = Bench.find(bench)
     suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
-    cached = home.cache / f"{name}{suffix}-{_hash(what, how, documentation)[:20]}.fmu"
+    cached = home.cache / f"{name}{suffix}-{content_hash(what, how, documentation)[:20]}.fmu"
     if not cached.exists():
         if target == "native":
-            entries = _native_entries(cls, guid, identifier, platforms, fmi)
+            files = native_target.source_files(cls, guid, fmi)
+            entries = native_entries(files, identifier, platforms, fmi)
         else:
             entries = _python_entries(cls, guid, identifier)
         if fmi == 3:
@@ -140,7 +151,7 @@ def build(
             entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
-        _zip(cached, entries)
+        write_archive(cached, entries)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")

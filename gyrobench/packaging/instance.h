@@ -1,6 +1,7 @@
 /* What the FMI 2 and FMI 3 faces share: an instance, its log, values by reference, states, derivatives.
  *
- * Included after model.c.  `Logger` is the type of the FMI version's log callback, `say` its call.
+ * Included after model.c.  `Logger` is the type of the FMI version's log callback, `say` its call, FIRST_REFERENCE the
+ * value reference of the first variable.
  * The results are FMI status values: 0 OK, 3 error, the same in both versions.
  */
 #include <stdlib.h>
@@ -17,18 +18,17 @@ static void say(Instance *m, const char *message);
 static Instance *new_instance(const char *name, Logger logger, void *environment) {
     Instance *m = (Instance *)calloc(1, sizeof *m);
     if (!m) return NULL;
-    snprintf(m->part.name, sizeof m->part.name, "%s", name ? name : "");
+    begin(&m->part, name);
     m->logger = logger;
     m->environment = environment;
-    memcpy(value(&m->part), starts, N_REFERENCES * sizeof(double));
-    m->part.n.dirty = 1.0;
     m->fresh = m->part.n;
     return m;
 }
 
 static void reset(Instance *m) {
     m->part.n = m->fresh;
-    m->part.kept.settled = 0;
+    m->part.kept.settled = m->part.kept.keyed = 0;
+    m->part.kept.step = 0.0;
     m->part.failed = 0;
 }
 
@@ -61,7 +61,9 @@ static inline int in_range(unsigned reference, int first, int n) {
     return reference - (unsigned)first < (unsigned)n; /* below the first it wraps round */
 }
 
-static inline int has(unsigned reference) { return in_range(reference, 0, N_REFERENCES); }
+static inline unsigned place(unsigned reference) { return reference - FIRST_REFERENCE; }
+
+static inline int has(unsigned reference) { return in_range(place(reference), 0, N_REFERENCES); }
 
 static int has_all(Instance *m, const unsigned references[], size_t n) {
     size_t i;
@@ -74,22 +76,22 @@ static int has_all(Instance *m, const unsigned references[], size_t n) {
 static void freshen(Instance *m, const unsigned references[], size_t n) {
     size_t i;
     for (i = 0; i < n; i++)
-        if (in_range(references[i], Y0, N_Y)) refresh(&m->part);
+        if (in_range(place(references[i]), Y0, N_Y)) refresh(&m->part);
 }
 
 static inline int get_value(Instance *m, unsigned reference, double *x) {
     if (!has(reference)) return missing(m, reference);
-    *x = value(&m->part)[reference];
+    *x = value(&m->part)[place(reference)];
     return 0;
 }
 
 static inline int set_value(Instance *m, unsigned reference, double x) {
-    if (!in_range(reference, U0, N_U)) { /* no input */
+    if (!in_range(place(reference), U0, N_U)) { /* no input */
         if (!has(reference)) return missing(m, reference);
-        if ((int)reference < U0 && m->part.n.running != 0.0)
-            return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[reference]);
+        if ((int)place(reference) < U0 && m->part.n.running != 0.0)
+            return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[place(reference)]);
     }
-    value(&m->part)[reference] = x;
+    value(&m->part)[place(reference)] = x;
     return 0;
 }
 
@@ -97,6 +99,23 @@ static int step(Instance *m, double t, double h) {
     if (m->part.n.running == 0.0) return wrong(m, "a step before initialization has succeeded");
     if (m->part.failed) return 3;
     do_step(&m->part, t, h);
+    return told(m);
+}
+
+/* A step in the linked form of a system: its inputs are outputs of parts, which have checked them, but for the first,
+   before which outputs may follow inputs that came after the end of initialization. */
+#ifdef _WIN32
+__declspec(dllexport)
+#elif defined(__GNUC__)
+__attribute__((visibility("default")))
+#endif
+int gyrobench_step(void *c, double t, double h) {
+    Instance *m = (Instance *)c;
+    if (h == m->part.kept.step) {
+        proceed(&m->part, t, h);
+    } else {
+        do_step(&m->part, t, h);
+    }
     return told(m);
 }
 
@@ -108,11 +127,11 @@ static int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, c
     size_t i;
     memset(&seed, 0, sizeof seed);
     if (!has_all(m, unknown, n_unknown) || !has_all(m, known, n_known)) return 3;
-    for (i = 0; i < n_known; i++) ((double *)&seed)[known[i]] = dv[i];
+    for (i = 0; i < n_known; i++) ((double *)&seed)[place(known[i])] = dv[i];
     flow_d(&m->part, &seed);
     outputs_d(&m->part, &seed);
     m->part.n.v = before;
-    for (i = 0; i < n_unknown; i++) out[i] = ((double *)&seed)[unknown[i]];
+    for (i = 0; i < n_unknown; i++) out[i] = ((double *)&seed)[place(unknown[i])];
     return told(m);
 }
 
@@ -132,7 +151,8 @@ static int get_state(Instance *m, void **state) {
 static int set_state(Instance *m, const void *state) {
     if (!state) return wrong(m, "no state is given");
     memcpy(&m->part.n, state, sizeof(Numbers));
-    m->part.kept.settled = 0;
+    m->part.kept.settled = m->part.kept.keyed = 0;
+    m->part.kept.step = 0.0;
     m->part.failed = 0;
     return 0;
 }

@@ -13,6 +13,7 @@ from gyrobench.packaging.source import Source, member
 from gyrobench.packaging.translate import Translation
 
 HERE = Path(__file__).parent
+RUNTIME = ("core.h", "functions.h", "noise.h")  # what model.c includes
 PER = {"start": 0, "step": 1, "second": 2}
 
 
@@ -149,6 +150,6 @@ def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
     headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
     return {
         "model.c": c_source(cls, guid),
-        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "noise.h", "instance.h", f"fmi{fmi}.c")},
+        **{n: (HERE / n).read_text(encoding="utf-8") for n in (*RUNTIME, "instance.h", f"fmi{fmi}.c")},
         **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
     }

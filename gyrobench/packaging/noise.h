@@ -1,6 +1,6 @@
 /* The noise of a native component: counter-based, so that a number depends on seed, port and count alone.
  *
- * Included by core.h.  The numbers are those of gyrobench/component/numerics.py bit for bit; they are made AHEAD at a time,
+ * Included by functions.h.  The numbers are those of gyrobench/component/numerics.py bit for bit; they are made AHEAD at a time,
  * because the rare branch of the quantile would stop the processor at each one.
  */
 static uint64_t mix(uint64_t z) { /* SplitMix64 output function */
@@ -9,21 +9,27 @@ static uint64_t mix(uint64_t z) { /* SplitMix64 output function */
     return z ^ (z >> 31);
 }
 
-static uint64_t key_of(uint64_t seed, int port) {
+static inline uint64_t key_of(uint64_t seed, int port) {
     return mix(mix((seed + 1) * GAMMA) + (uint64_t)(port + 1) * GAMMA);
 }
 
 /* The normal quantile of p, Wichura, AS 241 (PPND16), for |q| <= 0.425 and beyond; q = p - 0.5. */
 #ifdef __GNUC__
-typedef double lanes __attribute__((vector_size(16))); /* two numbers at a time: the same operations on each */
+typedef double lanes __attribute__((vector_size(32))); /* four numbers at a time: the same operations on each */
 #else
 typedef double lanes;
 #endif
+/* Two forms in one library, the wider for the processors that have it; no operation is contracted in either. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+#define BY_PROCESSOR __attribute__((target_clones("avx2", "default")))
+#else
+#define BY_PROCESSOR
+#endif
 enum { LANES = sizeof(lanes) / sizeof(double) };
 
-static inline lanes quantile_middle(lanes q) {
-    const lanes r = 0.180625 - q * q;
-    return (((((((2.5090809287301226727e+3 * r + 3.3430575583588128105e+4) * r + 6.7265770927008700853e+4) * r
+static inline void quantile_middle(lanes *at) { /* by address: a vector that is passed depends on the processor */
+    const lanes q = *at, r = 0.180625 - q * q;
+    *at = (((((((2.5090809287301226727e+3 * r + 3.3430575583588128105e+4) * r + 6.7265770927008700853e+4) * r
                 + 4.5921953931549871457e+4) * r + 1.3731693765509461125e+4) * r + 1.9715909503065514427e+3) * r
              + 1.3314166789178437745e+2) * r + 3.3871328727963666080e+0) * q
          / (((((((5.2264952788528545610e+3 * r + 2.8729085735721942674e+4) * r + 3.9307895800092710610e+4) * r
@@ -57,7 +63,7 @@ static double quantile_tail(double p, double q) {
 
 static inline int in_middle(double q) { return fabs(q) <= 0.425; }
 
-static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of count, count + 1, ... */
+BY_PROCESSOR static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of count, count + 1, ... */
     double p[AHEAD];
     int rare[AHEAD], n = 0, i;
     for (i = 0; i < AHEAD; i++) {
@@ -69,54 +75,9 @@ static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of cou
     for (i = 0; i < AHEAD; i += LANES) {
         lanes q;
         memcpy(&q, p + i, sizeof q);
-        q = quantile_middle(q - 0.5);
+        q -= 0.5;
+        quantile_middle(&q);
         memcpy(out + i, &q, sizeof q);
     }
     for (i = 0; i < n; i++) out[rare[i]] = quantile_tail(p[rare[i]], p[rare[i]] - 0.5);
-}
-
-enum { ONCE, PER_STEP, PER_SECOND }; /* kinds of ports */
-
-static inline double number_of(Part *p, int stream, uint64_t count) { /* the normal number of a stream */
-    if (count - p->kept.first[stream] >= AHEAD) { /* unsigned: before the first too */
-        normals(p->kept.key[stream], count, p->kept.ahead[stream]);
-        p->kept.first[stream] = count;
-    }
-    return p->kept.ahead[stream][count - p->kept.first[stream]];
-}
-
-static inline void draw(Part *p, int from, int to) { /* the samples of these kinds */
-#if N_PORTS > 0
-    double *a = value(p);
-    const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
-    int i, j;
-    if (!p->kept.keyed || p->kept.seed != p->n.v.seed) {
-        for (i = 0; i < N_STREAMS; i++) {
-            p->kept.key[i] = key_of((uint64_t)p->n.v.seed, i);
-            p->kept.first[i] = (uint64_t)1 << 63; /* none made: far from every count */
-        }
-        p->kept.seed = p->n.v.seed;
-        p->kept.keyed = 1;
-    }
-    for (i = 0; i < N_PORTS; i++) {
-        double size;
-        if (ports[i].per < from || ports[i].per > to) continue;
-        size = a[ports[i].parameter];
-        if (size == 0.0 && a[ports[i].sample] == 0.0) continue; /* off, and 0 already */
-        for (j = 0; j < ports[i].streams; j++) {
-            double x = 0.0;
-            if (size != 0.0) {
-                x = size * number_of(p, ports[i].stream + j, count);
-                if (ports[i].per == PER_SECOND) x = x / p->kept.root;
-            }
-            a[ports[i].sample + j] = x;
-        }
-    }
-#else
-    (void)p;
-    (void)from;
-    (void)to;
-    (void)normals;
-    (void)key_of;
-#endif
 }

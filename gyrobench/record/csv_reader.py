@@ -12,6 +12,7 @@ semicolon or a tab separates, a comma.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import re
@@ -38,6 +39,9 @@ class DataError(GyrobenchError):
     def __init__(self, file: Path | str, problems: list[str]) -> None:
         self.problems = problems
         super().__init__("\n".join([f"{file}: not usable:", *(f"  - {p}" for p in problems)]))
+
+
+LARGEST = 1e30  # of a cell: no quantity of a laboratory in any unit, and squares of it are still numbers
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,21 @@ def read_lines(file: Path) -> list[str]:
         return data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         row = data[: error.start].count(b"\n") + 1
-        raise DataError(file, [_not_utf8(row)]) from None
+        raise DataError(file, [not_utf8(row)]) from None
+
+
+def check_utf8(file: Path) -> None:
+    """Raise DataError for a file of any length that is not UTF-8 text, with the row."""
+    decoder, row = codecs.getincrementaldecoder("utf-8")(), 1
+    with Path(file).open("rb") as data:
+        block = b" "
+        while block:
+            block = data.read(1 << 20)
+            try:
+                decoder.decode(block, final=not block)
+            except UnicodeDecodeError as error:
+                raise DataError(file, [not_utf8(row + block[: error.start].count(b"\n"))]) from None
+            row += block.count(b"\n")
 
 
 @dataclass(frozen=True)
@@ -104,7 +122,7 @@ def read_head(file: Path) -> Head:
             try:
                 line = data.decode("utf-8-sig" if number == 1 else "utf-8").rstrip("\r\n")
             except UnicodeDecodeError:
-                raise DataError(file, [_not_utf8(number)]) from None
+                raise DataError(file, [not_utf8(number)]) from None
             if line.lstrip().startswith("#"):
                 _comment(line, comments)
             elif line.strip():
@@ -121,9 +139,18 @@ def _comment(line: str, into: dict[str, str]) -> None:
         into[key.strip()] = value.strip()
 
 
+def cells_of(line: str, delimiter: str = ",") -> list[str]:
+    """Return the cells of a line; of one that is no CSV (a return within it) what stands between the delimiters."""
+    try:
+        cells = next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:
+        cells = line.split(delimiter)
+    return [c.strip() for c in cells]
+
+
 def _split_header(line: str) -> tuple[str, list[str]]:
     delimiter = max(",;\t", key=line.count)
-    return delimiter, [h.strip() for h in next(csv.reader([line], delimiter=delimiter))]
+    return delimiter, cells_of(line, delimiter)
 
 
 def _decimal_comma(cells: Iterable[str]) -> bool:
@@ -136,7 +163,7 @@ def _decimal_comma(cells: Iterable[str]) -> bool:
     return found
 
 
-def _not_utf8(row: int) -> str:
+def not_utf8(row: int) -> str:
     return f"row {row}: not UTF-8 text; save the table as CSV (UTF-8)"
 
 
@@ -160,7 +187,7 @@ def read_measured(
     if not table:
         raise DataError(file, ["no header line"])
     delimiter, header = _split_header(table[0][1])
-    rows = [(n, [c.strip() for c in next(csv.reader([line], delimiter=delimiter))]) for n, line in table[1:]]
+    rows = [(n, cells_of(line, delimiter)) for n, line in table[1:]]
     if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
         rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
     expected = {c.name: c for c in (*columns, *conditions(header))}
@@ -194,12 +221,17 @@ def header_places(header: list[str], expected: Mapping[str, Column]) -> tuple[di
     """Return place and factor of each expected column, and the problems of the header."""
     places: dict[str, tuple[int, Factor]] = {}
     problems = []
+    known = set[str]()
     for k, text in enumerate(header):
         match = re.fullmatch(r"([^\[\]]+?)\s*(?:\[(.*)\])?", text)
         name, unit = (match[1], match[2]) if match else (text, None)
         column = expected.get(name)
-        if column is None:
-            continue  # further columns are the laboratory's own
+        if column is None:  # further columns are the laboratory's own
+            if not match and (begins := text.split("[")[0].strip()) in expected:
+                known.add(begins)
+                problems.append(f"header '{text[:40]}': not of the form '{begins} [{expected[begins].unit}]'")
+            continue
+        known.add(name)
         if name in places:
             problems.append(f"column '{name}': appears twice")
         fits = ", ".join(units.fitting(column.unit)[:5])
@@ -215,7 +247,6 @@ def header_places(header: list[str], expected: Mapping[str, Column]) -> tuple[di
             problems.append(f"column '{name}': wrong unit [{unit}]: units that fit: {fits}")
             continue
         places[name] = (k, Factor(u.factor, u.offset))
-    known = {t.split("[")[0].strip() for t in header}
     for c in expected.values():
         if c.required and c.name not in known:
             unit = f" [{c.unit}]" if c.unit != "1" else ""
@@ -244,7 +275,9 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
         if not math.isfinite(x):
             comma = "; the decimal sign is a point" if DECIMAL_COMMA.fullmatch(text) else ""
             invalid.setdefault(f"is not a finite number{comma}", []).append((n, text))
-        elif whole and x != math.floor(x):
+        elif abs(x) > LARGEST:
+            invalid.setdefault(f"is larger than {LARGEST:g}", []).append((n, text))
+        elif whole and (x != math.floor(x) or abs(x) > 2.0**53):
             invalid.setdefault("must be an integer", []).append((n, text))
         values.append(x)
     problems = []
@@ -257,6 +290,8 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
 
 
 def _repeats(columns: Mapping[str, np.ndarray[Any, Any]], numbers: list[int], time: str | None) -> list[str]:
+    if not columns:
+        return []
     first_row: dict[tuple[float, ...], int] = {}
     twice = []
     for n, row in zip(numbers, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):

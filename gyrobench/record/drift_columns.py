@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +142,44 @@ def _of_run(record: Record, source: Path, channel: str) -> Table:
         yield {c.name: np.asarray(columns[c.name], dtype=float) for c in asked if c.name in columns}
 
     return Table(source, head, len(next(iter(columns.values()), ())), blocks)
+
+
+def harmonic_names(order: int) -> list[str]:
+    """Return the names of the columns of :func:`with_harmonics`: cosθ, sinθ, cos2θ ..."""
+    return [f"{f}{n if n > 1 else ''}θ" for n in range(1, order + 1) for f in ("cos", "sin")]
+
+
+def with_harmonics(table: Table, column: str, order: int) -> Table:
+    """Return the table with cos nθ and sin nθ, n = 1 ... ``order``, in place of a column of angles θ.
+
+    Raises DataError for a column that is missing or no angle, and for angles so far apart that n θ is not followed.
+    """
+    there = named(table.head)
+    if column not in there:
+        raise DataError(table.source, [f"column '{column}' is missing; columns of the file: {', '.join(there)}"])
+    unit = there[column] or "1"
+    if units.unit(unit).exponents != units.unit("rad").exponents or unit == "1":
+        raise DataError(table.source, [f"column '{column}': [{unit}] is no angle; write '{column} [deg]'"])
+    angle, names = Column(column, "rad", "angle of the table"), harmonic_names(order)
+    rest = [n for n in table.head.names if n.partition("[")[0].strip() != column]
+    head = replace(table.head, names=[*rest, *(f"{n} [1]" for n in names)])
+
+    def blocks(columns: Sequence[Column]) -> Blocks:
+        own = [c for c in columns if c.name not in names]
+        for block in table.blocks([*own, angle]):
+            theta = block.pop(column)
+            step = np.abs((np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi)
+            if step.size and order * float(np.nanmedian(step)) > 0.5 * np.pi:
+                raise DataError(
+                    table.source,
+                    [f"column '{column}': {np.degrees(np.nanmedian(step)):.3g} deg from sample to sample; harmonic "
+                     f"{order} needs {90.0 / order:.3g} deg at most"],
+                )  # fmt: skip
+            turned = np.arange(1, order + 1)[:, None] * theta
+            yield {**block, **dict(zip(names, np.stack([np.cos(turned), np.sin(turned)], 1).reshape(-1, theta.size),
+                                       strict=True))}  # fmt: skip
+
+    return replace(table, head=head, blocks=blocks)
 
 
 def named(head: Head) -> dict[str, str | None]:

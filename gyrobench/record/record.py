@@ -81,6 +81,8 @@ def read_table(stem: Path) -> dict[str, Array] | None:
         with text.open(newline="", encoding="utf-8") as f:
             names, *rows = list(csv.reader(f))
         columns = [np.array([float(r[k]) for r in rows]) for k in range(len(names))]
+        if wrong := [n for n, c in zip(names, columns, strict=True) if n in WHOLE and not np.all(np.abs(c) < 2.0**53)]:
+            raise ValueError(f"column '{wrong[0]}' holds numbers that are not whole")
         return {n: c.astype(np.int64) if n in WHOLE else c for n, c in zip(names, columns, strict=True)}
     return None
 
@@ -125,7 +127,7 @@ class Record(Displayed):
         try:
             windows = read_table(folder / "record")
             channels = read_table(folder / "channels")
-        except (OSError, ValueError, IndexError) as error:
+        except (OSError, ValueError, IndexError, NotImplementedError, csv.Error) as error:
             raise RecordError(f"{folder}: not a readable record: {error}") from None
         if windows is None:
             raise RecordError(f"{folder}: has run.json but neither record.parquet nor record.csv")

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, WithJsonSchema
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
@@ -213,8 +213,7 @@ class RunDocument(Document):
     spec: list[str] = Field(default_factory=list, description="identifiers of the methods")
     measured: bool = Field(default=False, description="true: the data come from a laboratory")
     step: float = Field(default=0.0, description="communication step, s")
-    engine: str = Field(default="", description="native or reference")
-    isolated: list[str] = Field(default_factory=list, description="slots whose FMU ran in a process of its own")
+    engine: str = Field(default="", description="native, linked (native, in any case in the linked form) or reference")
     order: list[str] = Field(default_factory=list, description="slots in the order of execution")
     cuts: list[str] = Field(default_factory=list, description="connections that carry the value of the step before")
     delays: dict[str, float] = Field(default_factory=dict, description="connection -> delay, s")
@@ -231,6 +230,7 @@ class RunDocument(Document):
     steps: int = Field(default=0, description="communication steps done")
     stopped_at: float | None = Field(default=None, description="simulated time at the end, s")
     resumed_at: list[float] = Field(default_factory=list, description="simulated times at which it was continued, s")
+    linked: bool = Field(default=False, description="the native engine ran in its linked form")
     problem: str = Field(default="", description="why the run is not complete")
     tables: dict[str, str] = Field(default_factory=dict, description="file of the record -> SHA-256")
     data: DataFile | None = None
@@ -289,17 +289,13 @@ SUITE_KEYS = {"identity", "runs", "tests"}
 def read_run(folder: Path) -> RunDocument | SuiteDocument:
     """Return the run.json of a folder.  Raises RecordError where there is none that can be read."""
     file = Path(folder) / FILE
+    data = reading.json_object(reading.read_text(file, RecordError), file, RecordError)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        if not isinstance(data, dict):
-            raise ValueError("a JSON object is expected")
         return (SuiteDocument if SUITE_KEYS & data.keys() else RunDocument).model_validate(data)
     except ValidationError as error:
         problems = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
         shown = "; ".join([*problems[:3], *([f"and {len(problems) - 3} more"] if len(problems) > 3 else [])])
         raise RecordError(f"{file}: not a run.json of gyrobench: {shown}") from None
-    except (OSError, ValueError) as error:
-        raise RecordError(f"{file}: not a readable run.json: {error}") from None
 
 
 def schema() -> dict[str, Any]:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.record.csv_reader import Column, DataError, Head, header_places
+from gyrobench.record.csv_reader import Column, DataError, Head, check_utf8, header_places
 from gyrobench.record.sampling import Successive
 
 Array = NDArray[np.float64]
@@ -47,6 +47,7 @@ def read_blocks(file: Path, head: Head, columns: Sequence[Column]) -> Iterator[d
     places, problems = header_places(head.names, {c.name: c for c in columns})
     if problems:
         raise DataError(file, problems)
+    check_utf8(file)  # pyarrow would print the failure of its own decoding
     wrong: list[str] = []
 
     def incomplete(row: Any) -> str:
@@ -61,10 +62,7 @@ def read_blocks(file: Path, head: Head, columns: Sequence[Column]) -> Iterator[d
             rows += batch.num_rows
             yield {n: places[n][1].to_si(_floats(batch.column(c))) for n, c in taken.items()}
     except pa.ArrowInvalid as error:
-        try:
-            problems = _not_numbers(file, head, taken)
-        except pa.ArrowInvalid:
-            problems = ["holds text that is not UTF-8; save the table as CSV (UTF-8)"]
+        problems = _not_numbers(file, head, taken)
         raise DataError(file, problems or [str(error)]) from None
     if wrong:
         many = f"{len(wrong)} rows have" if len(wrong) > 1 else "a row has"

@@ -19,7 +19,8 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-NORMAL = 1.959963984540054
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+
 ROUNDING = 1e-12  # relative
 LEVEL = 0.05  # largest chance of a false rank among equal candidates
 

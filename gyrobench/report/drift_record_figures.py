@@ -26,7 +26,7 @@ MARKS = ("o", "s", "^")
 
 
 def record(column: Json, key: str) -> str:
-    """Band of extremes and line of means against time; broken at gaps."""
+    """Band of extremes and line of means against time, broken at gaps; smoothed drift with its band over it."""
     r = column["record"]
     t, low, mean, high = finite(r["t"], r["low"], r["mean"], r["high"])
     if len(t) < 3:
@@ -40,6 +40,10 @@ def record(column: Json, key: str) -> str:
         x = [v / divisor for v in t[a:b]]
         ax.fill_between(x, low[a:b], high[a:b], color=BLUE, alpha=0.25, linewidth=0)
         ax.plot(x, mean[a:b], color=BLUE, linewidth=0.8)
+    if s := r.get("smoothed"):
+        x = [v / divisor for v in s["t"]]
+        ax.fill_between(x, s["low"], s["high"], color=VERMILION, alpha=0.35, linewidth=0)
+        ax.plot(x, s["mean"], color=VERMILION, linewidth=1.0)
     if min(low) < 0.0 < max(high):
         zero_line(ax)
     ax.margins(x=0.01)

@@ -26,6 +26,10 @@ from gyrobench.report.style import styled
 from gyrobench.report.tables import how_tables, words
 
 Json = dict[str, Any]
+SMOOTHED = (
+    " Red: Gauss–Markov drift of the longest stretch, lines and columns taken out, smoothed from all samples, with its "
+    "95 % band, if its correlation time and sizes are those that were estimated."
+)
 
 
 def page(doc: Json) -> Page:
@@ -56,10 +60,11 @@ def _sections(doc: Json, k: int, of: str) -> list[Section]:
     def part(title: str, slug: str, blocks: Sequence[Any], sub: bool = True) -> Section:
         return Section(title, f"{slug}-{k + 1}", [*_texts(c, slug), *blocks, *_tables(doc, k, slug)], sub=sub)
 
+    smoothed = SMOOTHED if "smoothed" in c["record"] else ""
     record = Picture(
         f"{key}-record", figures.record(c, f"{key}-record"),
         "Rate of the record: band from the smallest to the largest value of each interval, line through the means. "
-        "White: no samples.", "Rate against time with gaps", zoom=True,
+        "White: no samples." + smoothed, "Rate against time with gaps", zoom=True,
     )  # fmt: skip
     allan = Picture(
         f"{key}-deviations", figures.deviations(c, f"{key}-deviations"),

@@ -28,6 +28,7 @@ class Cell:
     pointer: str = ""  # where it stands in result.json
     mark: str = ""  # pass | fail | inconclusive | void | warn | strong | ""
     number: bool = False
+    link: str = ""  # what the text leads to, on the page
 
 
 @dataclass
@@ -94,6 +95,14 @@ class BulletList:
     items: list[str]
     kind: str = "items"
     warn: bool = False
+
+
+@dataclass
+class Markup:
+    """A piece of a page that a script fills; not for paper."""
+
+    html: str
+    kind: str = "markup"
 
 
 @dataclass
@@ -193,8 +202,8 @@ def pictures(*items: Picture) -> list[Any]:
     return [Pictures(shown)] if shown else []
 
 
-def text_cell(value: Any, mark: str = "") -> Cell:
-    return Cell(text="" if value is None else str(value), mark=mark)
+def text_cell(value: Any, mark: str = "", link: str = "") -> Cell:
+    return Cell(text="" if value is None else str(value), mark=mark, link=link)
 
 
 def number_cell(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.reduction.ranking import NORMAL, Candidate, rank
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.ranking import Candidate, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 
 Json = dict[str, Any]

@@ -59,7 +59,7 @@ def write(
 
         return result_page.page(doc, record)
 
-    return _write(doc, page, Path(folder), formats, NAMES, bench)
+    return write_files(doc, page, Path(folder), formats, NAMES, bench)
 
 
 def compare(
@@ -77,10 +77,10 @@ def compare(
     from gyrobench.report import comparison_page
 
     doc = comparison_page.comparison(results, baseline)
-    return _write(doc, lambda: comparison_page.page(doc), Path(folder), formats, COMPARISON_NAMES, bench)
+    return write_files(doc, lambda: comparison_page.page(doc), Path(folder), formats, COMPARISON_NAMES, bench)
 
 
-def _write(
+def write_files(
     doc: dict[str, Any],
     view: Callable[[], Page],
     folder: Path,
@@ -88,6 +88,7 @@ def _write(
     names: Mapping[str, str],
     bench: Path | None,
 ) -> dict[str, Path]:
+    """Write a document and its page into a folder; as :func:`write`.  view: the page, made where it is needed."""
     unknown = [f for f in formats if f not in FORMATS]
     if unknown:
         raise ValueError(f"unknown report format {unknown[0]!r}; there are {', '.join(FORMATS)}")

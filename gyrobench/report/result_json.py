@@ -14,6 +14,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 from gyrobench.result import Result
 
@@ -56,11 +57,8 @@ def report_id(result: Result) -> str:
 
 def load(text: str) -> Result:
     """Return the Result in the text of a ``result.json``; raises ResultError for any other text."""
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise ResultError(f"not a JSON text: {error}") from None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+    data = reading.json_object(text, "result.json", ResultError)
+    if data.get("schema") != SCHEMA:
         raise ResultError(f"not a result of gyrobench: 'schema' must be {SCHEMA!r}")
     for key in ("schema", "report_id", "derived"):
         data.pop(key, None)

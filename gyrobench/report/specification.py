@@ -10,15 +10,17 @@ max = 1.5
 
 from __future__ import annotations
 
-import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 from gyrobench.result import Specification
 
 _UNITS = {"deg/h": "°/h", "deg/h/g": "°/h/g", "deg/h/g2": "°/h/g²", "deg/h/g^2": "°/h/g²"}
+
+
+LARGEST = 1e300  # of a limit
 
 
 class SpecificationError(GyrobenchError, ValueError):
@@ -57,10 +59,7 @@ def check_units(path: str | Path, units: dict[str, str]) -> None:
 
 
 def _entries(path: Path) -> dict[str, dict[str, Any]]:
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SpecificationError(f"{path}: not a TOML file: {error}") from error
+    data = reading.toml(reading.read_text(path, SpecificationError), path, SpecificationError)
     unknown = set(data) - {"title", "note", "coefficients"}
     if unknown:
         raise SpecificationError(f"{path}: unknown key {sorted(unknown)[0]!r}; allowed are title, note, coefficients")
@@ -84,7 +83,7 @@ def _check(path: Path, name: str, entry: Any) -> None:
     for side in ("min", "max"):
         value = entry.get(side)
         if side in entry and (
-            isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value)
+            isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST
         ):
             raise SpecificationError(f"{where}: {side} must be a finite number, not {value!r}")
         if side in entry:

@@ -184,9 +184,7 @@ def how_tables(doc: Any) -> list[Any]:
         columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
         blocks.append(Table(columns, rows, "Components in their slots, with the computing time of each.", small=True))
     blocks += _changed(doc) + _defaults(doc)
-    facts = [
-        k for k in ("seed", "step", "engine", "isolated", "complete", "stopped_at") if run.get(k) not in (None, [])
-    ]
+    facts = [k for k in ("seed", "step", "engine", "complete", "stopped_at") if run.get(k) is not None]
     if facts:
         units = {"step": "s", "stopped_at": "s"}
         rows = [

@@ -6,7 +6,14 @@ mapping file (TOML): one table for each connector whose name or unit differs,
     [u]                        # connector of the socket
     name = "pickoff_mV"        # the FMU's variable; an array: names = ["wx", "wy", "wz"]
     unit = "mV"                # optional where the FMU declares a unit that can be understood
-    factor = -1                # optional: connector = factor * variable (after the unit conversion)
+    factor = -1                # optional: connector = factor * variable + offset, in SI; the unit is converted first
+    offset = "20mV"            # optional: a number in SI, or a text with its unit
+    feedthrough = false        # an output: it follows no input within a step.  An input: no output follows it so
+    delay = 1                  # its wires carry the value of the previous communication step
+
+    [saturated]
+    constant = 0               # an output that the FMU does not have.  With a name, an input: the FMU keeps this value;
+                               # without one: the FMU has no such input and behaves as if it had this value
 
     [parameters.step]          # parameters that the system sets, in the same way
     name = "dt"
@@ -23,40 +30,64 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.connectors import QUANTITIES
+from gyrobench.system.fmu_variables import Variable, variables
+from gyrobench.system.mapping_proposal import propose
 from gyrobench.system.sockets import Connector, Socket, element_names
-from gyrobench.system.values import flatten
+from gyrobench.system.values import InvalidValueError, flatten, parse
 
-FMI_TYPES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+NUMBERS = ("Real", "Integer", "Boolean")
+KEYS_SHOWN = ("name or names", "unit", "factor", "offset", "constant", "feedthrough", "delay")
+KEYS = {"name", "names", *KEYS_SHOWN[1:]}
 
 
 class SocketMismatchError(GyrobenchError):
-    """An FMU does not fit its socket; ``problems`` is the list of single findings."""
+    """An FMU does not fit its socket; ``problems`` is the list of single findings, ``proposal`` lines of a mapping."""
 
-    def __init__(self, head: str, problems: list[str]) -> None:
-        self.problems = problems
-        super().__init__("\n".join([head, *(f"  - {p}" for p in problems)]))
+    def __init__(self, head: str, problems: list[str], proposal: Sequence[str] = ()) -> None:
+        self.problems, self.proposal = problems, list(proposal)
+        lines = ["mapping lines that may fit (check units, signs and axes):", *(f"    {x}" for x in proposal)]
+        super().__init__("\n".join([head, *(f"  - {p}" for p in problems), *(lines if proposal else [])]))
 
 
 @dataclass(frozen=True)
 class Bound:
-    """One scalar variable of an FMU; connector value (SI) = ``gain`` * variable value."""
+    """One scalar variable of an FMU; connector value (SI) = ``gain`` * variable value + ``offset``.
+
+    constant: the value of an output that the FMU does not have; ``reference`` is then -1.
+    """
 
     element: str  # "omega[1]"
     variable: str
     reference: int
-    kind: str  # "Real" | "Integer" | "Boolean"
+    kind: str  # "Real" | "Integer" | "Boolean" | "String"
     gain: float = 1.0
     unit: str = ""
+    type: str = "Real"  # as the FMU declares it: that of the calls that get and set it
+    index: int = 0  # place in an array
+    size: int = 0  # elements of the array, 0: a scalar
+    offset: float = 0.0
+    constant: float | None = None
+
+    def si(self, value: Any) -> Any:
+        """Return a value of the variable as the connector's."""
+        if self.kind != "Real" or (self.gain == 1.0 and self.offset == 0.0):
+            return value
+        return value * self.gain + self.offset if self.offset else value * self.gain
+
+    def own(self, value: Any) -> Any:
+        """Return a value of the connector as the variable's."""
+        if self.kind != "Real" or (self.gain == 1.0 and self.offset == 0.0):
+            return value
+        return (value - self.offset) / self.gain
 
 
 @dataclass
@@ -70,6 +101,9 @@ class Binding:
     parameters: dict[str, Bound] = field(default_factory=dict)
     constants: dict[str, Any] = field(default_factory=dict)  # values that the mapping file states, SI
     absent: list[str] = field(default_factory=list)  # optional connectors the FMU does not have
+    held: dict[str, list[tuple[Bound, Any]]] = field(default_factory=dict)  # inputs at a constant: name -> SI values
+    no_feedthrough: set[str] = field(default_factory=set)  # variables without it, by the mapping file
+    delayed: set[str] = field(default_factory=set)  # elements whose wires carry the value of the previous step
     warnings: list[str] = field(default_factory=list)
 
 
@@ -77,17 +111,27 @@ def load_mapping(file: Path | None) -> dict[str, Any]:
     """Reads a mapping file; None gives the empty mapping.  Raises SocketMismatchError when it is not readable."""
     if file is None:
         return {}
-    try:
-        return tomllib.loads(Path(file).read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SocketMismatchError(f"mapping file {file}", [str(error)]) from None
+    return parse_mapping(reading.read_text(Path(file), _unreadable), str(file))
+
+
+def parse_mapping(text: str, file: str) -> dict[str, Any]:
+    """Return the mapping of a text.  Raises SocketMismatchError when it is not TOML."""
+    return reading.toml(text, file, _unreadable)
+
+
+def _unreadable(why: str) -> SocketMismatchError:
+    return SocketMismatchError("mapping file", [why])
+
+
+def _bound(element: str, v: Variable, gain: float, unit: str, offset: float = 0.0) -> Bound:
+    return Bound(element, v.name, v.reference, v.kind, gain, unit, v.type, v.index, v.size, offset)
 
 
 class _Fitter:
     def __init__(self, slot: str, socket: Socket, description: Any, mapping: Mapping[str, Any]) -> None:
         self.binding = Binding(slot, socket)
         self.socket, self.mapping = socket, mapping
-        self.variables = {v.name: v for v in description.modelVariables}
+        self.variables = variables(description)
         self.units = {u.name: u for u in description.unitDefinitions}
         self.problems: list[str] = []
 
@@ -105,28 +149,32 @@ class _Fitter:
             return None
         return u.exponents, u.factor, u.offset
 
-    def gain(self, element: str, wanted: str, variable: Any, entry: Mapping[str, Any]) -> tuple[float, str] | None:
-        """(gain, unit name) of one variable, or None after noting a problem."""
-        factor = float(entry.get("factor", 1.0))
-        if not math.isfinite(factor) or factor == 0.0:
+    def gain(
+        self, element: str, wanted: str, variable: Variable, entry: Mapping[str, Any]
+    ) -> tuple[float, str, float] | None:
+        """(gain, unit name, offset) of one variable, or None after noting a problem."""
+        factor = self.number(element, "factor", entry, "1", 1.0)
+        offset = self.number(element, "offset", entry, wanted, 0.0)
+        if factor is None or offset is None:
+            return None
+        if factor == 0.0:
             self.problems.append(f"{element}: factor {factor} in the mapping: must be finite and not 0")
             return None
-        declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
-        name = str(entry.get("unit") or declared or "")
+        name = str(entry.get("unit") or variable.unit)
         if not wanted:
-            return factor, name
+            return factor, name, offset
         target = units.unit(wanted)
         if not name:
-            if wanted != "1" and FMI_TYPES.get(variable.type) == "Real":
+            if wanted != "1" and variable.kind == "Real":
                 self.binding.warnings.append(f"{element}: variable {variable.name} declares no unit; taken as {wanted}")
-            return factor, wanted
+            return factor, wanted, offset
         fits = ", ".join(units.fitting(wanted)[:6])
         known = self.understood(name)
         if known is None:
             self.problems.append(f"{element}: unit '{name}' of {variable.name} is not known and has no BaseUnit; "
                                  f'give unit = "..." in the mapping ({fits})')  # fmt: skip
             return None
-        exponents, scale, offset = known
+        exponents, scale, zero = known
         if exponents != target.exponents:
             if exponents[:-1] != target.exponents[:-1] or "Hz" in name:
                 self.problems.append(f"{element}: wrong unit: {variable.name} is in {name}, the socket needs {wanted} "
@@ -135,10 +183,16 @@ class _Fitter:
             self.binding.warnings.append(
                 f"{element}: {variable.name} is in {name}, which has no rad; taken as {wanted}"
             )
-        if offset or target.offset:
-            self.problems.append(f"{element}: unit {name} has an offset and cannot be connected by a factor")
+        gain = scale / target.factor
+        return factor * gain, name, factor * (zero / target.factor) + offset
+
+    def number(self, element: str, key: str, entry: Mapping[str, Any], unit: str, default: float) -> float | None:
+        """Return a number of a mapping entry in SI, or None after noting a problem."""
+        try:
+            return float(parse(f"{key}", entry.get(key, default), unit or "1"))
+        except (InvalidValueError, TypeError) as error:
+            self.problems.append(f"{element}: in the mapping: {error}")
             return None
-        return factor * (scale / target.factor), name
 
     # ------------------------------------------------------------------------------ names
     def entry(self, name: str, element: str, index: int, mapping: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
@@ -146,8 +200,8 @@ class _Fitter:
         entry = mapping.get(element, mapping.get(name, {}))
         if isinstance(entry, str):
             entry = {"name": entry}
-        if not isinstance(entry, Mapping) or not set(entry) <= {"name", "names", "unit", "factor"}:
-            self.problems.append(f"{element}: mapping entry must be a table with name or names, unit, factor")
+        if not isinstance(entry, Mapping) or not set(entry) <= KEYS:
+            self.problems.append(f"{element}: mapping entry must be a table with {', '.join(KEYS_SHOWN)}")
             return element, {}
         if "names" in entry:
             names = entry["names"]
@@ -184,6 +238,9 @@ class _Fitter:
     def fit_connector(self, c: Connector) -> None:
         mapped = c.name in self.mapping or any(e in self.mapping for e in c.elements)
         names = [self.entry(c.name, e, k, self.mapping) for k, e in enumerate(c.elements)]
+        if any("constant" in entry for _, entry in names):
+            self.fit_constant_connector(c, names)
+            return
         if c.optional and not mapped and not any(n in self.variables for n, _ in names):
             self.binding.absent.append(c.name)
             return
@@ -197,15 +254,13 @@ class _Fitter:
                 was = f"{name} is {variable.causality}, must be {c.causality}"
                 self.problems.append(f"{element}: wrong causality: {was}; {self.would_fit(name, c)}")
                 continue
-            kind = FMI_TYPES.get(variable.type, "")
-            allowed = ("Real", "Integer", "Boolean") if c.whole else ("Real",)
-            if kind not in allowed or variable.dimensions:
-                shape = " array" if variable.dimensions else ""
+            allowed = NUMBERS if c.whole else ("Real",)
+            if variable.kind not in allowed:
                 self.problems.append(
-                    f"{element}: wrong type: {name} is {variable.type}{shape}, must be {' or '.join(allowed)}"
+                    f"{element}: wrong type: {name} is {variable.type}, must be {' or '.join(allowed)}"
                 )
                 continue
-            given = str(variable.quantity or getattr(variable.declaredType, "quantity", None) or "").lower()
+            given = variable.quantity.lower()
             if c.quantity and given in QUANTITIES and given != c.quantity:
                 self.problems.append(
                     f"{element}: wrong quantity: {name} is for {QUANTITIES[given]}, here the {c.meaning} stands for "
@@ -215,18 +270,74 @@ class _Fitter:
             found = self.gain(element, c.unit, variable, entry)
             if found is not None:
                 ports = self.binding.inputs if c.causality == "input" else self.binding.outputs
-                ports[element] = Bound(element, name, int(variable.valueReference), kind, *found)
+                ports[element] = _bound(element, variable, *found)
+                self.fit_timing(element, name, entry)
+
+    def fit_timing(self, element: str, variable: str, entry: Mapping[str, Any]) -> None:
+        """Note feedthrough and delay of a mapping entry."""
+        if "feedthrough" in entry:
+            if entry["feedthrough"] is not False:
+                self.problems.append(
+                    f"{element}: feedthrough = {entry['feedthrough']} in the mapping: false is the only value; without "
+                    "it the dependencies hold that the FMU declares"
+                )
+            self.binding.no_feedthrough.add(variable)
+        if "delay" in entry:
+            if entry["delay"] != 1 or isinstance(entry["delay"], bool):
+                self.problems.append(
+                    f"{element}: delay = {entry['delay']} in the mapping: 1 is the only value, one communication step"
+                )
+            self.binding.delayed.add(element)
+
+    def fit_constant_connector(self, c: Connector, names: list[tuple[str, Mapping[str, Any]]]) -> None:
+        """Note a connector with a constant: an output that the FMU lacks, an input at a fixed value or lacking."""
+        held: list[tuple[Bound, Any]] = []
+        for k, (element, (name, entry)) in enumerate(zip(c.elements, names, strict=True)):
+            if set(entry) & {"feedthrough", "delay", "factor", "offset"} or "constant" not in entry:
+                self.problems.append(f"{element}: a constant in the mapping goes with name and unit only")
+                return
+            given = list(flatten("", entry["constant"]).values())
+            if len(given) not in (1, len(c.elements)):
+                self.problems.append(f"{element}: {len(given)} constants in the mapping for {len(c.elements)} elements")
+                return
+            one = {"constant": given[0] if len(given) == 1 else given[k]}
+            unit = entry.get("unit")
+            if unit is not None and not isinstance(one["constant"], str):
+                one["constant"] = f"{one['constant']!r}{unit}"
+            value = self.number(element, "constant", one, c.unit, 0.0)
+            if value is None:
+                return
+            variable = self.variables.get(name) if set(entry) & {"name", "names"} else None
+            if c.causality == "output":
+                if variable is not None:
+                    self.problems.append(f"{element}: either constant or the FMU's output {name}, not both")
+                self.binding.outputs[element] = Bound(element, "", -1, "Real", unit=c.unit, constant=value)
+            elif variable is not None:
+                own = {key: v for key, v in entry.items() if key == "unit"} if c.unit else {}
+                found = self.gain(element, c.unit, variable, own)
+                if variable.causality != "input" or variable.kind not in NUMBERS:
+                    self.problems.append(f"{element}: {name} is {variable.causality}, must be input")
+                elif found is not None:
+                    kind = {"Integer": int, "Boolean": bool}.get(variable.kind, float)
+                    held.append((_bound(element, variable, *found), kind(value)))
+            elif set(entry) & {"name", "names"}:
+                self.problems.append(f"{element}: missing: no variable '{name}'; {self.would_fit(name, c)}")
+        if c.causality == "input":
+            self.binding.held[c.name] = held
 
     def fit_extras(self) -> None:
         """Inputs and outputs beyond the socket, under their own names and in SI."""
         used = {b.variable for b in (*self.binding.inputs.values(), *self.binding.outputs.values())}
+        used |= {b.variable for held in self.binding.held.values() for b, _ in held}
         for name, v in self.variables.items():
-            kind = FMI_TYPES.get(v.type)
-            if v.causality in ("input", "output") and kind and name not in used and not v.dimensions:
-                known = self.understood(v.unit) if v.unit else None
-                gain = known[1] if known and not known[2] else 1.0
+            if v.causality in ("input", "output") and v.kind in NUMBERS and name not in used:
                 ports = self.binding.inputs if v.causality == "input" else self.binding.outputs
-                ports.setdefault(name, Bound(name, name, int(v.valueReference), kind, gain, v.unit or ""))
+                ports.setdefault(name, _bound(name, v, self.own_gain(v), v.unit))
+
+    def own_gain(self, v: Variable) -> float:
+        """Factor to SI by the declared unit of a variable."""
+        known = self.understood(v.unit) if v.unit else None
+        return known[1] if known and not known[2] else 1.0
 
     def fit_constant(self, name: str, entry: Mapping[str, Any]) -> None:
         """Note a value that the mapping file states, a number or nested lists of numbers."""
@@ -257,24 +368,17 @@ class _Fitter:
                     near = difflib.get_close_matches(name, free, n=3) or free[:6]
                     self.problems.append(f"parameters.{ours}: no parameter '{name}'; nearest: {', '.join(near)}")
                     continue
-                unit = entry.get("unit") or v.unit or ""
+                unit = entry.get("unit") or v.unit
                 known = self.understood(unit) if unit else (None, 1.0, 0.0)
                 if known is None or known[2]:
                     self.problems.append(f"parameters.{ours}: unit '{unit}' has no factor to SI")
                     continue
                 gain = float(entry.get("factor", 1.0)) * known[1]
-                self.binding.parameters[element] = Bound(
-                    element, name, int(v.valueReference), FMI_TYPES[v.type], gain, unit
-                )
+                self.binding.parameters[element] = _bound(element, v, gain, unit)
                 mapped.add(name)
         for name, v in self.variables.items():
-            if v.causality == "parameter" and name not in mapped and v.type in (*FMI_TYPES, "String"):
-                known = self.understood(v.unit) if v.unit else None
-                gain = known[1] if known and not known[2] else 1.0
-                kind = FMI_TYPES.get(v.type, "String")
-                self.binding.parameters.setdefault(
-                    name, Bound(name, name, int(v.valueReference), kind, gain, v.unit or "")
-                )
+            if v.causality == "parameter" and name not in mapped and v.kind:
+                self.binding.parameters.setdefault(name, _bound(name, v, self.own_gain(v), v.unit))
 
 
 def fit(socket: Socket, description: Any, mapping: Mapping[str, Any] | None = None, slot: str = "") -> Binding:
@@ -297,7 +401,7 @@ def fit(socket: Socket, description: Any, mapping: Mapping[str, Any] | None = No
     fitter.fit_parameters()
     if fitter.problems:
         where = f"slot {slot}: " if slot else ""
-        raise SocketMismatchError(
-            f"{where}FMU '{description.modelName}' does not fit socket {socket.name}", fitter.problems
-        )
+        lines = [x for p in propose(socket, description, fitter.mapping) if p.found for x in p.lines]
+        head = f"{where}FMU '{description.modelName}' does not fit socket {socket.name}"
+        raise SocketMismatchError(head, fitter.problems, lines)
     return fitter.binding

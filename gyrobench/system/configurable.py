@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self
 
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
+from gyrobench.reading import shorten
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.values import InvalidValueError, flatten, parse
 
@@ -55,6 +56,8 @@ class Option:
         """The SI value; raises InvalidValueError for a wrong dimension or a broken bound."""
         unit = "1" if isinstance(self.unit, type) else self.unit
         number = parse(name, value, unit, self.kind)
+        if isinstance(number, list) and not isinstance(self.default, list | tuple):
+            raise InvalidValueError(f"{name} = {shorten(str(value))}: a list, where one value is expected")
         if not isinstance(number, str | list):
             given = value.strip() if isinstance(value, str) else f"{number:g}"
             if self.min is not None and not number >= self.min:

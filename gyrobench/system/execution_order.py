@@ -25,15 +25,15 @@ Port = tuple[str, str]  # (part, variable)
 
 
 class AlgebraicLoopError(GyrobenchError):
-    """A loop in which every part passes its input on at once; ``loop`` lists its ports."""
+    """A loop in which every part passes its input on at once; ``loop`` lists its ports, ``remedy`` what opens it."""
 
-    def __init__(self, loop: list[Port]) -> None:
+    def __init__(self, loop: list[Port], remedy: str = "") -> None:
         self.loop = loop
         names = " -> ".join(f"{p}.{v}" for p, v in [*loop, loop[0]])
         super().__init__(
             f"algebraic loop: {names}. Every part of it has direct feedthrough, so no execution order exists; use a "
             "part whose output does not depend on that input at once, or declare the dependencies of its outputs "
-            "(ModelStructure) if it does not"
+            "(ModelStructure) if it does not" + (f"\n  {remedy}" if remedy else "")
         )
 
 
@@ -72,22 +72,6 @@ class Order:
             "cuts": [str(c) for c in self.cuts],
             "delays": {c.wire: c.steps * step for c in self.cuts},
         }
-
-
-def feedthrough(description: Any) -> dict[str, set[str]]:
-    """Inputs on which each output of an FMU depends at once (FMPy model description).
-
-    An output without a ``dependencies`` attribute, or not listed under ModelStructure/Outputs, depends on
-    all inputs.
-    """
-    inputs = {v.name for v in description.modelVariables if v.causality == "input"}
-    declared = {u.variable.name: u.dependencies for u in description.outputs if u.variable is not None}
-    result = {}
-    for v in description.modelVariables:
-        if v.causality == "output":
-            known = declared.get(v.name)
-            result[v.name] = set(inputs) if known is None else inputs & {d.name for d in known}
-    return result
 
 
 def _algebraic_loop(links: Sequence[Link], through: Mapping[str, Mapping[str, set[str]]]) -> list[Port] | None:
@@ -179,7 +163,7 @@ def execution_order(
 ) -> Order:
     """Order and cuts of the parts (in declared order) under the given connections.
 
-    through: for each part, output -> inputs with direct feedthrough (see :func:`feedthrough`).
+    through: for each part, output -> inputs with direct feedthrough (gyrobench.system.fmu_variables.feedthrough).
     Raises :class:`AlgebraicLoopError`.
     """
     loop = _algebraic_loop(links, through)

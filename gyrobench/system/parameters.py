@@ -10,6 +10,7 @@ from typing import Any
 from gyrobench import units
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.binding import Binding, Bound
+from gyrobench.system.fmu_variables import variables
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError, flatten, nest, parse
@@ -31,13 +32,13 @@ def defaults(assembly: Assembly) -> dict[str, Any]:
     """
     found: dict[str, Any] = {}
     for slot, binding in assembly.bindings.items():
-        starts = {v.name: v.start for v in assembly.descriptions[slot].modelVariables}
+        own = variables(assembly.descriptions[slot])
         for name, bound in binding.parameters.items():
-            text = starts.get(bound.variable)
+            text = own[bound.variable].start
             if text is None:
                 continue
             if bound.kind == "Real":
-                found[f"{slot}.{name}"] = float(text) if bound.gain == 1.0 else float(text) * bound.gain
+                found[f"{slot}.{name}"] = bound.si(float(text))
             elif bound.kind == "Integer":
                 found[f"{slot}.{name}"] = int(text)
             elif bound.kind == "Boolean":
@@ -121,7 +122,7 @@ def resolve(
         slot, _, variable = name.partition(".")
         if variable in variables[slot]:
             element, known = variables[slot][variable]
-            raw[f"{slot}.{element}"] = value * known.gain if known.kind == "Real" else value
+            raw[f"{slot}.{element}"] = known.si(value)
         else:
             notes.append(f"{name}: no parameter or input of that name; not set")
     chosen.update(raw)
@@ -149,5 +150,7 @@ def resolve(
         slot, _, parameter = name.partition(".")
         bound = _target(parameter, assembly.bindings[slot])
         assert bound is not None
-        starts[slot].append((bound, value / bound.gain if bound.kind == "Real" and bound.gain != 1.0 else value))
+        starts[slot].append((bound, bound.own(value)))
+    for slot, binding in assembly.bindings.items():
+        starts[slot] += [(bound, bound.own(value)) for held in binding.held.values() for bound, value in held]
     return starts, nest({**base, **chosen}), notes

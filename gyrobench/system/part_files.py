@@ -14,12 +14,13 @@ def resolve_parts(
     target: str,
     bench: Path | None,
     notes: list[str],
+    prebuilt: Mapping[str, Path] | None = None,
 ) -> tuple[dict[str, Path], dict[str, str]]:
     """Paths of the FMUs of all slots, and the target of those that were built (slot -> "native" | "python").
 
     Something that ends in .fmu is a file; anything else is the name of a part of the bench, built if needed.
-    Without a compiler the Python target is built, with a note.  Raises InvalidConfigurationError, BenchError and
-    BuildError.
+    Without a compiler the Python target is built, with a note.  prebuilt: part of the bench -> its FMU, which was built
+    elsewhere.  Raises InvalidConfigurationError, BenchError and BuildError.
     """
     for slot in parts:
         system.request(slot)
@@ -36,6 +37,10 @@ def resolve_parts(
             paths[slot] = Path(part)
             if not paths[slot].is_file():
                 raise InvalidConfigurationError(system.name, [f"{slot}: no such file {part}"])
+            continue
+        if prebuilt and str(part) in prebuilt:
+            paths[slot] = prebuilt[str(part)]
+            built[slot] = "python" if paths[slot].stem.endswith("-python") else "native"
             continue
         from gyrobench.packaging import CompilerError, build
 

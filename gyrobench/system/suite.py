@@ -128,7 +128,7 @@ class Suite(Configurable):
         return {n: {**to_all[n], **to_one[n]} for n in members}
 
     def swaps(self, members: Mapping[str, System], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-        """Return the parts, mapping files or isolated slots that go to each test: to all with the slot.
+        """Return the parts or mapping files that go to each test: to all with the slot.
 
         Raises InvalidValueError for a slot that no test has.
         """

@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
+from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.system.configurable import Configurable, InvalidConfigurationError, Option, load_configurable
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
@@ -123,6 +124,7 @@ class System(Configurable):
     open: ClassVar[tuple[str, ...]] = ()  # "slot.input" left at its start value on purpose: no note says so
     #: of wires: "a.y -> b.u" -> factor, SI to SI (rad/s into A, too), or a function of the parts that gives it
     factors: ClassVar[Mapping[str, float | Callable[[PartValues], float]]] = {}
+    offsets: ClassVar[Mapping[str, float]] = {}  # of wires: added after the factor, SI
     raw: ClassVar[Mapping[str, Any]] = {}  # "slot.variable" -> start value in the FMU's own unit
     windows: ClassVar[Windows | None] = None
     done: ClassVar[str | None] = None  # "slot.output": the run ends when it is not 0
@@ -134,11 +136,15 @@ class System(Configurable):
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
     reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result
+    #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.campaign.design
+    protocol: ClassVar[str] = ""
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
     ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
+    seed: int = 1  # of a run that names none
     step: float = 1e-3  # s, communication step
     stop: float | None = None  # s, or a property; None: only `done` ends the run
 
@@ -235,13 +241,18 @@ class System(Configurable):
         """Return the result of a record, judged by the limits of ``specification`` where it has any.
 
         By the module that ``reduction`` names, unless a system overrides this method.  Raises UsageError for a system
-        with neither.
+        with neither, and for a record that lacks a column that is needed.
         """
         if not self.reduction:
             raise UsageError(f"{self.name} has no reduction")
         owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
         module = importlib.import_module(f".{self.reduction}", owner.__module__)
-        result: Result = module.from_record(record, specification)
+        try:
+            result: Result = module.from_record(record, specification)
+        except KeyError as error:
+            if error.args[0] in record.windows or error.args[0] not in {c.name for c in WINDOW_COLUMNS}:
+                raise
+            raise UsageError(f"column '{error.args[0]}' is missing in the windows of the record") from None
         return result
 
     @property

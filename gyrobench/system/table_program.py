@@ -11,14 +11,12 @@ table) and way (cumulative) may be left out.
 
 from __future__ import annotations
 
-import csv
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gyrobench import units
-from gyrobench.record.csv_reader import DataError
+from gyrobench import reading, units
+from gyrobench.record.csv_reader import DataError, cells_of
 
 KINDS = ("positions", "commands")
 WAYS = ("cumulative", "shorter", "up", "down")
@@ -74,7 +72,7 @@ def read_program(file: Path) -> Program:
 
 
 def _csv(file: Path, text: str) -> tuple[str, list[dict[str, str]]]:
-    lines = [row for row in csv.reader(line for line in text.splitlines() if not line.startswith("#")) if any(row)]
+    lines = [row for row in (cells_of(x) for x in text.splitlines() if not x.startswith("#")) if any(row)]
     if len(lines) < 2 or lines[0][0].strip() != "kind" or len(lines[0]) < 2:
         raise DataError(file, ["the first line must be 'kind,positions' or 'kind,commands', the second the columns"])
     names = [n.strip() for n in lines[1]]
@@ -90,7 +88,7 @@ def _csv(file: Path, text: str) -> tuple[str, list[dict[str, str]]]:
 
 def _json(file: Path, text: str) -> tuple[str, list[dict[str, str]]]:
     try:
-        document = json.loads(text)
+        document = reading.json_value(text, file.name, ValueError)
         rows = [{str(n): str(x) for n, x in row.items()} for row in document["entries"]]
         kind = str(document["kind"])
     except (ValueError, KeyError, TypeError, AttributeError) as error:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.errors import GyrobenchError
 
 
@@ -64,10 +63,7 @@ def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
         if kind is str:
             return text
         if text.startswith("["):
-            try:
-                value = json.loads(text)
-            except json.JSONDecodeError as error:
-                raise InvalidValueError(f"{name} = {text}: not a list: {error}") from None
+            value = reading.json_value(text, f"{name} = {reading.shorten(text)}", InvalidValueError)
         elif kind is bool and text.lower() in ("true", "false"):
             return text.lower() == "true"
         else:

@@ -10,7 +10,8 @@ from typing import Any
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
-from gyrobench.system.execution_order import Link, Order, execution_order, feedthrough
+from gyrobench.system.execution_order import AlgebraicLoopError, Cut, Link, Order, execution_order
+from gyrobench.system.fmu_variables import feedthrough
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System
@@ -26,7 +27,10 @@ class WiringError(GyrobenchError):
 
 @dataclass(frozen=True)
 class Connection:
-    """One scalar connection: target variable = gain * source variable."""
+    """One scalar connection: target variable = gain * source variable + offset.
+
+    delayed: it carries the value of the previous communication step, by a mapping file.
+    """
 
     source: str  # slot
     output: Bound
@@ -34,6 +38,8 @@ class Connection:
     input: Bound
     gain: float
     wire: str
+    offset: float = 0.0
+    delayed: bool = False
 
 
 @dataclass
@@ -101,12 +107,20 @@ def _gain(factor: float, out: Bound, inp: Bound) -> float:
     return factor if out.gain == inp.gain else factor * out.gain / inp.gain
 
 
+def _offset(factor: float, out: Bound, inp: Bound, added: float) -> float:
+    """Return the offset between the variables of a wire with this factor and this offset, SI to SI."""
+    return (factor * out.offset + added - inp.offset) / inp.gain if out.offset or inp.offset or added else 0.0
+
+
 def follow_factors(assembly: Assembly, system: System, parts: PartValues) -> None:
     """Set the gains of the wires whose factor follows the parts."""
     following = {wire: float(f(parts)) for wire, f in system.factors.items() if callable(f)}
     for k, c in enumerate(assembly.connections):
         if c.wire in following:
-            assembly.connections[k] = replace(c, gain=_gain(following[c.wire], c.output, c.input))
+            ends = (following[c.wire], c.output, c.input)
+            assembly.connections[k] = replace(
+                c, gain=_gain(*ends), offset=_offset(*ends, system.offsets.get(c.wire, 0.0))
+            )
 
 
 def _elements(ports: Mapping[str, Bound], name: str) -> dict[str, Bound]:
@@ -135,7 +149,9 @@ class _Layer:
         found = _elements(ports, name)
         if found:
             return found
-        if name.split("[")[0] in binding.absent:
+        if name.split("[")[0] in binding.held:
+            self.notes.append(f"{wire}: {slot}.{name} is constant by the mapping file; not connected")
+        elif name.split("[")[0] in binding.absent:
             if slot not in self.usual:  # the part the system is made with: its author knows
                 self.notes.append(f"{wire}: {slot} has no '{name}' (optional); not connected")
         else:
@@ -167,14 +183,17 @@ class _Layer:
         for index, out in outputs.items():
             inp = inputs[index]
             gain = _gain(factor, out, inp)
-            if inp.kind != "Real" and (gain != 1.0 or (out.kind == "Real" and not whole)):
+            offset = _offset(factor, out, inp, self.system.offsets.get(wire, 0.0))
+            if inp.kind != "Real" and (gain != 1.0 or offset or (out.kind == "Real" and not whole)):
+                also = f" and offset {offset:g}" if offset else ""
                 self.problems.append(
-                    f"{wire}: {out.kind} with factor {gain:g} into the {inp.kind} input {inp.variable}"
+                    f"{wire}: {out.kind} with factor {gain:g}{also} into the {inp.kind} input {inp.variable}"
                 )
             other = self.taken.setdefault((b, inp.element), wire)
             if other != wire:
                 self.problems.append(f"{wire}: {b}.{inp.element} is already fed by {other}")
-            self.connections.append(Connection(a, out, b, inp, gain, wire))
+            delayed = out.element in self.bindings[a].delayed or inp.element in self.bindings[b].delayed
+            self.connections.append(Connection(a, out, b, inp, gain, wire, offset, delayed))
 
     def unfed(self) -> None:
         for slot, binding in self.bindings.items():
@@ -183,6 +202,7 @@ class _Layer:
                 for c in binding.socket.connectors
                 if c.causality == "input"
                 and not c.optional
+                and c.name not in binding.held
                 and not any((slot, e) in self.taken for e in c.elements)
                 and f"{slot}.{c.name}" not in self.system.open
             ]
@@ -197,7 +217,8 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
     """
     from fmpy import read_model_description
 
-    maps = maps or {}
+    unchanged = {slot: s.part in (str(paths[slot]), paths[slot].stem) for slot, s in system.slots.items()}
+    maps = {**{slot: file for slot, file in system.maps.items() if unchanged[slot]}, **(maps or {})}
     for what, given in (("part", paths), ("mapping", maps)):
         for slot in given:
             if slot not in system.slots:
@@ -205,10 +226,10 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
     descriptions, bindings = {}, {}
     for slot, declared in system.slots.items():
         d = read_model_description(str(paths[slot]), validate=False)
-        if d.coSimulation is None or not d.fmiVersion.startswith("2."):
-            kind = "co-simulation" if d.coSimulation is None else f"FMI {d.fmiVersion}"
-            what = "has no co-simulation interface" if d.coSimulation is None else f"is {kind}"
-            raise WiringError(system.name, [f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 co-simulation"])
+        if d.coSimulation is None or not d.fmiVersion.startswith(("2.", "3.")):
+            what = "has no co-simulation interface" if d.coSimulation is None else f"is FMI {d.fmiVersion}"
+            text = f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 and 3.0 co-simulation"
+            raise WiringError(system.name, [text])
         descriptions[slot] = d
         bindings[slot] = fit(
             socket(declared.socket).standing_for(declared.quantities), d, load_mapping(maps.get(slot)), slot
@@ -221,7 +242,45 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
     layer.unfed()
     for slot, binding in bindings.items():
         layer.notes += [f"{slot}: {w}" for w in binding.warnings]
-    links = [Link((c.source, c.output.variable), (c.target, c.input.variable), c.wire) for c in layer.connections]
-    through = {slot: feedthrough(d) for slot, d in descriptions.items()}
-    order = execution_order(list(system.slots), links, through)
+    links = [
+        Link((c.source, c.output.variable), (c.target, c.input.variable), c.wire)
+        for c in layer.connections
+        if not c.delayed and c.output.constant is None
+    ]
+    through = {slot: _stated_feedthrough(feedthrough(d), bindings[slot]) for slot, d in descriptions.items()}
+    try:
+        order = execution_order(list(system.slots), links, through)
+    except AlgebraicLoopError as error:
+        raise AlgebraicLoopError(error.loop, _remedy(error.loop, descriptions, bindings)) from None
+    delays = dict.fromkeys(c.wire for c in layer.connections if c.delayed)
+    order = replace(order, cuts=(*order.cuts, *(Cut(wire, "stated in the mapping file") for wire in delays)))
     return Assembly(system, dict(paths), descriptions, bindings, layer.connections, order, layer.notes)
+
+
+def _stated_feedthrough(declared: dict[str, set[str]], binding: Binding) -> dict[str, set[str]]:
+    """Return the feedthrough of an FMU without what its mapping file excludes."""
+    without = binding.no_feedthrough
+    return {y: set() if y in without else xs - without for y, xs in declared.items()}
+
+
+def _remedy(loop: list[tuple[str, str]], descriptions: Mapping[str, Any], bindings: Mapping[str, Binding]) -> str:
+    """Return the lines of mapping files that open an algebraic loop, for the parts that declare no dependencies."""
+    lines = []
+    for slot, variable in loop:
+        known = {u.variable.name for u in descriptions[slot].outputs if u.variable and u.dependencies is not None}
+        found = next((b for b in bindings[slot].outputs.values() if b.variable == variable), None)
+        if found is not None and variable.split("[")[0] not in known and variable not in known:
+            name = found.element.split("[")[0]
+            lines.append(
+                f"{slot}: {variable} declares no dependencies; if it follows its inputs only with the next step, write "
+                f"into the mapping file:\n    [{name}]\n    feedthrough = false"
+            )
+    if not lines:
+        slot, variable = loop[0]
+        found = next((b for b in bindings[slot].outputs.values() if b.variable == variable), None)
+        name = found.element.split("[")[0] if found else variable
+        lines.append(
+            f"or delay one of its wires by a communication step, in the mapping file of {slot}:\n"
+            f"    [{name}]\n    delay = 1"
+        )
+    return "\n".join(lines)

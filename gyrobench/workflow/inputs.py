@@ -21,7 +21,7 @@ def load_test(name: str, step: float | None = None) -> System | Suite:
     if name.endswith(".ssp"):
         from gyrobench.exchange.ssp_import import read_ssp
 
-        return read_ssp(Path(name), step or System.step)
+        return read_ssp(Path(name), step)
     return suites.load_test(name, Bench.find().folder)
 
 

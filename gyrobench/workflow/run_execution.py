@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 class RunRequest:
     """The settings of a run other than the system and its values.
 
-    step: s, None for the system's own.  in_memory: nothing is written, ``out``, ``force`` and ``resume`` have no
-    meaning.  formats: of the report.  check_step: whether what the step does is found by two further runs; None: by two
-    short ones for a system with loops, else not.
+    step: s, None for the system's own.  timeout: s, for one call of an FMU, None for the usual.  in_memory: nothing is
+    written, ``out``, ``force`` and ``resume`` have no meaning.  formats: of the report.  check_step: whether what the
+    step does is found by two further runs; None: by two short ones for a system with loops, else not.
     """
 
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -43,7 +43,7 @@ class RunRequest:
     force: bool = False
     spec: str | Path | None = None
     check_step: bool | None = None
-    isolate: tuple[str, ...] = ()
+    timeout: float | None = None
     resume: bool = False
     in_memory: bool = False
     formats: tuple[str, ...] = FORMATS
@@ -51,12 +51,18 @@ class RunRequest:
 
 def open_session(request: RunRequest, system: System) -> Session:
     """Return a system with its FMUs loaded.  Raises UsageError, and what Session raises."""
-    from gyrobench.engine.session import Session
+    from gyrobench.engine.session import TIMEOUT, Session
 
     require_slots(system).refuse()
     check_fmu_files(request.parts)
     return Session(
-        system, request.parts, request.maps, engine=request.engine, isolate=request.isolate, bench=Bench.find().folder
+        system,
+        request.parts,
+        request.maps,
+        engine=request.engine,
+        bench=Bench.find().folder,
+        child=True,
+        timeout=request.timeout or TIMEOUT,
     )
 
 
@@ -65,7 +71,7 @@ def execute_run(
 ) -> RunOutcome:
     """Run a system with its values set; write record and report, unless the request keeps them in memory.
 
-    prepared: the session of an earlier run of the same system, values, parts, engine and isolated slots.
+    prepared: the session of an earlier run of the same system, values, parts, engine and timeout.
 
     Raises what Session.run raises, and PostRunError for whatever goes wrong after the run: its text names the folder
     of the record, its attribute ``record`` holds it.
@@ -105,6 +111,8 @@ def _run(
             raise
         kept = save_partial_record(error.record, folder)
         message = f"{error}\nthe record until then is kept in {display_path(kept)}"
+        if checkpoints is not None and checkpoints.is_there and not isinstance(error, RunInterrupted):
+            message += "; the same command with --resume goes on from its last checkpoint"
         if isinstance(error, RunInterrupted):
             raise CommandInterrupted(f"{message} (gyrobench report lists what is missing)", error.record) from None
         raise PostRunError(message, error.record) from None

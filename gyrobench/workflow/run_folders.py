@@ -36,11 +36,12 @@ def prepare_run_folder(
     lock of the folder, to be released.
 
     The manager is None where ``resume`` finds the complete record of this run without the files ``wanted`` of its
-    report, which are all that is left to do.
+    report, or with those of a process that was killed: the report is all that is left to do.
 
     With ``resume`` the manager continues from the checkpoint in that folder or in its :func:`incomplete_folder`, once
-    it is known to belong to this run.  Raises UsageError when there is none to resume, and when --out holds another
-    run, unless ``force``, or files that do not belong to a run.
+    it is known to belong to this run; a run that came to its end before its first checkpoint, killed or with an error,
+    begins anew.  Raises UsageError when there is nothing to resume, and when --out holds another run, unless ``force``,
+    or files that do not belong to a run.
     """
     from gyrobench.system.parameters import resolve
 
@@ -62,38 +63,69 @@ def prepare_run_folder(
         raise UsageError(f"{display_path(folder)}: is a file; name a folder")
     lock = FolderLock(folder)
     try:
-        return folder, _manager(session, folder, identity, force, resume, wanted), lock
+        if lock.abandoned:
+            _sweep(folder)
+            _sweep(incomplete_folder(folder))
+        return folder, _manager(session, folder, identity, force, resume, wanted, lock.abandoned), lock
     except BaseException:
         lock.release()
         raise
 
 
 def _manager(
-    session: Any, folder: Path, identity: Mapping[str, Any], force: bool, resume: bool, wanted: Collection[str]
+    session: Any,
+    folder: Path,
+    identity: Mapping[str, Any],
+    force: bool,
+    resume: bool,
+    wanted: Collection[str],
+    abandoned: bool,
 ) -> checkpoint.CheckpointManager | None:
-    """Prepare the folder of a run; return the manager of its checkpoint, None where only its report is missing."""
-    kept = [f for f in (folder, incomplete_folder(folder)) if (f / checkpoint.FILE).is_file()]
+    """Prepare the folder of a run; return the manager of its checkpoint, None where only its report is missing.
+
+    abandoned: by a process that was killed.
+    """
     if not resume:
         prepare_folder(folder, identity, force)
-    elif not kept and has_complete_record(folder) and not all((folder / name).is_file() for name in wanted):
+        return checkpoint.CheckpointManager(partial_folder(folder))
+    complete = has_complete_record(folder) and not (abandoned and _damaged(folder))
+    if complete and (folder / checkpoint.FILE).is_file():  # killed between the end of the record and that of its run
+        prepare_folder(folder, identity, False)
+        checkpoint.remove_checkpoints((folder,))
+    kept = [f for f in (folder, incomplete_folder(folder)) if (f / checkpoint.FILE).is_file()]
+    if kept:
+        if folder not in kept:
+            prepare_folder(folder, identity, force)
+        return checkpoint.CheckpointManager(partial_folder(folder), True, kept[0])
+    if complete and (abandoned or not all((folder / name).is_file() for name in wanted)):
         prepare_folder(folder, identity, False)  # refuses another run
         return None
-    elif not kept:
-        state = (
-            "the run is complete"
-            if has_complete_record(folder)
-            else "no checkpoint of a run with these parts and values"
-        )
-        raise UsageError(
-            "--resume: "
-            + (
-                checkpoint.resume_obstacle(session.instances)
-                or f"nothing to continue in {display_path(folder)}: {state}"
-            )
-        )
-    elif folder not in kept:
-        prepare_folder(folder, identity, force)
-    return checkpoint.CheckpointManager(partial_folder(folder), resume, kept[0] if kept else None)
+    obstacle = checkpoint.resume_obstacle(session.assembly.descriptions)
+    if complete or obstacle or not (abandoned or (folder / RUN).is_file()):
+        state = "the run is complete" if complete else "no checkpoint of a run with these parts and values"
+        raise UsageError("--resume: " + (obstacle or f"nothing to continue in {display_path(folder)}: {state}"))
+    prepare_folder(folder, identity, force)
+    manager = checkpoint.CheckpointManager(partial_folder(folder))
+    manager.remark = f"{display_path(folder)}: the run before ended without a checkpoint; this one begins at t = 0"
+    return manager
+
+
+def _damaged(folder: Path) -> bool:
+    """Return whether the record in a folder cannot be read."""
+    try:
+        Record.load(folder)
+    except RecordError:
+        return True
+    return False
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed process left half written: temporary files, tables without the run.json they belong to."""
+    for name in (*RECORD, *REPORT):
+        for file in folder.glob(f"{name}*.part"):
+            file.unlink(missing_ok=True)
+        if name.startswith(("record.", "channels.")) and not (folder / RUN).is_file():
+            (folder / name).unlink(missing_ok=True)
 
 
 def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Path:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import RecordError
 from gyrobench.reduction.loops.loop_summary import renew
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS, NAMES
@@ -81,7 +82,8 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
     limits = load_limits(spec)
     with record_kept(folder, record):
         old = folder / "result.json"  # the step check needs further runs and is kept
-        check = (json.loads(old.read_text(encoding="utf-8")).get("step_check") or {}) if old.exists() else {}
+        check = (reading.json_object(reading.read_text(old, RecordError), old, RecordError).get("step_check") or {}
+                 ) if old.exists() else {}  # fmt: skip
         try:
             result = reduce_run(system, record, limits, check if "other" in check else None)
         except GyrobenchError:

@@ -120,13 +120,12 @@ def _test_requests(request: RunRequest, suite: Suite, members: Mapping[str, Syst
     """Return the request of each test: the parts, files and seed that go to it."""
     try:
         parts, maps = suite.swaps(members, request.parts), suite.swaps(members, request.maps)
-        isolate = suite.swaps(members, dict.fromkeys(request.isolate))
     except InvalidValueError as error:
         raise UsageError(str(error)) from None
     check_fmu_files(request.parts)
     return {
         name: replace(
-            request, parts=parts[name], maps=maps[name], isolate=tuple(isolate[name]), spec=None,
+            request, parts=parts[name], maps=maps[name], spec=None,
             seed=suite.seed_of(request.seed, name),
         )
         for name in members

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
@@ -75,7 +75,7 @@ def reduce_runs(
             rewrite = f"write it by gyrobench report {folder}"
             hint = rewrite if (folder / RUN).is_file() else "a measured record becomes a run by gyrobench reduce"
             raise UsageError(f"{folder}: no result.json; {hint}")
-    systems = [str(json.loads((f / "result.json").read_text(encoding="utf-8"))["system"]) for f in runs]
+    systems = [str(_result(f / "result.json").get("system")) for f in runs]
     labels = short_names(runs)
     names = [s if systems.count(s) == 1 else f"{s} {label}" for s, label in zip(systems, labels, strict=True)]
     file = find_specification(spec)
@@ -131,6 +131,10 @@ def write_suite_report(
     return SuiteOutcome(folder, result, paths)
 
 
+def _result(file: Path) -> dict[str, Any]:
+    return reading.json_object(reading.read_text(file, RecordError), file, RecordError)
+
+
 def _load_member(folder: Path, label: str) -> Member:
     """Return a test of a suite from its folder.  Raises RecordError for a result that cannot be read."""
     from gyrobench.reduction.suite.method_comparison import Member
@@ -139,7 +143,7 @@ def _load_member(folder: Path, label: str) -> Member:
     file = folder / "result.json"
     try:
         text = file.read_text(encoding="utf-8")
-        result, report_id = load(text), str(json.loads(text)["report_id"])
+        result, report_id = load(text), str(_result(file)["report_id"])
     except (OSError, ValueError, KeyError) as error:
         raise RecordError(f"{file}: not a readable result: {error}") from None
     if not isinstance(result, DriftTestResult):

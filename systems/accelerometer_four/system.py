@@ -42,6 +42,7 @@ class AccelerometerFour(TableTest):
     title = "Four accelerometers on one indexing head"
     spec = ("TEST-ACCEL4", "ACCEL-MODEL")
     reduction = "reduction"
+    protocol = "design"
     slots = {
         **on_table(table=Slot("Table", "index_head")),
         **{f"accelerometer_{i}": Slot(SENSOR, "accelerometer_static") for i in geometry.SENSORS},

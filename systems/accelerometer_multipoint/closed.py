@@ -29,6 +29,7 @@ from .geometry import CROSS
 
 Array = NDArray[np.float64]
 EQUAL = 1e-5  # rad, largest departure from equal spacing
+LEAST = 7  # equally spaced positions for three harmonics  [ACC-MINPTS]
 
 
 def spacing(angle: Array) -> tuple[int, str]:

@@ -24,15 +24,17 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import closed
 from .geometry import zero_angle
 from .model import Model, Setup, Visits, visits
-from .refusals import position_problems, record_problems, setup_problems, zero_problems
+from .refusals import four_positions, position_problems, record_problems, setup_problems, zero_problems
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
@@ -76,7 +78,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         raise ReductionError(problems)
     if np.all(v.y == v.y[0]):
         raise ReductionError("the current is the same in all positions: no accelerometer was read")
-    four = closed.spacing(v.angle[v.mount == v.mounts[0]])[0] == 4
+    four = four_positions(v.mount, v.angle)
     model = Model(v.mounts, four)
     zeros, k = model.solve(v, gamma)
     if all(abs(z) > 0.5 * math.pi for z in zeros.values()):
@@ -135,9 +137,11 @@ def _closed(v: Visits, s: Setup, four: bool) -> tuple[dict[str, float], dict[str
     fits = {}
     for m in v.mounts:
         mine = v.mount == m
-        _, uneven = closed.spacing(v.angle[mine])
+        n, uneven = closed.spacing(v.angle[mine])
         if uneven:
             return {}, {}, f"the positions of mount {m} are not equally spaced ({uneven})"
+        if not four and n < closed.LEAST:
+            return {}, {}, f"mount {m} has {n} positions, three harmonics need {closed.LEAST} [ACC-MINPTS]"
         if four:
             fits[m] = closed.four_points(v.angle[mine], v.y[mine], s.gamma)
         else:
@@ -232,7 +236,8 @@ def _harmonics(v: Visits, four: bool, linear: Findings) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for m in v.mounts:
         mine = v.mount == m
-        if closed.spacing(v.angle[mine])[1] or four:
+        n, uneven = closed.spacing(v.angle[mine])
+        if uneven or n < closed.LEAST:
             continue
         h = closed.harmonics(v.angle[mine], v.y[mine])
         u = linear.residual_std / math.sqrt(mine.sum())

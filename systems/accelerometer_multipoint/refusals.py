@@ -37,6 +37,17 @@ def points_problems(points: int, mounts: str = "both", turns: int = 1) -> list[s
     return []
 
 
+def few_problems(points: int, alone: bool) -> list[str]:
+    """Why so few positions will not do, as sentences; whether they tell the terms apart is up to the fit.
+
+    The seven of :func:`points_problems` are those of three harmonics.  The model has no cosine of the third, and both
+    mounts share k0 to k3: the six positions 30°, 90°, 150° ... determine all terms of a mount, those from 0° on do not.
+    """
+    if alone:
+        return points_problems(points, turns=2) if points < 6 else []
+    return [] if points >= 3 else [f"{points} positions: at least 3 are needed in a mount"]
+
+
 def zero_problems(zeros: Mapping[str, float]) -> list[str]:
     """Mounts whose input axis is not level at angle 0; ``zeros``: mount -> theta_0, rad."""
     return [
@@ -72,18 +83,21 @@ def record_problems(s: Setup, windows: Mapping[str, Array]) -> list[str]:
 
 
 def position_problems(mount: NDArray[np.str_], angle: Array) -> list[str]:
-    """Mounts with too few positions, or few that are not equally spaced."""
+    """Mounts with too few positions, or with four that are not quarters of a turn."""
     found = []
-    for m in sorted(set(mount.tolist())):
+    four, mounts = four_positions(mount, angle), sorted(set(mount.tolist()))
+    for m in mounts:
         here = angle[mount == m]
         n, uneven = spacing(here)
-        problems = points_problems(n, turns=2)
-        if not problems and n == 4:
+        problems = points_problems(n, turns=2) if four else few_problems(n, len(mounts) == 1)
+        if four:
             quarters = np.abs(here - np.rint(here / (math.pi / 2.0)) * (math.pi / 2.0))
             if uneven or float(quarters.max()) > ZERO:
                 problems = [f"4 positions must be 0°, 90°, 180° and 270°, each as often as the others; {uneven}"]
         found += [f"mount {m}: {p}" for p in problems]
-    counts = {m: spacing(angle[mount == m])[0] for m in sorted(set(mount.tolist()))}
-    if not found and len(counts) == 2 and 4 in counts.values() and len(set(counts.values())) > 1:
-        found.append("one mount with 4 positions, the other with more: reduce them apart")
     return found
+
+
+def four_positions(mount: NDArray[np.str_], angle: Array) -> bool:
+    """True where every mount has four positions, which see three combinations of the coefficients."""
+    return all(spacing(angle[mount == m])[0] == 4 for m in set(mount.tolist()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.record import sampling
+from gyrobench.record.drift_columns import harmonic_names
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
@@ -94,14 +96,30 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
 
 
 def regression(p: Prepared) -> list[Json]:
-    rows = []
+    rows, turns = [], list[list[Any]]()
+    by = {r.name: r for r in p.regressions}
     for r in p.regressions:
-        unit = units.display(r.unit) if r.unit != "1" else "1"
-        rows.append([r.name, r.slope / DPH, r.u / DPH, r.low / DPH, r.high / DPH, f"°/h per {unit}",
-                     "taken out" if r.significant else "not significant, left in"])  # fmt: skip
-    head = ["column", "slope", "u", "95 % from", "95 % to", "unit", "use"]
-    caption = "Slope of the rate over other columns, all at once, under noise estimated from the residuals"
-    return [table("Regression", caption, head, rows)] if rows else []
+        unit = f"°/h per {units.display(r.unit)}" if r.unit != "1" else "°/h"
+        rows.append([r.name, r.slope / DPH, r.u / DPH, r.full[0] / DPH, r.full[1] / DPH, unit, r.p, 100.0 * r.share,
+                     "taken out" if r.kept else "not significant, left in"])  # fmt: skip
+    names = harmonic_names(len(by))
+    for n, (c, s) in enumerate(zip(names[::2], names[1::2], strict=True), 1):
+        if c in by and s in by:
+            a, b = by[c], by[s]
+            size = math.hypot(a.slope, b.slope)
+            u = math.hypot(a.slope * a.u, b.slope * b.u) / size if size else math.hypot(a.u, b.u)
+            turns.append([n, size / DPH, u / DPH, math.degrees(math.atan2(a.slope, b.slope)), a.p])
+    head = ["column", "slope", "u", "all: from", "all: to", "unit", "p", "share / %", "use"]
+    caption = (
+        "Slope of the rate over other columns, under noise estimated from the residuals. The least significant column "
+        "left, again and again, until all of the rest were significant (5 % for all together); p is that of its last "
+        "test. Selection makes p and u of what stays too small; 'all' is the 95 % interval with every column. Share: "
+        "of the sum of squares of the rate, after the columns above it"
+    )
+    out = [table("Regression", caption, head, rows)] if rows else []
+    caption = "C sin(n θ + φ), θ the angle of the table; u of C from those of its cosine and sine"
+    head = ["harmonic n", "C / (°/h)", "u(C) / (°/h)", "φ / °", "p"]
+    return out + ([table("Harmonics over the angle", caption, head, turns)] if turns else [])
 
 
 def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Json:
@@ -236,7 +254,7 @@ def conventions(run: RunDocument) -> list[str]:
         "without cutoff, its floor in the Allan deviation 0.664 B.",
         "Spectrum figures are one-sided: 2 S.",
         "Not determined: the 95 % interval of the coefficient holds zero; its upper end is stated.",
-        "Lines and columns whose slope is significant are taken out of the rate before coefficients and deviations.",
+        "Lines and columns that the rate follows significantly are taken out of it before coefficients and deviations.",
     ]
 
 

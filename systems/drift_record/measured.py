@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record import sampling
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import TIME, find_signals, open_table
+from gyrobench.record.drift_columns import TIME, find_signals, harmonic_names, open_table, with_harmonics
 from gyrobench.record.drift_series import DriftReader, Progress, as_dict
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
@@ -33,7 +33,8 @@ TEMPLATE = """\
 # Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], or another quantity and a line
 #   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (resets are found), or
 #   those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
-# temperature [degC], and columns named by '# regressors = pressure', are taken out by regression.
+# temperature [degC], and columns named by '# regressors = pressure', are taken out by regression, and harmonics over
+#   the angle of the table: '# angle = table_angle', '# harmonics = 2'.
 # flag: other than 0 where a sample is suspect.  What the samples are: '# samples = means' (each since the one before)
 #   or points, of a signal of '# bandwidth = 14Hz'.
 time [s],rate [deg/h]
@@ -59,8 +60,12 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
         kind, _ = sampling.stated({k: v for k, v in said.items() if k == "samples"})
     except ValueError as error:
         raise DataError(data, [str(error)]) from None
+    regressors = system["regressors"]
+    if system["angle"]:
+        table = with_harmonics(table, system["angle"], system["harmonics"])
+        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
     signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
-    reader = DriftReader(table, signals, system["regressors"], system["sampling"])
+    reader = DriftReader(table, signals, regressors, system["sampling"])
     every = {s.name: _Every(reader) for s in signals}
     columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
     about = reader.about

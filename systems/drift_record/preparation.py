@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,35 +14,19 @@ from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
-from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Line
 from gyrobench.reduction.setups import attitude_of
 from gyrobench.reduction.window_checks import ReductionError
 
+from .regressors import Regression, block_means_of, regress
+
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
-BLOCKS = 200  # means that other columns are regressed on
 WHOLE = 0.5  # part of the samples that a stretch without a gap must hold
 LEAST = 512  # samples of it
 OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged"}
-
-
-@dataclass(frozen=True)
-class Regression:
-    """Slope of the rate over another column, SI, with its 95 % interval."""
-
-    name: str
-    unit: str
-    slope: float
-    u: float
-    low: float
-    high: float
-
-    @property
-    def significant(self) -> bool:
-        return not self.low <= 0.0 <= self.high
 
 
 @dataclass(frozen=True)
@@ -63,6 +47,7 @@ class Prepared:
     stretch: Array
     stretch_step: float
     averaged: int
+    first: int  # place of the stretch on the grid
 
     @property
     def cleaned(self) -> bool:
@@ -109,7 +94,6 @@ def columns_of(record: Record) -> Columns:
 def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
     """Return a rate with what other columns and lines explain taken out.
 
-    Another column is taken out where its slope, under noise estimated from the residuals, differs from zero (95 %).
     Raises ReductionError for a record too short or without a stretch long enough.
     """
     rate = columns.rates[name]
@@ -118,10 +102,10 @@ def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
             [f"column '{name}': {np.count_nonzero(np.isfinite(rate))} samples; at least {LEAST} needed"]
         )
     time = columns.time
-    regressions = _regressions(time, columns.step, rate, columns.others, columns.others_unit)
+    regressions = regress(rate, columns.others, columns.others_unit)
     clean = rate
     for r in regressions:
-        if r.significant:
+        if r.kept:
             x = columns.others[r.name]
             clean = clean - r.slope * np.nan_to_num(x - np.nanmean(x))
     stretch, first, averaged = longest_stretch(clean)
@@ -134,7 +118,7 @@ def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
         begin = time[first] + 0.5 * columns.step * (averaged - 1)
         clean = clean - sum_of(model.lines.lines, time - begin, columns.step, averaged)
         stretch = model.lines.residual
-    return Prepared(name, time, columns.step, rate, clean, tuple(regressions), model, stretch, step, averaged)
+    return Prepared(name, time, columns.step, rate, clean, regressions, model, stretch, step, averaged, first)
 
 
 def sum_of(lines: Sequence[Line], t: Array, step: float, averaged: int) -> Array:
@@ -163,7 +147,7 @@ def longest_stretch(x: Array) -> tuple[Array, int, int]:
         if (b - a) * averaged >= WHOLE * total:
             break
         averaged *= 2
-        y = _means(x, averaged)
+        y = block_means_of(x, averaged)
     if best is None or best[0].size < LEAST:
         raise ReductionError([f"no stretch of {LEAST} samples without a gap: the gaps leave no spectrum"])
     return best
@@ -173,41 +157,6 @@ def _longest(x: Array) -> tuple[int, int]:
     edges = np.flatnonzero(np.diff(np.isfinite(x).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     a, b = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))].tolist() if edges.size else (0, 0)
     return int(a), int(b)
-
-
-def _means(x: Array, m: int) -> Array:
-    parts = x[: x.size // m * m].reshape(-1, m)
-    there = np.isfinite(parts)
-    count = there.sum(axis=1)
-    sums = np.where(there, parts, 0.0).sum(axis=1)
-    return np.where(2 * count >= m, sums / np.maximum(count, 1), np.nan)
-
-
-def _regressions(
-    time: Array, step: float, rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]
-) -> list[Regression]:
-    """Fit level and the other columns to block means, under noise that is estimated from the residuals."""
-    m = max(1, math.ceil(rate.size / BLOCKS))
-    names = [n for n, v in others.items() if np.count_nonzero(np.isfinite(v)) > 0.5 * v.size and np.nanstd(v) > 0.0]
-    if not names:
-        return []
-    y = _means(rate, m)
-    x = [_means(others[n], m) for n in names]
-    good = np.all(np.isfinite([y, *x]), axis=0)
-    y, x = y[good], [v[good] for v in x]
-    spread = [float(np.std(v)) for v in x]
-    start = time[: m * good.size : m][good]
-    scale = float(np.std(y)) or 1.0
-    design = np.column_stack([np.ones(y.size), *((v - v.mean()) / (s or 1.0) for v, s in zip(x, spread, strict=True))])
-    if np.linalg.matrix_rank(design) < design.shape[1] or y.size < 4 * design.shape[1]:
-        raise ReductionError([f"columns {', '.join(names)}: not separable in this record; name fewer by regressors"])
-    fit = noise_mixture_fit.fit(design, (y - y.mean()) / scale, ("level", *names), start, start + m * step)
-    out = []
-    for k, (n, s) in enumerate(zip(names, spread, strict=True), 1):
-        unit = scale / s
-        slope, half = float(fit.beta[k]) * unit, float(fit.half_width[k]) * unit
-        out.append(Regression(n, unit_of.get(n, "1"), slope, float(fit.u[k]) * unit, slope - half, slope + half))
-    return out
 
 
 #: noise coefficient -> parameter of the gyro that gives it

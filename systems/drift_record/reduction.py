@@ -27,9 +27,12 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.noise_coefficients_table import TERMS
+from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
 
@@ -39,7 +42,6 @@ from .preparation import Prepared, columns_of, prepare, truth_of
 __all__ = ["ReductionError", "from_record"]
 
 Array = NDArray[np.float64]
-NORMAL = 1.959963984540054
 SHOWN, SHOWN_LAGS = 1500, 40  # intervals of the record, lags that are drawn
 RESIDUAL = (
     "The deviations are those of the rate without what lines and other columns explain: where these fits have taken "
@@ -167,7 +169,7 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
     return DriftColumn(
         name=p.name,
         unit="°/h",
-        record=_envelope(p),
+        record=_envelope(p) | _smoothed(p),
         deviations=[_deviation(kind, d) for kind, d in a.deviations.items()],
         model={"tau": tau.tolist(), "dev": (a.noise.allan(tau) / DPH).tolist(), **model},
         spectrum={"f": s.frequency.tolist(), **density},
@@ -188,6 +190,20 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
             "model": model_tables.model_texts(m),
         },
     )  # fmt: skip
+
+
+def _smoothed(p: Prepared) -> dict[str, Any]:
+    """Gauss-Markov part of the longest stretch with its 95 % band, where Gauss-Markov and white noise describe it."""
+    m, drift = p.model, p.model.gauss_markov
+    if m.recommended not in ("ARMA(1,1)", "AR(1)") or drift is None or not drift.determined or not drift.density > 0.0:
+        return {}
+    y = block_means(p.stretch, m.factor)
+    t = p.time[p.first] + m.model_dt * (np.arange(y.size) + 0.5)
+    slope = m.trend.slope * (t - t.mean()) if m.trend is not None and m.detrended else np.zeros(y.size)
+    value, sd = smooth_drift(y - slope, m.model_dt, drift)
+    every = slice(None, None, max(1, y.size // SHOWN))
+    band = {"t": t, "mean": value + slope, "low": value + slope - NORMAL * sd, "high": value + slope + NORMAL * sd}
+    return {"smoothed": {n: (v[every] / (1.0 if n == "t" else DPH)).tolist() for n, v in band.items()}}
 
 
 def _deviation(kind: str, d: Deviation) -> dict[str, Any]:

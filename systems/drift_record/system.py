@@ -44,6 +44,8 @@ class DriftRecord(RebalanceTest):
             "sampling": Option(0.0, "Hz", "measured data without a column time: sampling rate", 0.0),
             "counts": Option("cumulative", str, "measured angles and counts: cumulative, or increments"),
             "regressors": Option("", str, "measured data: columns taken out by regression, beside temperatures"),
+            "angle": Option("", str, "measured data: column of the table angle, for harmonics of the rate over it"),
+            "harmonics": Option(2, int, "highest harmonic over the angle", 1, 20),
             "remove_lines": Option(True, bool, "lines of the spectrum are taken out before the noise model"),
             "bandwidth": Option(0.0, "Hz", "bandwidth of the signal before it was sampled; 0: not known", 0.0),
         }

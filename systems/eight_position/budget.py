@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyrobench import frames
 from gyrobench.reduction.drift.pulses import Windows, sources
 from gyrobench.reduction.estimation.effects import Effect, one_by_one
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 
 from . import model, positions
 

@@ -28,7 +28,8 @@ from scipy import special
 from gyrobench import units
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.linear_fit import Estimates, Findings, Quantity
+from gyrobench.reduction.estimation.findings import Estimates, Findings
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import SiteSetup
 from gyrobench.reduction.window_checks import ReductionError
 

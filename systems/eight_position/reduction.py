@@ -24,8 +24,9 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, repeatability, residual_series
 from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.findings import Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Group, fit
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems

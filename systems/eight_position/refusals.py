@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.system.values import InvalidValueError
 
 from . import positions
 
@@ -46,6 +47,8 @@ def options(system: Any) -> list[str]:
     found = latitude(system["latitude"])
     if system["terms"] not in (4, 6):
         found.append(f"terms = {system['terms']}: no such model; a channel has 4 or 6 unknowns")
+    if system["visits"]:
+        return found + _visits(system)
     if system["sigma"] and system["cycles"] < 2:
         found.append(
             "cycles = 1: no scatter over cycles can be had from one; take at least 2, or set sigma=false to do without"
@@ -53,6 +56,21 @@ def options(system: Any) -> list[str]:
     if system["cycles"] * system["readings"] < 2:
         found.append("one reading in each position leaves no noise to estimate: readings or cycles at least 2")
     return found
+
+
+def _visits(system: Any) -> list[str]:
+    """What is wrong with the option visits: positions that are missing, or none that is visited twice."""
+    try:
+        numbers = [int(v.place[0]) for v in system.visits()]
+    except InvalidValueError as error:
+        return [str(error)]
+    if missing := [str(n) for n in positions.ATTITUDES if n not in numbers]:
+        return [f"visits: position {', '.join(missing)} is missing: all eight are needed, one for each unknown"]
+    if len(numbers) * system["readings"] < 16:
+        return [f"visits: {len(numbers) * system['readings']} readings: at least 16 are needed to estimate the noise"]
+    if system["sigma"] and len(numbers) == len(positions.ATTITUDES):
+        return ["visits: no position is visited twice, so there is no scatter over cycles: set sigma=false"]
+    return []
 
 
 def attitudes(actual: Mapping[int, Array]) -> list[str]:

@@ -13,6 +13,8 @@ from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Windows
+from gyrobench.system.values import InvalidValueError
+from gyrobench.system.visits import Visit, parse_visits
 
 from . import positions, refusals
 from .measured import MEASURED
@@ -28,6 +30,7 @@ class EightPosition(TwoChannelTest):
     title = "Eight-position test"
     spec = ("TEST-8POS", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
     reduction = "reduction"
+    protocol = "design"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
     )
@@ -36,6 +39,7 @@ class EightPosition(TwoChannelTest):
         | PHYSICAL_FORM
         | {
             "cycles": Option(10, int, "times the eight positions are gone through", 1, 12),
+            "visits": Option("", str, "positions in place of these cycles, '1 60s; 3; 5 90s; ...': number, time"),
             "readings": Option(10, int, "readings (averaging windows) in each position", 1, 100),
             "dwell": Option(60.0, "s", "time of the readings in each position"),
             "settle": Option(10.0, "s", "wait before the readings, after each change of position", 1.0),
@@ -60,8 +64,10 @@ class EightPosition(TwoChannelTest):
     )
 
     def plan(self) -> Plan:
-        """The eight positions, ``cycles`` times; the table does not turn, the mount changes."""
+        """The eight positions, ``cycles`` times, or visits; the table does not turn, the mount changes."""
         faces = {positions.NAMES[n]: a for n, a in positions.ATTITUDES.items()}
+        if self["visits"]:
+            return Plan(self._visiting(self.visits()), faces)
         readings = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"] / self["readings"]}
         phases = [
             Phase(label=f"cycle {c}, {name}", mode="index", face=name, target=0.0, **readings)
@@ -69,6 +75,26 @@ class EightPosition(TwoChannelTest):
             for name in faces
         ]
         return Plan(phases, faces)
+
+    def visits(self) -> list[Visit]:
+        """Return the visits of the option.  Raises InvalidValueError."""
+        found = parse_visits("visits", self["visits"], ("",), self["dwell"])
+        known = [str(n) for n in positions.ATTITUDES]
+        for k, v in enumerate(found, 1):
+            if v.place[0] not in known:
+                raise InvalidValueError(f"visits, visit {k}: position '{v.place[0]}' must be 1 to 8")
+        return found
+
+    def _visiting(self, visits: list[Visit]) -> list[Phase]:
+        """A cycle of a position is its visit: the n-th of each."""
+        phases, seen = [], dict.fromkeys(positions.ATTITUDES, 0)
+        for v in visits:
+            n = int(v.place[0])
+            seen[n] += 1
+            readings = {"settle": self["settle"], "dwell": v.dwell, "window": v.dwell / self["readings"]}
+            name = positions.NAMES[n]
+            phases.append(Phase(label=f"cycle {seen[n]}, {name}", mode="index", face=name, target=0.0, **readings))
+        return phases
 
     def check(self) -> list[str]:
         return refusals.options(self) + super().check()

@@ -24,8 +24,10 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, repeatability
 from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems

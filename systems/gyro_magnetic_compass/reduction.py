@@ -14,6 +14,8 @@ from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.result import LoopResult, Response, Specification
 
+from .field import FieldError, field_at
+
 Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 
@@ -62,6 +64,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         "gyro path", "command", 1, "gyro.psi", "exciter.command[1]", unit="s",
         caption="A drift of the gyro passes 1/(s + k), its error in heading the high-pass s/(s + k).",
     )  # fmt: skip
+    _field(found)
     result = found.result(
         title="Gyro-magnetic compass",
         method="Heading of a slaved gyro against the true one: alignment, rest, sines, turn, disturbed field",
@@ -106,6 +109,31 @@ def _alignment(found: LoopFindings, gate: Gate, error: Array, k: float) -> None:
     (slope, _), covariance = np.polyfit(t, y, 1, cov=True)
     found.measure("time constant", "of the slaving, from the alignment", "s", -1.0 / slope,
                   math.sqrt(float(covariance[0, 0])) / slope**2, closed=1.0 / k)  # fmt: skip
+
+
+def _field(found: LoopFindings) -> None:
+    """Add the table of the field of day and site, where the run had one, with what its model leaves open."""
+    o = found.record.run.options
+    if not o.get("date"):
+        return
+    site = (float(o["latitude"]), float(o["longitude"]), float(o["height"]))
+    try:
+        field = field_at(str(o["date"]), *site)
+    except FieldError:  # a record from elsewhere, reduced without the model
+        return
+    rows = [
+        ["declination, clockwise / °", field.declination / DEG, field.u_declination / DEG],
+        ["inclination, down / °", field.inclination / DEG, field.u_inclination / DEG],
+        ["horizontal field / µT", field.horizontal * 1e6, field.u_horizontal * 1e6],
+    ]
+    found.tables.append({
+        "title": "Magnetic field of the site",
+        "caption": f"{field.model} on {o['date']} at latitude {site[0] / DEG:.4f}°, longitude {site[1] / DEG:.4f}°, "
+        f"{site[2]:g} m. u: of the model, one sigma, without local anomalies. The sensor of the run "
+        "has the model's own field; a true heading on the site has the u of the declination beside the errors found.",
+        "columns": ["", "value", "u"],
+        "rows": rows,
+    })  # fmt: skip
 
 
 def _drift(found: LoopFindings) -> float:

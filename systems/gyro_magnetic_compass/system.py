@@ -12,6 +12,8 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot
 
+from .field import Field, FieldError, field_at
+
 DEG = math.pi / 180.0
 MOST = 85.0 * DEG  # latitude
 
@@ -90,6 +92,9 @@ class GyroMagneticCompass(LoopTest):
         "corrected": Option(1, int, "1: the Earth's rate is corrected for the latitude", 0, 1),
         "true_heading": Option(False, bool, "the declination is added: true instead of magnetic heading"),
         "declination": Option(0.0, "rad", "declination of the field, clockwise", sets="sensor.declination"),
+        "date": Option("", str, "day (as 2026-07-02) whose field at the site the sensor has; empty: none"),
+        "longitude": Option(0.0, "rad", "longitude of the site, east", -math.pi, math.pi),
+        "height": Option(0.0, "m", "height of the site above the ellipsoid", -1e3, 1e5),
         "turn": Option("3deg/s", "rad/s", "rate of the turn, clockwise"),
         "turned": Option("180deg", "rad", "angle of the turn", 0.0),
         "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets="motion.speed"),
@@ -108,6 +113,11 @@ class GyroMagneticCompass(LoopTest):
     )  # fmt: skip
     shown = ("motion.angle", "gyro.psi sensor.psi", "slaving.error", "slaving.rate", "slaving.cut")
     channel_period = 0.1
+
+    def field(self) -> Field | None:
+        """Return the field of the day and the site; None without a date.  Raises FieldError."""
+        site = (float(self["latitude"]), float(self["longitude"]), float(self["height"]))
+        return field_at(str(self["date"]), *site) if self["date"] else None
 
     def phases(self) -> list[LoopPhase]:
         """Alignment, rest, sines about the cut-off k/2 pi, the turn and what it leaves, the disturbed field."""
@@ -128,14 +138,27 @@ class GyroMagneticCompass(LoopTest):
         turn = [0.0] * LIMIT
         labels = [p.label for p in self.phases()]
         turn[labels.index("turn")] = -self["turn"]  # the motion counts counter-clockwise
+        try:
+            field = self.field()
+        except FieldError:  # check() says it
+            field = None
+        declination = field.declination if field else self["declination"]
+        sensor: dict[str, Any] = {}
+        if field:
+            sensor = {
+                "sensor.declination": declination,
+                "sensor.inclination?": field.inclination,
+                "sensor.field?": field.horizontal,
+            }
         correction = self["earth_rate"] * math.sin(self["latitude"]) if self["corrected"] else 0.0
         return {
+            **sensor,
             "motion.turn": turn,
-            "gyro.start_error?": 0.0 if self["true_heading"] else -self["declination"],  # aligned
+            "gyro.start_error?": 0.0 if self["true_heading"] else -declination,  # aligned
             "gyro.white?": self["random_drift"],
             "sensor.white?": self["noise"],
             "slaving.correction?": correction,
-            "slaving.declination?": self["declination"] if self["true_heading"] else 0.0,
+            "slaving.declination?": declination if self["true_heading"] else 0.0,
         }
 
     def crossovers(self) -> dict[str, float]:
@@ -149,6 +172,14 @@ class GyroMagneticCompass(LoopTest):
             problems.append(
                 f"latitude = {self['latitude'] / DEG:.4g}°: beyond 85° the horizontal field gives no heading"
             )
-        if self["true_heading"] and "declination" not in self.given:
-            problems.append("true_heading: the declination of the place is missing; give declination")
+        if self["true_heading"] and "declination" not in self.given and not self["date"]:
+            problems.append("true_heading: the declination of the place is missing; give declination, or date and site")
+        if self["date"] and "declination" in self.given:
+            problems.append(
+                "declination and date are given: the date sets the declination of the site; give one of them"
+            )
+        try:
+            self.field()
+        except FieldError as e:
+            problems.append(str(e))
         return problems

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.system.families.moving_bases import BASES
 from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
 from gyrobench.system.families.table_test import Array, TableTest, on_table, sampled
 from gyrobench.system.part_values import PartValues
@@ -19,18 +20,6 @@ from . import plans
 from .measured import MEASURED
 
 FACES = {plans.FACE: np.eye(3).tolist()}
-#: moving bases: parameters of ground_motion, tilts about E, N, U.  Sizes are our own assumptions of a typical case.
-BASES: dict[str, dict[str, Any]] = {
-    "rest": {},
-    "bus": {
-        "site.period": [0.67, 0.083], "site.phase": [0.0, 1.0],
-        "site.tilt_amplitude": [[2e-5, 1e-5, 1e-5], [5e-6, 5e-6, 2e-6]], "site.local_e": 0.01, "site.local_n": 0.01,
-    },
-    "ship at pier": {
-        "site.period": [6.1, 8.3, 23.0], "site.phase": [0.0, 1.0, 2.0],
-        "site.tilt_amplitude": [[1e-3, 0.0, 0.0], [0.0, 4e-3, 0.0], [0.0, 0.0, 5e-4]],
-    },
-}  # fmt: skip
 
 
 class NorthFinder(TableTest):
@@ -43,6 +32,7 @@ class NorthFinder(TableTest):
     title = "North finding by gyro"
     spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN")
     reduction = "reduction"
+    protocol = "design"
     slots = {
         **on_table(
             table=Slot("Table", "table_rate"),

@@ -33,8 +33,10 @@ from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import nuisances, uncertainty
 from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import SiteSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification

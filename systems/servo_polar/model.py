@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from gyrobench import drift
 from gyrobench.reduction.drift import servo_regression
-from gyrobench.reduction.estimation.linear_fit import Findings, Quantity
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.run_metadata import Site
 
 Array = NDArray[np.float64]

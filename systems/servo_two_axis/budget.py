@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.run_metadata import Site
 
 from .windows import Track

@@ -26,9 +26,11 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError

@@ -71,6 +71,8 @@ class TableCapture(System):
         return float(self["offset"] * self["C"] / self["H"])
 
     def plan(self) -> Plan:
+        if not self["H"]:
+            return Plan()  # check() says why
         hold = 1.2 * self["limit"]
         phases = [
             Phase("offset", "index", FACE, target=self.turn(), settle=0.5 * PAUSE, dwell=0.5 * PAUSE,

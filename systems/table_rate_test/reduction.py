@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
@@ -35,6 +36,7 @@ class AtRate:
     rate: float  # commanded
     error: float  # by counts, relative
     angle: float  # over which, rad
+    scatter: tuple[float, int]  # of the angles at the ends of windows about a line: sum of squares, rad2, and dof
     true: float | None  # relative error of the true mean rate
     mean: float  # of the tracking error, rad
     ripple: float  # its standard deviation, rad
@@ -110,10 +112,37 @@ def _at_rate(w: Mapping[str, Array], row: PlanRow) -> AtRate | None:
     used = pick[1:]
     ripples = np.asarray(w["std"][used], dtype=float)
     return AtRate(
-        row, rate, float(angle / time / rate - 1.0), float(abs(angle)), true(), float(np.mean(w["mean"][used])),
+        row, rate, float(angle / time / rate - 1.0), float(abs(angle)), _scatter(w, pick), true(),
+        float(np.mean(w["mean"][used])),
         float(np.sqrt(np.mean(ripples**2))), float(np.std(ripples, ddof=1) / math.sqrt(used.size)),
         float(np.sqrt(np.mean(w["jitter"][used] ** 2))) if "jitter" in w else None, shown("gate"), shown("inverse"),
     )  # fmt: skip
+
+
+def _scatter(w: Mapping[str, Array], pick: Any) -> tuple[float, int]:
+    """Return sum of squares and degrees of freedom of the angles at the ends of windows about their line."""
+    t, angle = w["t_end"][pick] - w["t_end"][pick[0]], w["angle_end"][pick] - w["angle_end"][pick[0]]
+    line = np.column_stack([np.ones_like(t), t])
+    rest = angle - line @ np.linalg.lstsq(line, angle)[0]
+    return float(rest @ rest), len(t) - 2
+
+
+def time_base(readings: Sequence[AtRate], quantum: float) -> tuple[float, float, float]:
+    """Return the relative error that all rates have in common, its u and the coverage factor of 95 %.
+
+    A reading errs by its rounding and by the motion of the table: the scatter of the angles at the ends of windows says
+    by how much, at each rate, and not less than by rounding.  The tracking error does not say it: the roundings of
+    command and reading go together where the table follows well.
+    """
+    weight, error, doubt = 0.0, 0.0, 0.0
+    for rate in {abs(r.rate) for r in readings}:
+        both = [r for r in readings if abs(r.rate) == rate]
+        dof = sum(r.scatter[1] for r in both)
+        one = max(sum(r.scatter[0] for r in both) / dof, quantum**2 / 12.0)
+        w = np.array([r.angle**2 / (2.0 * one) for r in both])
+        weight, error = weight + float(w.sum()), error + float(w @ [r.error for r in both])
+        doubt += float(w.sum()) ** 2 / dof
+    return error / weight, 1.0 / math.sqrt(weight), float(special.stdtrit(weight**2 / doubt, 0.975))
 
 
 def _result(record: Record, readings: list[AtRate], quantum: float, limits: Specification) -> LoopResult:
@@ -123,26 +152,21 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
     budget: list[BudgetLine] = []
 
     def add(name: str, meaning: str, unit: str, estimate: float, u: float, **more: Any) -> None:
-        half, truth = uncertainty.NORMAL * u, more.get("truth")
+        k, truth = more.get("k", uncertainty.NORMAL), more.get("truth")
+        half = k * u
         limit = limits.get(name)
         found.append(
             Coefficient(
-                name, meaning, unit, estimate, u, uncertainty.NORMAL, (estimate - half, estimate + half), u_a=u,
+                name, meaning, unit, estimate, u, k, (estimate - half, estimate + half), u_a=u,
                 closed=more.get("closed"), truth=truth, z=(estimate - truth) / u if truth is not None and u else None,
                 limit=limit, verdict=uncertainty.assess_conformity(estimate, half, limit),
             )
         )  # fmt: skip
 
-    # the time base: what all rates have in common.  A reading errs by its rounding and by the motion of the table; the
-    # ripple, of the tracking error in counts, holds the rounding of the command, too, which the table does not follow
-    errors = np.array([r.error for r in readings])
-    rounding = quantum**2 / 12.0
-    at_ends = np.array([math.sqrt(2.0 * max(r.ripple**2 - rounding, rounding)) / r.angle for r in readings])
-    weights = 1.0 / at_ends**2
-    clock, u_clock = float(np.sum(weights * errors) / np.sum(weights)), float(1.0 / math.sqrt(np.sum(weights)))
+    clock, u_clock, k_clock = time_base(readings, quantum)
     true_clock = run.parameters.get("command.reference_clock")
     add("time base", "relative error of the command's time base, all rates", "1e-6", clock / PPM, u_clock / PPM,
-        truth=None if true_clock is None else float(true_clock) / PPM)  # fmt: skip
+        k=k_clock, truth=None if true_clock is None else float(true_clock) / PPM)  # fmt: skip
     for rate in sorted({abs(r.rate) for r in readings}):
         both = [r for r in readings if abs(r.rate) == rate]
         angle = min(r.angle for r in both)

@@ -100,9 +100,12 @@ class TableRateTest(System):
     def rates(self) -> list[float]:
         """Return the rates in rad/s, both senses of each."""
         try:
-            return [sense * float(x) * ERU for x in str(self["rates"]).split() for sense in (1.0, -1.0)]
+            rates = [float(x) for x in str(self["rates"]).split()]
+            if not all(0.0 < abs(x) < math.inf for x in rates):
+                raise ValueError
+            return [sense * x * ERU for x in rates for sense in (1.0, -1.0)]
         except ValueError:
-            text = f"rates = {self['rates']!r}: numbers in ERU with spaces between are expected, as in '{RATES}'"
+            text = f"rates = {self['rates']!r}: numbers in ERU, not 0, with spaces between, as in '{RATES}'"
             raise InvalidValueError(text) from None
 
     def time_at(self, rate: float) -> float:

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation.mixture import equivalent_dof
 from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
@@ -50,10 +52,8 @@ class Precession:
         n, J = self.K.size, np.zeros(self.est.beta.size)
         J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
         sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
-        u = min(sd, half / noise_mixture_fit.NORMAL)
-        return u, float(
-            noise_mixture_fit.equivalent_dof(np.array([half / u if u > 0.0 else noise_mixture_fit.NORMAL]))[0]
-        )
+        u = min(sd, half / NORMAL)
+        return u, float(equivalent_dof(np.array([half / u if u > 0.0 else NORMAL]))[0])
 
 
 def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array) -> Precession:

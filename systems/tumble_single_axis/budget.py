@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gyrobench import frames
 from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 
 from .setup import TumbleSetup
 

@@ -97,6 +97,21 @@ def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[s
     return found
 
 
+def visit_problems(latitude: float, outer: Array, inner: Array) -> list[str]:
+    """Why positions at these angles (k,) cannot give nine coefficients, as sentences."""
+    if found := frames.latitude_problems(latitude):
+        return found
+    X = drift.regressors(-attitude(latitude, outer, inner) @ frames.U, NAMES)
+    if len(X) < len(NAMES):
+        return [f"visits: {len(X)} positions for {len(NAMES)} coefficients: at least {len(NAMES)} different ones"]
+    seen = regression.examine(X, NAMES)
+    if seen.rank < len(NAMES):
+        return [f"visits: rank {seen.rank} of {len(NAMES)}, not estimable: {'; '.join(seen.lost)}"]
+    if seen.condition > LIMIT:
+        return [f"visits: condition {seen.condition:.3g}, least determined is {seen.weakest}"]
+    return []
+
+
 def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
     """Why these positions cannot give nine coefficients, as sentences."""
     if found := frames.latitude_problems(latitude):

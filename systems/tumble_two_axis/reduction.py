@@ -26,8 +26,10 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, corrected
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
@@ -48,6 +50,7 @@ FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D
 @dataclass(frozen=True, kw_only=True)
 class TwoAxisSetup(RebalanceSetup):
     """k: torquer scale factor, rad/s/A.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
+    path: the positions lie on the path of this ratio, and not anywhere.
     quantum: resolution of the current reading.  pulses: those of a pulse-width rebalance, where it was counted.
     """
 
@@ -55,6 +58,7 @@ class TwoAxisSetup(RebalanceSetup):
     m: int = 5
     n: int = 1
     harmonic: bool = False
+    path: bool = True
     quantum: float = 0.0
     pulses: Pulses | None = None
     u_pulse: float = 0.0
@@ -99,12 +103,14 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
     if s.harmonic and why:
         raise ReductionError(why)
     found = fit(
-        [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"], [_group(s, theta)],
+        [_quantity(s, n, book) for n in geometry.NAMES], X, y, w["t_start"], w["t_end"],
+        [_group(s, theta) if s.path else _visited(w["phase"])],
         "drift rate", "°/h", DPH, candidates=weighed,
     )  # fmt: skip
     found = corrected(found, lambda f: _effects(s, f, outer, inner, C, readings), s.corrections)
-    _model_test(found, theta)
-    _cycle_test(found, theta)
+    if s.path:
+        _model_test(found, theta)
+        _cycle_test(found, theta)
     warnings = []
     if s.fold:
         warnings.append(
@@ -115,7 +121,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         found,
         system="tumble_two_axis",
         title="Two-axis tumble test of a floated gyro",
-        method=f"Torque-rebalance tumble on two axes in the ratio {s.m}:{s.n}, averaged at rest; least squares over "
+        method=f"Torque-rebalance tumble on two axes {_where(s)}, averaged at rest; least squares over "
         "all windows under an estimated noise model [TEST-TUMBLE2-SDF]",
         sources=[
             "TEST-TUMBLE2-SDF, TUM2AX-REDUCE, TUM2AX-LS; Hu 1981, eq. 3-47..3-53, corrected by E30-E34",
@@ -192,6 +198,15 @@ def _quantity(s: TwoAxisSetup, name: str, book: Mapping[str, float]) -> Quantity
     return q
 
 
+def _where(s: TwoAxisSetup) -> str:
+    return f"in the ratio {s.m}:{s.n}" if s.path else "in positions chosen one by one"
+
+
+def _visited(phase: Array) -> Group:
+    """Drift against the number of the visit, where the positions lie on no path."""
+    return Group("positions", np.arange(phase.size), phase, "number of the position", "")
+
+
 def _group(s: TwoAxisSetup, theta: Array) -> Group:
     dense = np.radians(np.arange(0.0, 360.5, 0.5))
     curve = _design(s, geometry.attitude(s.latitude, s.m * dense, s.n * dense))
@@ -205,6 +220,8 @@ def _harmonic_route(
 ) -> tuple[Array, dict[str, float], list[dict[str, Any]], list[dict[str, Any]], list[str]]:
     """theta of each window, coefficients by the formulas of Hu 1981, amplitudes, table of checks, and why not."""
     theta = outer / s.m
+    if not s.path:
+        return theta, {}, [], [], ["the positions do not lie on a path"]
     turn = 2.0 * math.pi
     numbers = np.unique(phase)
     rows = [phase == p for p in numbers]
@@ -330,7 +347,7 @@ def _conventions(s: TwoAxisSetup) -> list[str]:
     return [
         *s.sign_conventions(s.k),
         "Gyro axes I, O, S right-handed; local frame east, north, up; table angles right-handed, outer axis along the "
-        f"pole: outer angle {s.m} θ, inner angle {s.n} θ.",
+        f"pole{f': outer angle {s.m} θ, inner angle {s.n} θ' if s.path else ''}.",
         *([] if s.fold else ["D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."]),
     ]
 
@@ -344,6 +361,7 @@ def setup_of(run: RunDocument, specification: Specification | None = None) -> Tw
         m=int(run.options.get("m", 5)),
         n=int(run.options.get("n", 1)),
         harmonic=bool(run.options.get("harmonic", False)),
+        path=not run.options.get("visits", ""),
         truth=run_metadata.truth_of(run, drift.NAMES),
         quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
         pulses=Pulses.of(run),

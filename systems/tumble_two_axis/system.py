@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from gyrobench import drift
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
@@ -13,6 +15,8 @@ from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
 from gyrobench.system.families.table_test import Array, sampled, surroundings
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.values import InvalidValueError
+from gyrobench.system.visits import Visit, nearest_turn, parse_visits
 
 from . import geometry
 from .measured import MEASURED
@@ -29,6 +33,7 @@ class TumbleTwoAxis(RebalanceTest):
     title = "Two-axis tumble test"
     spec = ("TEST-TUMBLE2-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
     reduction = "reduction"
+    protocol = "design"
     slots = RebalanceTest.with_parts(gyro="floated_gyro", rebalance="rebalance_analog") | {
         "table": Slot("TwoAxisTable", "table_two_axis"),
         "sampler_inner": Slot("Sampler", "sampler"),
@@ -52,6 +57,7 @@ class TumbleTwoAxis(RebalanceTest):
             "n": Option(1, int, "inner angle of a position in units of theta", 1, 20),
             "positions": Option(36, int, "equally spaced positions of a cycle", 1, 99),
             "cycles": Option(1, int, "how often the positions are gone through (99 phases in all)", 1, 9),
+            "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(120.0, "s", "averaging time in each position"),
             "windows": Option(2, int, "averages a position", 1, 100),
             "inner_rate": Option(0.003, "rad/s", "rate of the inner axis in moves", sets="table.index_rate[2]"),
@@ -81,7 +87,12 @@ class TumbleTwoAxis(RebalanceTest):
         return geometry.base(self["latitude"])
 
     def plan(self) -> Plan:
-        """The positions in order, every one with both angles; angles are counted on through the turns."""
+        """The positions in order, every one with both angles; angles are counted on through the turns.
+
+        Of visits, in their order; each axis takes the shorter way.
+        """
+        if self["visits"]:
+            return self._visiting(self.visits())
         phases = []
         each = {"mode": "index", "face": "gyro", "settle": self["settle"], "dwell": self["dwell"]}
         each["window"] = self["dwell"] / self["windows"]
@@ -91,18 +102,47 @@ class TumbleTwoAxis(RebalanceTest):
             phases.append(Phase(label=label, target=self["m"] * theta, target_y=self["n"] * theta, **each))
         return Plan(phases, {"gyro": geometry.FACE.tolist()})
 
+    def visits(self) -> list[Visit]:
+        """Return the visits of the option.  Raises InvalidValueError."""
+        return parse_visits("visits", self["visits"], ("rad", "rad"), self["dwell"])
+
+    def _visiting(self, visits: list[Visit]) -> Plan:
+        phases = []
+        angles = (0.0, 0.0)
+        for v in visits:
+            outer, inner = v.place
+            angles = tuple(nearest_turn(a, b, 2.0 * math.pi) for a, b in zip(v.place, angles, strict=True))  # type: ignore[assignment]
+            label = f"{math.degrees(outer):.6g}°, {math.degrees(inner):.6g}°"
+            each = {"mode": "index", "face": "gyro", "settle": self["settle"], "dwell": v.dwell}
+            window = v.dwell / self["windows"]
+            phases.append(Phase(label=label, target=angles[0], target_y=angles[1], window=window, **each))
+        return Plan(phases, {"gyro": geometry.FACE.tolist()})
+
     def check(self) -> list[str]:
+        if not self["inner_rate"] > 0.0:
+            return ["inner_rate = 0: the inner axis would never arrive", *super().check()]
+        if self["visits"]:
+            return self._visit_problems() + super().check()
         values = (self["latitude"], self["m"], self["n"], self["positions"])
         problems = geometry.refusals(*values)
         if self["harmonic"] and not problems:
             problems = geometry.harmonic_problems(*values)
-        if not self["inner_rate"] > 0.0:
-            problems.append("inner_rate = 0: the inner axis would never arrive")
         return problems + super().check()
+
+    def _visit_problems(self) -> list[str]:
+        try:
+            angles = np.array([v.place for v in self.visits()])
+        except InvalidValueError as error:
+            return [str(error)]
+        if self["harmonic"]:
+            return ["harmonic: the positions of visits are not equally spaced on a path; leave out one of the two"]
+        return geometry.visit_problems(self["latitude"], angles[:, 0], angles[:, 1])
 
     def warnings(self) -> list[str]:
         from .reduction import cautions
 
+        if self["visits"]:
+            return []
         return cautions(self["latitude"], self["m"], self["n"], self["positions"])
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:

@@ -13,7 +13,7 @@ from gyrobench import drift, frames, units
 from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
-from gyrobench.reduction.estimation.linear_fit import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings, Group
 
 from . import geometry
 from .setup import OTHER, TwoChannelSetup, design

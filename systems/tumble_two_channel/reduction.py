@@ -27,8 +27,9 @@ from gyrobench.reduction.drift.pulses import Windows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import corrected, remounts
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems

@@ -11,6 +11,11 @@ white alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windo
 differences of readings, with errors of the readings too.  Windows are shortened, so the sizes are scaled: the parts get
 the densities that give a window the drawn shares.  ``--noise`` takes one instrument instead, a corner of the
 population; there intervals may hold the truth more or less often than 95 %.  README.md here has the figures.
+
+Each count is a campaign, on all cores; campaigns/*.toml are the same in files, which keep their rows and go on where
+they were:
+
+    gyrobench campaign tests/benchmarks/campaigns/tumble_single_axis.toml --out FOLDER
 """
 
 from __future__ import annotations
@@ -28,11 +33,12 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+import gyrobench as gb
 from gyrobench import drift, frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
 from gyrobench.reduction.estimation.noise import mean_variance
-from gyrobench.system.system import System, load_system
+from gyrobench.system.system import load_system
 
 DPH, ARCSEC, G0 = math.pi / 648000.0, math.pi / 648000.0, 9.80665
 KU = 1e3 * DPH  # deg/h/mA
@@ -291,33 +297,49 @@ class Count:
         return low, float(stats.beta.ppf(1.0 - a, h + 1, n - h)) if h < n else 1.0
 
 
-def coverage(case: Case, runs: int, seed: int = 1, corner: str = "population") -> dict[str, Count]:
-    """Counts of each coefficient whose truth is known."""
+def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> list[Values]:
+    """What each run of a case is given: values and a seed."""
     rng = np.random.default_rng(seed)
-    system: System = load_system(case.system)
-    found: dict[str, Count] = {}
     with Session(case.system) as session:
         probe = case.drawn(rng)
         with seen_windows() as seen:
-            system.with_values(probe).reduce(session.run(probe, seed=1))
-        t0, t1, readings = seen[0]
-        window = float(np.median(t1 - t0))
-        for run in range(runs):
-            if corner == "population":
-                noisy = Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
-            else:
-                tau, share, reading = CORNERS[corner]
-                noisy = Noise(tau * window, share, reading, window)
-            drawn = case.drawn(rng)
-            values = {**drawn, **case.noise(noisy, drawn)}
-            record = session.run(values, seed=seed * 1_000_000 + run)
-            for c in system.with_values(values).reduce(record).coefficients:
-                if c.truth is None:
-                    continue
-                count = found.setdefault(c.name, Count(0, 0, []))
-                count.hits += bool(c.interval[0] <= c.truth <= c.interval[1])
-                count.runs += 1
-                count.z.append((c.estimate - c.truth) / c.u)
+            load_system(case.system).with_values(probe).reduce(session.run(probe, seed=1))
+    t0, t1, readings = seen[0]
+    window = float(np.median(t1 - t0))
+    found = []
+    for run in range(runs):
+        if corner == "population":
+            noisy = Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
+        else:
+            tau, share, reading = CORNERS[corner]
+            noisy = Noise(tau * window, share, reading, window)
+        drawn = case.drawn(rng)
+        found.append({**drawn, **case.noise(noisy, drawn), "seed": seed * 1_000_000 + run})
+    return found
+
+
+def rows(case: str, runs: int, seed: int = 1, noise: str = "population") -> list[Values]:
+    """The table of a campaign in campaigns/*.toml."""
+    return draws(CASES[case], runs, seed, noise)
+
+
+def coverage(case: Case, runs: int, seed: int = 1, corner: str = "population", **how: Any) -> dict[str, Count]:
+    """Counts of each coefficient whose truth is known; how: out, workers ... of a campaign."""
+    asked = {"system": case.system, "table": draws(case, runs, seed, corner), "check_step": False, "keep": "none"}
+    return counts(gb.campaign(asked, **how))
+
+
+def counts(frame: Any) -> dict[str, Count]:
+    """Counts in the rows of a campaign.  A run without a result is none of them, and is an error here."""
+    failed = frame[frame["state"] != "done"]
+    assert failed.empty, failed["reason"].tolist()[:3]
+    found = {}
+    for name in [c.removesuffix(".truth") for c in frame.columns if c.endswith(".truth")]:
+        low, high, truth, value, u = (frame[f"{name}.{k}"] for k in ("lo", "hi", "truth", "estimate", "u"))
+        known = truth.notna()
+        if known.any():
+            hits = ((low <= truth) & (truth <= high))[known].sum()
+            found[name] = Count(int(hits), int(known.sum()), ((value - truth) / u)[known].tolist())
     return found
 
 
@@ -327,6 +349,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--noise", default="population", choices=["population", *CORNERS])
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, help="default: one for each core")
     parser.add_argument("--markdown", action="store_true", help="one line of a table for each system")
     given = parser.parse_args()
     unknown = [n for n in given.system if not any(c == n or c.startswith(f"{n},") for c in CASES)]
@@ -337,7 +360,7 @@ def main() -> int:
         if given.system and not any(name == n or name.startswith(f"{n},") for n in given.system):
             continue
         began = time.monotonic()
-        found = coverage(case, given.runs, given.seed, given.noise)
+        found = coverage(case, given.runs, given.seed, given.noise, workers=given.workers)
         took = time.monotonic() - began
         if given.markdown:
             parts = ", ".join(f"{n} {c.hits / c.runs:.3f}" for n, c in found.items())

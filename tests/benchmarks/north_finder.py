@@ -1,11 +1,13 @@
 """North finding, counted: is the heading unbiased, is sigma right, do the intervals hold; how long ten thousand take.
 
-    python tests/benchmarks/north_finder.py [METHOD ...] [--runs 3000] [--time 300] [--trend]
+    python tests/benchmarks/north_finder.py [METHOD ...] [--runs 3000] [--time 300] [--trend] [--population]
 
 Each run draws heading, latitude (to 70 deg), bias of the gyro and, for tilt and strapdown, the attitude (tilt: 10 mrad,
 strapdown: 0.5 rad), and is a co-simulation at 1 kHz.  Printed: mean error of the finder over its sigma, and rms over
 sigma, both with the standard error they have by chance, and how often the 95 % interval of the reduction holds the
 heading.  The noise is white; --trend leaves the nuisance model in (a linear drift of the bias may be there).
+--population: noise of the same variance of a window from the population that intervals are made for (README): how often
+they hold, no more, as the sigma of the finder is that of white noise.
 """
 
 from __future__ import annotations
@@ -21,10 +23,14 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+from gyrobench import units
 from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation import noise
 from gyrobench.system.system import load_system
 from systems.north_finder import plans
 from systems.north_finder.reduction import from_record
+
+DPH = units.factor("deg/h")
 
 
 def drawn(method: str, rng: np.random.Generator) -> dict[str, Any]:
@@ -36,15 +42,33 @@ def drawn(method: str, rng: np.random.Generator) -> dict[str, Any]:
     return values
 
 
-def counted(job: tuple[str, int, int, float, bool]) -> list[tuple[float, float, bool]]:
+def coloured(windows: dict[str, Any], rng: np.random.Generator) -> dict[str, float]:
+    """Noise of an instrument of the population, of the variance that the white noise of the part leaves in a window."""
+    t0, t1 = (np.unique(np.asarray(windows[n], dtype=float)) for n in ("t_start", "t_end"))
+    tau, share, _ = noise.sample_instrument(rng, t0, t1)
+    window = float(np.median(t1 - t0))
+    white = 0.3 * DPH
+    drift = white * math.sqrt(share / window / float(noise.mean_variance(np.array(window / tau))))
+    return {
+        f"gyro.{name}_{axis}": value for axis in "xy"
+        for name, value in (("white", white * math.sqrt(1.0 - share)), ("markov", drift))
+    } | {f"gyro.markov_{axis}_tau": tau for axis in "xy"}  # fmt: skip
+
+
+def counted(job: tuple[str, int, int, float, bool, bool]) -> list[tuple[float, float, bool]]:
     """Errors of the finder over its sigma, and whether the interval of the reduction holds."""
-    method, first, runs, total, trend = job
+    method, first, runs, total, trend, population = job
+    windows: dict[str, Any] = {}
     system = load_system("north_finder")
     system.set("method", method)
     found = []
     with Session(system) as session:
         for k in range(first, first + runs):
-            values = drawn(method, np.random.default_rng(k)) | {"time": total}
+            rng = np.random.default_rng(k)
+            values = drawn(method, rng) | {"time": total}
+            if population:
+                windows = windows or session.run(values, seed=k).windows
+                values |= coloured(windows, rng)
             record = session.run(values | {"nuisances": "auto" if trend else "none"}, seed=k)
             error = math.remainder(float(record.channels["finder.heading"][-1]) - values["heading"], 2.0 * math.pi)
             psi = from_record(record)["ψ"]
@@ -59,20 +83,28 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3000)
     parser.add_argument("--time", type=float, default=300.0)
     parser.add_argument("--trend", action="store_true")
+    parser.add_argument("--population", action="store_true")
     given = parser.parse_args()
     begun = time.perf_counter()
     for method in given.method:
         n = 50
-        jobs = [(method, k, min(n, given.runs - k), given.time, given.trend) for k in range(0, given.runs, n)]
+        jobs = [
+            (method, k, min(n, given.runs - k), given.time, given.trend, given.population)
+            for k in range(0, given.runs, n)
+        ]
         with Pool(2) as pool:
             rows = [row for part in pool.imap(counted, jobs) for row in part]
         z = np.array([e / s for e, s, _ in rows])
         rms = float(np.sqrt(np.mean(z**2)))
         held = float(np.mean([h for *_, h in rows]))
         size = len(rows)
+        moments = (
+            f"mean {np.mean(z):+.3f} ± {1 / math.sqrt(size):.3f} sigma, rms {rms:.3f} ± "
+            f"{1 / math.sqrt(2 * size):.3f} sigma, "
+        )
         print(
-            f"{method:<15}{size} runs: mean {np.mean(z):+.3f} ± {1 / math.sqrt(size):.3f} sigma, rms {rms:.3f} ± "
-            f"{1 / math.sqrt(2 * size):.3f} sigma, held {held:.3f} ± {math.sqrt(0.95 * 0.05 / size):.3f}",
+            f"{method:<15}{size} runs: {'' if given.population else moments}held {held:.3f} ± "
+            f"{math.sqrt(0.95 * 0.05 / size):.3f}",
             flush=True,
         )
     total = given.runs * len(given.method)

@@ -2,8 +2,8 @@
 
     python tests/benchmarks/peers.py NAME FOLDER STEPS
 
-FOLDER holds loop.ssp, loop.fmu (container) and the four FMUs.  Prints {"us": microseconds a step, "at_1s": plant
-position at t = 1 s}.  Only the stepping is timed; every master reads two channels each 10 ms.
+FOLDER holds loop.ssp, loop.fmu (container), one.fmu (linked) and the four FMUs.  Prints {"us": microseconds a step,
+"at_1s": plant position at t = 1 s}.  Only the stepping is timed; every master reads two channels each 10 ms.
 """
 
 from __future__ import annotations
@@ -35,6 +35,10 @@ def ours(folder: Path, steps: int, engine: str = "native") -> tuple[float, float
         t = time.perf_counter()
         record = session.run({"duration": steps * H})
         return time.perf_counter() - t, float(record.channels["plant.position"][AT_1S + 1])
+
+
+def linked(folder: Path, steps: int) -> tuple[float, float]:
+    return ours(folder, steps, "linked")
 
 
 def reference(folder: Path, steps: int) -> tuple[float, float]:
@@ -84,11 +88,15 @@ def fmpy_ssp(folder: Path, steps: int) -> tuple[float, float]:
     return seconds, float(result[name][row])
 
 
-def container(folder: Path, steps: int) -> tuple[float, float]:
-    """One FMU of the toolbox around the four, stepped 10 ms at a time and read each time."""
+def one_fmu(folder: Path, steps: int) -> tuple[float, float]:
+    return container(folder, steps, "one.fmu")
+
+
+def container(folder: Path, steps: int, name: str = "loop.fmu") -> tuple[float, float]:
+    """One FMU in FMPy, of the toolbox around the four or the linked one, stepped 10 ms at a time and read each time."""
     import fmpy
 
-    path = str(folder / "loop.fmu")
+    path = str(folder / name)
     description = fmpy.read_model_description(path)
     fmu = fmpy.instantiate_fmu(fmpy.extract(path), description, "CoSimulation")
     vr = {v.name: v.valueReference for v in description.modelVariables}
@@ -143,6 +151,8 @@ def libcosimpy(folder: Path, steps: int) -> tuple[float, float]:
 
 PEERS = {
     "gyrobench, native engine": ours,
+    "gyrobench, linked": linked,
+    "gyrobench, one FMU in FMPy": one_fmu,
     "gyrobench, reference engine": reference,
     "FMPy, loop of its API": fmpy_loop,
     "FMPy, simulate_ssp": fmpy_ssp,

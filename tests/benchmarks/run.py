@@ -25,7 +25,13 @@ import peers
 
 HERE = Path(__file__).parent
 ROUNDS = 3
-STEPS = {"gyrobench, native engine": 1_000_000, "toolbox container, sequential": 300_000, "ecospy": 100_000}
+STEPS = {
+    "gyrobench, native engine": 1_000_000,
+    "gyrobench, linked": 1_000_000,
+    "gyrobench, one FMU in FMPy": 1_000_000,
+    "toolbox container, sequential": 300_000,
+    "ecospy": 100_000,
+}
 ROWS: list[tuple[str, str, str, str]] = []
 
 
@@ -56,6 +62,7 @@ def masters(quick: bool) -> None:
     """The engine against its peers, in turn, ROUNDS times; medians."""
     from gyrobench.exchange.container import export_container
     from gyrobench.exchange.ssp_export import export_ssp
+    from gyrobench.exchange.system_fmu import export_fmu
     from gyrobench.packaging import build
     from gyrobench.system.system import load_system
 
@@ -67,6 +74,7 @@ def masters(quick: bool) -> None:
         export_ssp(load_system("loop", peers.BENCH), folder / "loop.ssp", bench=peers.BENCH)
         with zipfile.ZipFile(folder / "loop.ssp") as z:
             z.extractall(folder / "loop")
+        export_fmu(load_system("loop", peers.BENCH), folder / "one.fmu", bench=peers.BENCH)
         try:
             export_container(load_system("loop", peers.BENCH), folder / "loop.fmu", bench=peers.BENCH)
         except Exception as error:
@@ -89,16 +97,41 @@ def masters(quick: bool) -> None:
 
 
 RUN = """
-import sys, time
+import hashlib, os, sys
 from pathlib import Path
 from gyrobench.bench import standard_folder
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
-with Session(load_system("tumble_single_axis", standard_folder()), bench=standard_folder()) as session:
-    began = time.process_time()
+system = load_system("tumble_single_axis", standard_folder())
+with Session(system, bench=standard_folder(), engine=sys.argv[1]) as session:
+    session.run({"rate": "2deg/s", "dwell": "30s"})
+    began = sum(os.times()[:4])  # of this process and of its children, in which runs happen
     record = session.run()
-    print(time.process_time() - began, record.run.steps)
+    took = sum(os.times()[:4]) - began
+    data = b"".join(c.tobytes() for table in (record.windows, record.channels) for c in table.values())
+    print(took, hashlib.sha256(data).hexdigest())
 """
+
+ONE = """
+import sys, time
+from fmpy import extract, read_model_description, instantiate_fmu
+d = read_model_description(sys.argv[1])
+fmu = instantiate_fmu(extract(sys.argv[1]), d, "CoSimulation")
+done = [v.valueReference for v in d.modelVariables if v.name == "sequencer.done"]
+fmu.setupExperiment(startTime=0.0)
+fmu.enterInitializationMode()
+fmu.exitInitializationMode()
+began, k = time.process_time(), 0
+while not fmu.getReal(done)[0]:
+    fmu.doStep(10.0 * k, 10.0)
+    k += 1
+print(time.process_time() - began)
+"""
+
+
+def printed(program: str, *words: str) -> str:
+    """Return what a Python program prints."""
+    return subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, check=True).stdout
 
 
 def tumble(quick: bool) -> None:
@@ -111,19 +144,31 @@ def tumble(quick: bool) -> None:
         options = ["--force", "--out", str(folder / "run")]
         command = [sys.executable, "-m", "gyrobench", "run", "tumble_single_axis", *options]
         subprocess.run([*command, "--set", "rate=2deg/s", "--set", "dwell=30s"], capture_output=True, check=True)
-        whole, stepping, floor = [], [], []
+        export = [sys.executable, "-m", "gyrobench", "export", "tumble_single_axis", "--to", "fmu"]
+        subprocess.run([*export, "--out", str(folder / "one.fmu")], capture_output=True, check=True)
+        whole, floor, one = [], [], []
+        stepping: dict[str, list[float]] = {"native": [], "linked": []}
+        digests = set()
         for _ in range(1 if quick else ROUNDS):
             floor.append(json.loads(subprocess.run([loop], capture_output=True, check=True).stdout)["seconds"])
-            out = subprocess.run([sys.executable, "-c", RUN], capture_output=True, text=True, check=True).stdout
-            stepping.append(float(out.split()[0]))
+            for engine, times in stepping.items():
+                took, digest = printed(RUN, engine).split()
+                times.append(float(took))
+                digests.add(digest)
+            one.append(float(printed(ONE, str(folder / "one.fmu"))))
             began = time.perf_counter()
             subprocess.run(command, capture_output=True, check=True)
             whole.append(time.perf_counter() - began)
         meta = json.loads((folder / "run" / "run.json").read_text())
         steps = meta["steps"]
-        w, r, f = (statistics.median(x) for x in (whole, stepping, floor))
+        w, f = statistics.median(whole), statistics.median(floor)
         row("one hand-written C loop, CPU time", f"{f:.2f} s", "", f"{1e9 * f / steps:.0f} ns a step")
-        row("the run of six FMUs, CPU time", f"{r:.2f} s", "", f"{r / f:.1f} x the C loop (budget 5)")
+        forms = {"linked form": stepping["linked"], "FMI calls": stepping["native"], "one FMU, FMPy": one}
+        for what, took in forms.items():
+            r = statistics.median(took)
+            budget = "2.0 x" if what == "linked form" else ""
+            row(f"the six parts, {what}, CPU time", f"{r:.2f} s", budget, f"{r / f:.2f} x the C loop")
+        row("records of both forms", "bit-equal" if len(digests) == 1 else "DIFFERENT", "bit-equal")
         row("command to report, wall time", f"{w:.2f} s", "15 s")
         for slot, seconds in meta["timing"].items():
             row(f"  {slot}", f"{1e6 * seconds / steps:.3f} us", "0.10 us", "a step, in the run, timer included")
@@ -132,14 +177,14 @@ def tumble(quick: bool) -> None:
 
 
 PLATFORM = """
-import sys, time
+import os, sys, time
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.engine.session import Session
 with Session("platform_three_axis", engine=sys.argv[1]) as s:
     type(s.system).plan = lambda self: LoopPlan([LoopPhase("hold", dwell=float(sys.argv[2]))])
-    began, wall = time.process_time(), time.perf_counter()
+    began, wall = sum(os.times()[:4]), time.perf_counter()
     record = s.run({"motion.preset": 2})
-    print(time.process_time() - began, time.perf_counter() - wall, record.run.steps)
+    print(sum(os.times()[:4]) - began, time.perf_counter() - wall, record.run.steps)
 """
 
 

@@ -10,6 +10,7 @@ the run is made a second time, stopped in the middle and continued, and the reco
 from __future__ import annotations
 
 import argparse
+import os
 import resource
 import tempfile
 import time
@@ -27,14 +28,14 @@ ENCODER = {
 
 
 def timed(what: str, values: dict[str, str], step: float, out: Path, **how: object) -> Record | None:
-    wall, cpu = time.perf_counter(), time.process_time()
+    wall, cpu = time.perf_counter(), sum(os.times()[:4])
     try:
         record = run(NAME, values=values, step=step, seed=3, out=out, **how)  # type: ignore[arg-type]
     except RunError as stopped:
         record = None
         what += f" ({str(stopped).splitlines()[0]})"
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    wall, cpu = time.perf_counter() - wall, sum(os.times()[:4]) - cpu  # the run happens in a child process
+    memory = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
     steps = f", {record.run.steps} steps" if record is not None else ""
     print(f"{what}: wall {wall:.0f} s, CPU {cpu:.0f} s{steps}, {memory:.0f} MB", flush=True)
     return record

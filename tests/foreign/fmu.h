@@ -1,7 +1,8 @@
 /* The FMI 2.0 co-simulation interface around an array of values, for the foreign FMUs of the tests.
 
    An FMU defines NV (number of variables), `start[NV]`, and the functions `initialize`, `step` and `outputs`; a value
-   reference is the place in `v`, whatever the type.  `say` logs through the FMI logger. */
+   reference is the place in `v`, whatever the type.  `say` logs through the FMI logger.  With OWN_TERMINATE the FMU has its own
+   fmi2Terminate, with NO_INSTANCE it cannot be instantiated. */
 
 #include <math.h>
 #include <stdint.h>
@@ -38,6 +39,9 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String where,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     (void)type; (void)guid; (void)where; (void)visible; (void)logging;
+#ifdef NO_INSTANCE
+    return NULL;
+#endif
     instance *m = calloc(1, sizeof *m);
     if (!m) return NULL;
     memcpy(m->v, start, sizeof m->v);
@@ -53,7 +57,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fm
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return initialize(c); }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
+#ifndef OWN_TERMINATE
 fmi2Status fmi2Terminate(fmi2Component c) { (void)c; return fmi2OK; }
+#endif
 fmi2Status fmi2Reset(fmi2Component c) {
     instance *m = c;
     memcpy(m->v, start, sizeof m->v);

@@ -30,8 +30,8 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
         '#include "model.c"\n'
         '#define SEEN __attribute__((visibility("default")))\n'
         "SEEN double ask_quantile(double p) {\n"
-        "    const lanes q = {p - 0.5};\n"
-        "    const lanes x = quantile_middle(q);\n"
+        "    lanes x = {p - 0.5};\n"
+        "    quantile_middle(&x);\n"
         "    return in_middle(p - 0.5) ? ((const double *)&x)[0] : quantile_tail(p, p - 0.5);\n"
         "}\n"
         "SEEN double ask_normal(uint64_t s, int port, uint64_t k, int ahead) {\n"

@@ -8,12 +8,13 @@ import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from toybench import HEAD, TOYS
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.packaging import SubsetError, compiler, load_part, native_target
-from gyrobench.packaging.dependencies import dependencies
+from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.instance import make
 from gyrobench.packaging.source import Source
 
@@ -290,6 +291,67 @@ def test_dependencies(written: Written) -> None:
         "through_output": {"a"},
         "none": set(),
     }
+
+
+def test_initial_dependencies(written: Written) -> None:
+    body = """\
+    a = Input(0.0, "1")
+    b = Input(0.0, "1")
+    p = Parameter(1.0, "1")
+    r = Parameter(2.0, "1")
+    seed = Parameter(1, int)
+    white = Noise(0.0, "1", per="start")
+    x = State(0.0, "1")
+    v = State(0.0, "1")
+    q = Discrete(0.0, "1")
+    y = Output("1")
+    z = Output("1")
+
+    def start(self):
+        self.q = self.p * self.b + self.noise.white
+        self.v = 3.0 * self.r
+
+    def flow(self):
+        self.der.x = self.a - self.x
+        self.der.v = 0.0
+
+    def outputs(self):
+        self.y = self.q
+        self.z = self.v + self.der.x
+"""
+    source = Source(written("toy", body))
+    found = initial_dependencies(source)
+    assert found["y"] == {"p", "b", "white", "seed"}
+    assert found["z"] == {"r", "v", "a", "x"}
+    assert found["der.x"] == {"a", "x"}
+    assert found["der.v"] == set()
+
+
+@pytest.mark.parametrize("name", ["floated_gyro", "rebalance_analog"])
+@pytest.mark.parametrize("kind", ["native", "native-fmi3"])
+def test_initial_outputs_follow_nothing_that_is_not_declared(instance: Callable, name: str, kind: str) -> None:
+    """Each parameter, input and state is changed by itself during initialization."""
+    one = instance(name, kind)
+    known = [v for v in one.description.modelVariables if v.causality in ("parameter", "input") or v.initial == "exact"]
+    known = [v for v in known if not v.name.startswith(("mount", "terms"))]  # few of their values are legal
+    declared = {u.variable.name: {d.name for d in u.dependencies} for u in one.description.initialUnknowns}
+    outputs = [v.name for v in one.description.modelVariables if v.causality == "output"]
+    fmu = one.fmu
+    if not one.three:
+        fmu.setupExperiment()
+    fmu.enterInitializationMode()
+    rng = np.random.default_rng(1)
+    changed = 0
+    real = [v for v in known if v.type in ("Real", "Float64") and v.causality != "parameter"]
+    one.set({v.name: rng.uniform(0.1, 0.2) for v in real})
+    for v in known:
+        before, now = one.get(outputs), one.get([v.name])[0]
+        one.set({v.name: 1.0 - now if v.type == "Boolean" else 1.5 * now + (0.1 if v in real else 0.0)})
+        for output, x, y in zip(outputs, before, one.get(outputs), strict=True):
+            changed += x != y
+            assert x == y or v.name in declared[output], f"{output} follows {v.name}"
+        one.set({v.name: now})
+    assert changed >= 2
 
 
 def test_dependencies_are_in_the_description(instance: Callable) -> None:

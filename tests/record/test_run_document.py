@@ -133,8 +133,8 @@ def test_keys_of_a_newer_version_are_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[1]", "not a readable run.json: a JSON object is expected"),
-        ("{", "not a readable run.json: Expecting property name"),
+        ("[1]", "not a JSON object"),
+        ("{", "not a JSON file: Expecting property name"),
         ('{"plan": [{"phase": "first"}]}', r"not a run.json of gyrobench: plan.0.phase: .*integer"),
         ('{"step": "fast", "seed": 1.5, "order": 1, "cuts": 2}', r"step: .*; .*; and 1 more"),
     ],
@@ -143,7 +143,7 @@ def test_what_is_no_run_json_is_refused(tmp_path: Path, text: str, message: str)
     (tmp_path / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(RecordError, match=message):
         read_run(tmp_path)
-    with pytest.raises(RecordError, match=r"nothing here/run\.json: not a readable run\.json"):
+    with pytest.raises(RecordError, match=r"nothing here/run\.json: No such file"):
         read_run(tmp_path / "nothing here")
 
 

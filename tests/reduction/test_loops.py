@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.loops import loop_result
+from gyrobench.reduction.loops import loop_curves
 from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, step, step_noise_std
 from gyrobench.reduction.window_checks import ReductionError
 
@@ -195,7 +195,7 @@ def test_step_response_of_a_linear_model() -> None:
         if k % 10 == 0:
             expected.append(C[1] @ x + D[1, 1] * 2.5)
         x = A @ x + B[:, 1] * 2.5
-    computed = loop_result._simulated(model, gate, "v")  # type: ignore[arg-type]
+    computed = loop_curves.simulated(model, gate, "v")  # type: ignore[arg-type]
     np.testing.assert_allclose(computed, expected, rtol=0.0, atol=1e-12 * np.max(np.abs(expected)))
 
 

@@ -16,6 +16,7 @@ from scipy import stats
 
 from gyrobench import drift
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
+from gyrobench.reduction.estimation.mixture import Mixture
 from gyrobench.reduction.estimation.regression import RegressionError, generalized_least_squares, least_squares
 
 _spec = importlib.util.spec_from_file_location("coverage_of_tumble", Path(__file__).with_name("coverage.py"))
@@ -264,7 +265,7 @@ def test_combinations_are_of_the_mixture() -> None:
     """Two candidates by hand: t of 1e9 degrees, sd 1 and 2 about 0.5 and -0.5, weights alike; of the sum of the two
     coefficients, which are independent, the means are +-1 and the sd sqrt2 and 2 sqrt2: variance (2 + 8)/2 + 1.
     """
-    m = noise_mixture_fit.Mixture(
+    m = Mixture(
         np.array([0.5, 0.5]), np.array([[0.5, 0.5], [-0.5, -0.5]]), np.array([np.eye(2), 4.0 * np.eye(2)]), 10**9
     )
     sd, half = m.spread(np.array([[1.0, 1.0], [1.0, 0.0]]))

@@ -14,8 +14,10 @@ import pytest
 from gyrobench import units
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import Remount, remounts
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import linear_result
-from gyrobench.reduction.estimation.linear_fit import Findings, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 
 _spec = importlib.util.spec_from_file_location(
     "setup_effects", Path(__file__).parents[1] / "benchmarks" / "setup_effects.py"

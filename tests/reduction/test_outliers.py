@@ -9,8 +9,10 @@ import pytest
 
 from gyrobench import units
 from gyrobench.reduction.estimation import outliers
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import linear_result
-from gyrobench.reduction.estimation.linear_fit import Findings, Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 
 DPH = units.factor("deg/h")
 N = 88

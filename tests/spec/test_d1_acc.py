@@ -133,9 +133,21 @@ def test_seven_points_are_needed() -> None:
         X = np.column_stack([np.ones(n), *(f(h * t) for h in (1, 2, 3) for f in (np.cos, np.sin))])
         assert np.linalg.matrix_rank(X) == rank
     k = polynomial(np.random.default_rng(0))
-    for n in (5, 6):
-        with pytest.raises(ReductionError, match="three harmonics need at least 7"):
-            reduced(windows(k, {"a": 0.0}, 1.0, n, turns=4), 1.0, {"a": 0.0})
+    with pytest.raises(ReductionError, match="three harmonics need at least 7"):
+        reduced(windows(k, {"a": 0.0}, 1.0, 5, turns=4), 1.0, {"a": 0.0})
+    with pytest.raises(ReductionError, match="rank 5 for 6 coefficients; not estimable: k3"):
+        reduced(windows(k, {"a": 0.0}, 1.0, 6, turns=4), 1.0, {"a": 0.0})
+
+
+def test_six_points_off_the_axes_are_enough() -> None:
+    """Of three harmonics the model lacks the cosine of the third: 30, 90 ... degrees determine its six unknowns."""
+    k = polynomial(np.random.default_rng(0))
+    angles = [math.radians(30.0 + 60.0 * j) for j in range(6)] * 3
+    r = reduced(windows(k, {"a": 1e-3}, 1.0, 0, angles=angles), 1.0, {"a": 1e-3})
+    by = {c.name: c for c in r.coefficients}
+    for name in ("k0", "k2", "k3", "k5"):
+        assert by[name].estimate == pytest.approx(1e6 * k[name], abs=1e-3)
+    assert by["k1"].estimate == pytest.approx(k["k1"], abs=1e-9)
 
 
 @pytest.mark.parametrize("n", [8, 12, 24])

@@ -83,19 +83,19 @@ def small() -> SmallTumble:
 
 
 @pytest.fixture(scope="session")
-def make(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Builds a foreign FMU of tests/foreign once."""
+def make(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Builds a foreign FMU of tests/foreign once, with each set of the compiler's flags."""
     file = Path(__file__).parents[1] / "foreign" / "make.py"
     spec = importlib.util.spec_from_file_location("foreign_make", file)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    folder = tmp_path_factory.mktemp("foreign")
-    done: dict[str, Path] = {}
+    done: dict[tuple[str, ...], Path] = {}
 
-    def make_once(name: str) -> Path:
-        if name not in done:
-            done[name] = module.make(name, folder)
-        return done[name]
+    def make_once(name: str, *flags: str) -> Path:
+        key = (name, *flags)
+        if key not in done:
+            done[key] = module.make(name, tmp_path_factory.mktemp("foreign"), *flags)
+        return done[key]
 
     return make_once

@@ -6,9 +6,11 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from fmpy import read_model_description
 
 from gyrobench.engine.session import Session, run
 from gyrobench.exchange.container import export_container
@@ -61,11 +63,24 @@ def test_ssp_is_valid_and_reproducible(small: System, archive: Path, tmp_path: P
     values = {p.name: float(p.value) for p in read_ssv(str(archive), "resources/parameters.ssv").parameters}
     assert values["site.latitude"] == pytest.approx(np.radians(45.75), rel=1e-15)
     assert values["sequencer.modes[2]"] == 2
+    # start values of inputs: what the outputs give after initialization
+    assert values["table.face[1,1]"] == 1.0
+    assert values["gyro.f[3]"] == pytest.approx(9.8067, abs=1e-3)  # the output z of the table is up, 45.75 deg
     units = {u.name for u in ssd.units}
     assert {"rad/s", "m/s2", "V", "A"} <= units
     export_ssp(small, tmp_path / "again.ssp", values=QUICK)
     assert (tmp_path / "again.ssp").read_bytes() == archive.read_bytes()
-    assert b"Annotation" not in zipfile.ZipFile(archive).read("SystemStructure.ssd")
+    with zipfile.ZipFile(archive) as z:
+        text = z.read("SystemStructure.ssd").decode()
+        names = {ET.fromstring(z.read(n)).get("name") for n in z.namelist() if n.endswith(".ssv")}
+        z.extract("resources/gyro.fmu", tmp_path)
+    assert 'FixedStepMaster description="oms-ma" stepSize="0.001"' in text
+    assert names == {"smalltumble"}  # one name of all sets, which some importers look for
+    sampler = text[text.index('<ssd:Component name="sampler"') :]
+    x = sampler[sampler.index('<ssd:Connector name="x"') :]
+    assert x[: x.index("</ssd:Connector>")].count("unit=") == 0  # any unit: others refuse "A" into "1"
+    fmu = read_model_description(str(tmp_path / "resources" / "gyro.fmu"))
+    assert float(fmu.defaultExperiment.stepSize) == 1e-3
 
 
 def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path) -> None:
@@ -150,7 +165,7 @@ def test_factors_are_transformations_or_refused(small: System, make: Make, tmp_p
     # table.f -> ACC_IA: load in g = -f / g0
     assert f'LinearTransformation factor="{1.0 / -9.80665!r}"' in text
     assert text.count('suppressUnitConversion="true"') == 3 + 3 + 1 + 1  # omega, f, i, u
-    with pytest.raises(ExportError, match=r"cannot apply the factors of .*table\.f -> gyro\.f"):
+    with pytest.raises(ExportError, match=r"cannot apply the factors and offsets of .*table\.f -> gyro\.f"):
         export_container(small, tmp_path / "v.fmu", parts=parts, maps=MAPPED)
 
 

@@ -17,7 +17,7 @@ import pytest
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE
-from gyrobench.engine.run_driver import _CtrlC
+from gyrobench.engine.run_driver import Interrupts
 from gyrobench.files import LOCK, FolderInUseError, FolderLock, sweep
 from gyrobench.record.record import Record
 
@@ -134,7 +134,7 @@ def test_an_ignored_hangup_stays_ignored() -> None:
     """nohup: the end of the terminal is no end of the run."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with _CtrlC() as ended:
+        with Interrupts() as ended:
             signal.raise_signal(signal.SIGHUP)
             assert not ended.pressed and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
             signal.raise_signal(signal.SIGTERM)

@@ -17,7 +17,7 @@ import pytest
 from gyrobench.commands import cli, progress_display
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE, CheckpointManager, ResumeError
-from gyrobench.engine.fmu_instance import LocalInstance
+from gyrobench.engine.fmu_instance import FmuInstance
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.engine.session import RunInterrupted, Session, run
 from gyrobench.record.record import Record
@@ -155,24 +155,27 @@ def test_a_part_that_cannot_save_its_state(small: System, make: Make, tmp_path: 
         run(small, seed=5, out=tmp_path, resume=True, **setup)
 
 
-def test_isolated_slots_are_refused(small: System, tmp_path: Path) -> None:
-    why = "gyro: an FMU in a process of its own"
-    assert f"it cannot be resumed: {why}" in str(stop(small, tmp_path, 0.1, isolate=["gyro"]))
-    with pytest.raises(ResumeError, match=f"--resume: {why}"):
-        run(small, values=QUICK, seed=5, out=tmp_path, resume=True, isolate=["gyro"])
+def test_a_child_resumes(small: System, tmp_path: Path) -> None:
+    """Stopped and resumed in one process or another: the checkpoint is the same, and its times come back."""
+    whole = run(small, values=QUICK, seed=5)
+    stop(small, tmp_path / "r", 0.2, child=True)
+    stop(small, tmp_path / "r", 0.4, resume=True)
+    found = run(small, values=QUICK, seed=5, out=tmp_path / "r", resume=True, child=True)
+    assert found.same_data(whole) and found.run.resumed_at == pytest.approx([0.2, 0.4])
+    assert not (tmp_path / "r" / FILE).exists()
 
 
 def test_an_fmu_that_saves_only_half_of_its_state(
     small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stop(small, tmp_path, 0.3)
-    whole = checkpoint.load_state
+    whole = FmuInstance.load_state
 
-    def forgetful(instance: LocalInstance, data: bytes) -> None:
+    def forgetful(instance: FmuInstance, data: bytes) -> None:
         if instance.slot != "gyro":
             whole(instance, data)
 
-    monkeypatch.setattr(checkpoint, "load_state", forgetful)
+    monkeypatch.setattr(FmuInstance, "load_state", forgetful)
     with pytest.raises(ResumeError, match="gyro: the outputs of the FMU are not those it had when its state was saved"):
         run(small, values=QUICK, seed=5, out=tmp_path, resume=True)
 
@@ -220,7 +223,9 @@ def command(words: list[str], capture: Any, patch: pytest.MonkeyPatch) -> tuple[
     return code, out, err
 
 
-def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], unhurried: None
+) -> None:
     monkeypatch.chdir(tmp_path)
 
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:

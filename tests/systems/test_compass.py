@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
 
 NAME = "gyro_magnetic_compass"
+field = importlib.import_module(type(load_system(NAME)).__module__ + ".field")
 DEG = math.pi / 180.0
 QUIET = {"noise": 0.0, "random_drift": 0.0}
 
@@ -120,10 +123,55 @@ def test_random_heading_noise_is_that_of_the_two_filters() -> None:
 
 
 @pytest.mark.parametrize(
+    ("date", "latitude", "longitude", "height", "D", "inclination", "H"),
+    [
+        ("2020-01-01", 80, 0, 0, -1.28, 83.14, 6572.0),
+        ("2020-01-01", 0, 120, 100e3, 0.16, -15.55, 37636.9),
+        ("2022-07-02", -80, -120, 0, 69.13, -72.09, 16885.0),
+    ],
+)
+def test_field_of_a_day_is_the_world_magnetic_models(
+    date: str, latitude: float, longitude: float, height: float, D: float, inclination: float, H: float
+) -> None:
+    """Test values that NOAA publishes with WMM2020 (the last one: of 2022.5)."""
+    here = field.field_at(date, latitude * DEG, longitude * DEG, height)
+    assert here.declination / DEG == pytest.approx(D, abs=0.006)
+    assert here.inclination / DEG == pytest.approx(inclination, abs=0.006)
+    assert here.horizontal * 1e9 == pytest.approx(H, abs=0.5) and here.model.endswith("2020")
+    assert here.u_declination / DEG == pytest.approx(math.hypot(0.26, 5625.0 / H), rel=1e-3)
+
+
+def test_date_and_site_give_the_sensor_its_field() -> None:
+    """55.75 N, 37.6 E, 200 m: ppigrf with IGRF 14 has D 12.06, I 71.73 degrees, H 16.647 uT; the heading is true."""
+    place = {"latitude": 55.75 * DEG, "longitude": 37.6 * DEG, "height": 200.0}
+    values = {"date": "2026-07-02", "true_heading": True, **place, **QUIET}
+    found = reduced(("rest",), **values)
+    p = found.provenance["parameters"]
+    assert p["sensor.declination"] / DEG == pytest.approx(12.06, abs=0.1)
+    assert p["sensor.inclination"] / DEG == pytest.approx(71.73, abs=0.05)
+    assert p["sensor.field"] == pytest.approx(16.647e-6, rel=2e-3)
+    assert found["error at rest"].estimate == pytest.approx(5.0 / 60.0, rel=1e-3)
+    (table,) = [t for t in found.tables if t["title"] == "Magnetic field of the site"]
+    assert "2025 on 2026-07-02" in table["caption"] and 0.3 < table["rows"][0][2] < 0.5
+
+
+def test_without_the_package_a_date_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    field.field_at.cache_clear()
+    monkeypatch.setitem(sys.modules, "pygeomag", None)
+    system = load_system(NAME)
+    system.set("date", "2026-07-02")
+    with pytest.raises(InvalidConfigurationError, match=r"pip install 'gyrobench\[magnetic\]'"):
+        system.refuse()
+
+
+@pytest.mark.parametrize(
     ("values", "words"),
     [
         ({"true_heading": True}, "declination of the place is missing"),
         ({"latitude": 86 * DEG}, "beyond 85"),
+        ({"date": "2026-02-30"}, "is not a day"),
+        ({"date": "2031-01-01"}, "2015-01-01 to 2029-12-31"),
+        ({"date": "2026-07-02", "declination": 0.1}, "give one of them"),
         ({"turn": 0.0}, "must have a rate"),
     ],
 )

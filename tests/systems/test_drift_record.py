@@ -115,7 +115,7 @@ def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     t = np.arange(n, dtype=float)
     T = 20.0 + 2.0 * np.sin(2.0 * np.pi * t / n * 1.5)
     x = 5.0 + walk_and_white(n, 0.02, 0.0, 1) + 0.05 * np.sin(0.3 * t) + 0.03 * (T - 20.0)
-    y = walk_and_white(n, 0.1, 0.0, 2)
+    y = walk_and_white(n, 0.1, 0.0, 4)
     keep = (t < 4000) | (t > 4100)
     columns = {"time [s]": t, "x [deg/s]": x / 3600.0, "y [arcsec]": np.cumsum(y), "temperature [degC]": T}
     result = reduce(write(tmp_path / "r.csv", {k: v[keep] for k, v in columns.items()}), type_b="none")

@@ -380,7 +380,7 @@ def test_days_that_do_not_go_together(session: Session, tmp_path: Path) -> None:
     with pytest.raises(DataError, match="other options: latitude"):
         combine([first, third], ["a", "b"])
     first.save(tmp_path / "a")
-    for text, said in (("run\na\n", "at least two"), ("run\na\na\n", "named twice"), ("run\na\nb\n", "not a readable")):
+    for text, said in (("run\na\n", "at least two"), ("run\na\na\n", "named twice"), ("run\na\nb\n", "No such file")):
         (tmp_path / "days.csv").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=said):
             load().read_measured(tmp_path / "days.csv", {})

@@ -19,7 +19,8 @@ from tumbling import NAME, SHORT
 from gyrobench.bench import standard_folder
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.linear_fit import Quantity, fit
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 
 Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import Effect
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 
 Array = NDArray[np.float64]
 

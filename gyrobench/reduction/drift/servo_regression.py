@@ -28,7 +28,7 @@ from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.run_metadata import Site
 from gyrobench.reduction.window_checks import ReductionError

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
 
 Array = NDArray[np.float64]

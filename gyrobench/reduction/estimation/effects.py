@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.linear_fit import Findings
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]
@@ -103,7 +104,7 @@ def corrected(
     taken = [_read(one, unit) for one in stated if one.rpartition("=")[0].strip() not in elsewhere]
     if len({c.source for c in taken}) < len(taken):
         raise ReductionError(f"corrections: a source stands twice in '{text}'")
-    again = found.without(sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
+    again = without(found, sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
     return replace(again, corrections=tuple(taken), tests=list(again.tests))
 
 

@@ -10,8 +10,10 @@ a Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; unce
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import replace
 from typing import Any
 
@@ -27,14 +29,30 @@ from gyrobench.reduction.estimation.effects import (
     simulated_table,
     standard_changes,
 )
-from gyrobench.reduction.estimation.linear_fit import Findings, Group, Quantity, fit
+from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 
-__all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "plus_minus"]
+__all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "observed_fits", "plus_minus"]
 
 Array = NDArray[np.float64]
 CONDITION = 100.0  # above this a warning names the weakest direction
+_observers: ContextVar[tuple[list[tuple[Findings, Array]], ...]] = ContextVar("observers", default=())
+
+
+@contextlib.contextmanager
+def observed_fits() -> Iterator[list[tuple[Findings, Array]]]:
+    """Collect the fits that linear_result() reports while the block runs, each with what one standard uncertainty of
+    every source of type B changes (parts, q), SI: a prediction of u needs the design matrix and not the numbers alone.
+    """
+    seen: list[tuple[Findings, Array]] = []
+    token = _observers.set((*_observers.get(), seen))
+    try:
+        yield seen
+    finally:
+        _observers.reset(token)
 
 
 def linear_result(
@@ -57,6 +75,8 @@ def linear_result(
     """
     by_source = [standard_changes(fit, e) for e in effects]
     rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])
+    for seen in _observers.get():
+        seen.append((fit, rows[1:]))
     coefficients = [_coefficient(fit, j, rows[:, j].tolist(), specification or {}) for j in range(rows.shape[1])]
     slow_warnings = _judge_slow_drift(fit, coefficients, rows)
     design = fit.est.design

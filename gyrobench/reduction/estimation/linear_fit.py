@@ -1,101 +1,29 @@
-"""A linear fit of averaged data with everything a report shows beside its coefficients.
+"""A linear fit of averaged data, whose noise and set-up effects are estimated from the same data.
 
     fitted = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
     fitted.f_test("harmonics 3 and higher", columns, ...)
     fitted.gain, fitted.value, fitted.u ...                    all in SI, in the order of ``found.quantities``
 
 Groups are the phases of a plan: rows of the data that are drawn together, against an angle, a time or a number.
-Where what is wanted is a function of what the data are linear in (R = (R/k)/(1/k)), :meth:`Findings.derive` turns
-the one into the other with uncertainties to first order.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import special
+from numpy.typing import NDArray
 
-from gyrobench import drift, units
-from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
-from gyrobench.reduction.estimation import residual_series as series
-from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
+from gyrobench.reduction.estimation.findings import Estimates, Findings, Group
+from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import RegressionError
-from gyrobench.reduction.estimation.uncertainty import p_text
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.result import Series, Test
 
 Array = NDArray[np.float64]
-RAW = "Ljung-Box, residuals"
-CONTRADICTED = 0.01  # probability that the tests of a clean record speak against its model or noise
 IDEAL = 1e-6  # residuals over data, below which there is no noise
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One quantity that is estimated: its name, what it means, its printed unit and that unit's size in SI.
-
-    truth and closed (the source's formula on the same data): SI, None where there is none.  shown: the printed name
-    where it differs, as for the combination that a coefficient stands for; limits are looked up under both.
-    combination: coefficient of the drift model -> its factor in it (per g0^n); empty: it is the one of its name.  Where
-    |f| is the same in all attitudes D_OO (Dx_yy, Dy_xx) is folded into the others and left out.
-    """
-
-    name: str
-    meaning: str
-    unit: str  # "°/h/g"
-    scale: float
-    truth: float | None = None
-    closed: float | None = None
-    shown: str = ""
-    combination: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls, name: str, meaning: str, unit: str, truth: float | None = None, closed: float | None = None
-    ) -> Quantity:
-        """With the printed form and the size of a unit that gyrobench.units knows: "deg/h", "mA", "arcsec"."""
-        return cls(name, meaning, units.display(unit), units.factor(unit), truth, closed)
-
-    @classmethod
-    def drift(cls, name: str, truth: float | None = None, closed: float | None = None, meaning: str = "") -> Quantity:
-        """Return a drift coefficient in rad/s per g0^n: D_F, D_IS ..., or Dx_0, Dy_yz ... of a channel."""
-        unit = units.display(drift.surface_unit(name))
-        return cls(name, meaning or drift.meaning(name), unit, units.factor("deg/h"), truth, closed)
-
-    @property
-    def title(self) -> str:
-        return self.shown or self.name
-
-
-@dataclass(frozen=True)
-class Group:
-    """Rows of the data that belong together, with what they are drawn against (in the printed unit)."""
-
-    label: str  # "mount 1, against the Earth"
-    rows: ArrayLike  # indices of the rows, or a mask
-    x: ArrayLike  # one for each row
-    x_name: str  # "table angle"
-    x_unit: str  # "°"
-    dense: tuple[ArrayLike, ArrayLike] | None = None  # x and rows of X of the plotted curve
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """What is reported, in SI, in the order of the quantities; see correlated.Estimate."""
-
-    value: Array
-    covariance: Array
-    u: Array
-    half_width: Array
-    p: Array
-    dof: Array
-    gain: Array  # (q, n): value = gain y, of changes if the values are derived
 
 
 def fit(
@@ -139,6 +67,18 @@ def fit(
     )  # fmt: skip
 
 
+def without(found: Findings, error: Array) -> Findings:
+    """The same fit of the data less ``error`` (n,)."""
+    weighed = [*found.candidates, *(h.candidate for h in found.hidden)]
+    again = fit(
+        found.linear, found.X, found.y - error, found.t_start, found.t_end, found.groups, found.y_name, found.y_unit,
+        found.y_scale, noise=found.mode, weights=found.weights, limit=math.inf, candidates=weighed,
+    )  # fmt: skip
+    if found.function is None:
+        return again
+    return again.derive(found.quantities[: len(found.quantities) - len(found.joined)], found.function)
+
+
 def _noise_free(X: Array, y: Array) -> bool:
     """True for simulated data without noise, whose remainder (the lag of a loop) no candidate is to explain."""
     if not (np.all(np.isfinite(X)) and np.all(np.isfinite(y))):
@@ -173,312 +113,3 @@ def _reported(
         covariance[j], covariance[:, j], gain[j] = 0.0, 0.0, 0.0
         covariance[j, j] = sd**2
     return Estimates(value, covariance, u, half, probability, dof, gain)
-
-
-@dataclass
-class Findings:
-    """A fit and what its residuals say; made by :func:`fit`.  Data in SI, what is shown in the unit of the data."""
-
-    quantities: tuple[Quantity, ...]
-    X: Array
-    y: Array
-    t_start: Array
-    t_end: Array
-    est: noise_mixture_fit.Estimate  # of the linear unknowns
-    reported: Estimates
-    groups: list[Group]
-    y_name: str
-    y_unit: str
-    y_scale: float
-    white: bool  # assumed, not estimated
-    weights: Array | None = None
-    tests: list[Test] = field(default_factory=list)
-    candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
-    hidden: Sequence[Hidden] = ()
-    linear: tuple[Quantity, ...] = ()  # those of the columns of X
-    mode: str = "estimated"  # noise, as of fit()
-    function: Callable[[Array], ArrayLike] | None = None  # of derive()
-    corrections: tuple[Any, ...] = ()  # what was taken out of the data, see gyrobench.reduction.estimation.effects
-
-    def __post_init__(self) -> None:
-        dof = self.dof
-        residual = self.est.residual / self.y_scale
-        self.residual_std = math.sqrt(float(np.sum(self.est.residual**2)) / dof) / self.y_scale
-        self.stretches = series.stretches(self.t_start, self.t_end, residual)
-        self.ideal = self.residual_std * self.y_scale <= 1e-12 * float(np.max(np.abs(self.y)))
-        if not self.tests:
-            self.tests = self._residual_tests()
-
-    @property
-    def dof(self) -> int:
-        """Data less coefficients, those of effects that joined among them."""
-        flat = sum(e.value.size for c, e in self.joined if not c.scatter)
-        return int(self.y.size) - int(self.X.shape[1]) - flat
-
-    @property
-    def joined(self) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
-        """Effects of the nuisance model that are reported."""
-        return nuisances.reported(self.candidates, self.est)
-
-    @property
-    def value(self) -> Array:
-        return self.reported.value
-
-    @property
-    def u(self) -> Array:
-        return self.reported.u
-
-    @property
-    def gain(self) -> Array:
-        """(q, n): how the reported values change with the data."""
-        return self.reported.gain
-
-    def error(self, dy: Array | float = 0.0, dX: Array | None = None) -> Array:
-        """What the data (n,) are wrong by, to first order, when data and design X are wrong by dy, dX."""
-        error = np.broadcast_to(np.asarray(dy, dtype=float), self.y.shape)
-        return error if dX is None else error - dX @ self.est.beta[: dX.shape[1]]
-
-    def without(self, error: Array) -> Findings:
-        """The same fit of the data less ``error`` (n,)."""
-        weighed = [*self.candidates, *(h.candidate for h in self.hidden)]
-        again = fit(
-            self.linear, self.X, self.y - error, self.t_start, self.t_end, self.groups, self.y_name, self.y_unit,
-            self.y_scale, noise=self.mode, weights=self.weights, limit=math.inf, candidates=weighed,
-        )  # fmt: skip
-        if self.function is None:
-            return again
-        return again.derive(self.quantities[: len(self.quantities) - len(self.joined)], self.function)
-
-    def derive(self, quantities: Sequence[Quantity], function: Callable[[Array], ArrayLike]) -> Findings:
-        """The same fit reported as ``function`` (of the linear unknowns, SI) with uncertainties to first order.
-
-        Effects that joined the model follow as they are.
-        """
-        r, p = self.est, self.X.shape[1]
-        after = self.quantities[p:]
-        value, own = self.linearized(function, r.beta[:p])
-        if value.size != len(quantities):
-            raise ValueError(f"{len(quantities)} quantities for {value.size} values")
-        J = np.zeros((value.size, r.beta.size))
-        J[:, :p] = own
-        sd, half = r.mixture.spread(J)
-        u = np.minimum(sd, half / noise_mixture_fit.NORMAL)
-        size = u / np.maximum(np.sqrt(np.maximum(np.diag(J @ r.covariance @ J.T), 0.0)), 1e-300)
-        covariance = (J @ r.covariance @ J.T) * np.outer(size, size)
-        dof = noise_mixture_fit.equivalent_dof(half / np.maximum(u, 1e-300))
-        outside = np.where(u > 0.0, r.mixture.outside(J, np.abs(value)), 0.0)
-        reported = Estimates(value, covariance, u, half, outside, dof, J @ r.gain)
-        if after:
-            reported = _behind(reported, self.reported, p)
-        return replace(
-            self, quantities=(*quantities, *after), reported=reported, tests=list(self.tests), function=function
-        )
-
-    def linearized(self, function: Callable[[Array], ArrayLike], beta: Array) -> tuple[Array, Array]:
-        """Return ``function`` of the linear unknowns beta (p,) and its derivatives (q, p)."""
-        size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
-        value = np.atleast_1d(np.asarray(function(beta), dtype=float))
-        J = np.empty((value.size, beta.size))
-        for j in range(beta.size):
-            step = np.zeros_like(beta)
-            step[j] = 1e-5 * (max(abs(float(beta[j])), float(size[j])) or 1.0)
-            high, low = np.asarray(function(beta + step)), np.asarray(function(beta - step))
-            J[:, j] = (high - low) / (2.0 * step[j])
-        return value, J
-
-    def if_slow(self) -> tuple[float, Array]:
-        """Return the probability of slow drift in the noise, and by how much it would widen the interval of each value
-        (q,); 1 where it hardly is there.
-        """
-        beta, p = self.est.beta, self.X.shape[1]
-        own = np.eye(p) if self.function is None else self.linearized(self.function, beta[:p])[1]
-        J = np.column_stack([own, np.zeros((len(own), beta.size - p))])
-        probability, half = self.est.mixture.if_slow(J)
-        ratio = np.maximum(half / np.maximum(self.est.mixture.spread(J)[1], 1e-300), 1.0)
-        return probability, np.concatenate([ratio, np.ones(max(self.value.size - ratio.size, 0))])
-
-    def nuisance_tables(self) -> list[dict[str, Any]]:
-        """Return the table of the nuisance model (none without candidates)."""
-        names = [q.title for q in self.quantities]
-        found = None if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
-        return [found] if found else []
-
-    def nuisance_sentences(self) -> list[str]:
-        return nuisances.sentences(self.candidates, self.est)
-
-    def implausible_nuisances(self) -> list[str]:
-        return nuisances.implausible(self.candidates, self.est)
-
-    # ------------------------------------------------------------------------------------------ plots
-    def series(self) -> list[Series]:
-        """Data against what each group is drawn against, with fit, residual and the dense curve."""
-        out = []
-        fitted, middle = self.y - self.est.residual, (self.t_start + self.t_end) / 2.0
-        for g in self.groups:
-            rows = np.asarray(g.rows)
-            rows = np.flatnonzero(rows) if rows.dtype == bool else rows
-            x = np.asarray(g.x, dtype=float)
-            turn = np.argsort(x, kind="stable")
-            x, rows = x[turn], rows[turn]
-            s = Series(
-                label=g.label, x=x.tolist(), x_name=g.x_name, x_unit=g.x_unit, y=(self.y[rows] / self.y_scale).tolist(),
-                fit=(fitted[rows] / self.y_scale).tolist(), residual=(self.est.residual[rows] / self.y_scale).tolist(),
-                y_name=self.y_name, y_unit=self.y_unit, t=middle[rows].tolist(),
-            )  # fmt: skip
-            if g.dense is not None:
-                s.shown_fit_x = np.asarray(g.dense[0], dtype=float).tolist()
-                curve = np.asarray(g.dense[1], dtype=float) @ self.est.beta[: self.X.shape[1]]
-                s.shown_fit_y = (curve / self.y_scale).tolist()
-            out.append(s)
-        return out
-
-    def _parts(self, values: Array) -> list[Array]:
-        """Stretches of neighbouring windows; readings that all stand alone count as one, in the order taken."""
-        parts = [v for _, v in series.stretches(self.t_start, self.t_end, values)]
-        return [values] if self.white or max(p.size for p in parts) < 3 else parts
-
-    def acf(self) -> dict[str, list[float]]:
-        parts = self._parts(self.est.residual / self.y_scale)
-        return series.autocorrelation(parts, min(40, max(max(p.size for p in parts) // 2, 1)))
-
-    def allan(self) -> dict[str, Any]:
-        values = {} if self.ideal else series.allan(self.stretches)
-        return {**values, "unit": self.y_unit} if values else {}
-
-    def psd(self) -> dict[str, Any]:
-        values = {} if self.ideal else series.spectrum(self.stretches)
-        return {**values, "unit": f"({self.y_unit})²/Hz"} if values else {}
-
-    # ------------------------------------------------------------------------------------------ noise
-    def noise(self) -> dict[str, Any]:
-        """Return the noise model of the estimation; units in the keys."""
-        e, unit, scale = self.est, self.y_unit, self.y_scale
-        if self.white:
-            parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
-            return {**parameters, f"standard deviation / ({unit})": self.residual_std}
-        share = e.best[1]
-        model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
-        model += " with reading errors" if e.reading > 0.0 else ""
-        parameters = {
-            "model": "none (ideal data)" if self.ideal else model,
-            "weight of white noise alone": e.white,
-            f"white density / ({unit}/√Hz)": e.density[0] / scale,
-            f"white density, 90 % range / ({unit}/√Hz)": [v / scale for v in e.density[1:]],
-            f"Gauss-Markov rms / ({unit})": e.sigma[0] / scale,
-            f"Gauss-Markov rms, 90 % range / ({unit})": [v / scale for v in e.sigma[1:]],
-        }
-        if e.sigma_reading[2] > 0.0:
-            parameters[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
-            parameters[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
-        if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
-            parameters["correlation time / s"] = e.tau[0]
-            parameters["correlation time, 90 % range / s"] = list(e.tau[1:])
-        return parameters
-
-    def noise_sentence(self, what: str = "windows") -> str:
-        """Return the residual standard deviation and its noise model as a sentence, for the summary."""
-        text = f"Residual standard deviation of the {what}: {self.residual_std:.3g} {self.y_unit}"
-        if self.ideal:
-            return text + ", rounding only."
-        if self.white:
-            return text + ", treated as white noise."
-        if self.est.best[1] == 0.0:
-            reading_errors = " and reading errors" if self.est.reading > 0.0 else ""
-            return text + f", compatible with white noise{reading_errors}."
-        return text + f"; correlation time about {self.est.tau[0]:.3g} s, included in the coverage intervals."
-
-    # ------------------------------------------------------------------------------------------ tests
-    def _residual_tests(self) -> list[Test]:
-        if self.ideal:
-            return []
-        e = self.est
-        lags = min(20, max(self.y.size // 5, 3))
-        null = series.fitted_noise(e.X)
-        q, p = series.ljung_box_of_fit(self._parts(e.residual), lags, null)
-        text = (
-            "no significant autocorrelation"
-            if p >= 0.05
-            else "the residuals are autocorrelated; the coverage intervals, which assume white noise, are too narrow"
-            if self.white
-            else "the residuals are autocorrelated; ordinary least squares would understate the uncertainties"
-        )
-        tests = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
-        whitened = ", residuals" if self.white else ", whitened residuals"
-        null = series.fitted_noise(e.fitted)
-        if not self.white:
-            q, p = series.ljung_box_of_fit(self._parts(e.whitened), lags, null)
-            text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
-            tests.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
-        z, p = series.runs_test(e.whitened, null)
-        text = "neighbours have the same sign too often" if p < 0.05 else "compatible with random signs"
-        tests.append(Test("runs" + whitened, z, p, "trends and steps", text))
-        w, p = series.normality(e.whitened)
-        text = (
-            "the residuals are not normal; check for outliers" if p < 0.05 else "compatible with a normal distribution"
-        )
-        tests.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
-        return tests
-
-    def broken(self) -> list[Test]:
-        """Return the tests that contradict the fit: p below CONTRADICTED over their number, so that a clean record has
-        none with a probability of 1 - CONTRADICTED.  That of autocorrelation that the noise model includes is not one.
-        """
-        tests = [t for t in self.tests if t.p is not None and (self.white or t.name != RAW)]
-        return [t for t in tests if t.p is not None and t.p * len(tests) < CONTRADICTED]
-
-    def warnings(self) -> list[str]:
-        """Return a sentence for each of :meth:`broken`."""
-        return [f"{t.name}: {p_text(t.p or 0.0)}, {t.finding}. The stated u may be too small." for t in self.broken()]
-
-    def f_test(
-        self, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
-    ) -> tuple[Array, Array] | None:
-        """Adds an F test of ``extra`` columns (n, k): do they explain more than noise?  ``bad`` is said when they do.
-
-        F is that of the likeliest noise model, p the mean over all, weighted by their probabilities: what a slower
-        noise than the likeliest may do by chance is no effect.  Returns the amplitudes of the columns and their
-        standard uncertainties (SI).  Of columns that the fit holds in part only the rest is tested.  None, without a
-        test, for ideal data, fewer than ``minimum`` degrees of freedom, or columns that the fit holds all.
-        """
-        basis, s, _ = np.linalg.svd(self.est.X, full_matrices=False)  # of what joined some columns may be alike
-        basis = basis[:, s > 1e-9 * s[0]]
-        size = np.linalg.norm(extra, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
-        there = s > 1e-6
-        k, p = int(np.count_nonzero(there)), basis.shape[1]
-        Q = np.column_stack([basis, new[:, there]])
-        dof = self.y.size - Q.shape[1]
-        if self.ideal or not k or dof < minimum:
-            return None
-        M, xy, yy = self._whitened_moments(np.column_stack([Q, self.y - basis @ (basis.T @ self.y)]))
-        inner = np.linalg.inv(M[:, :p, :p])
-        rss0 = yy - np.einsum("gp,gpq,gq->g", xy[:, :p], inner, xy[:, :p])
-        inverse = np.linalg.inv(M)
-        rss1 = yy - np.einsum("gp,gpq,gq->g", xy, inverse, xy)
-        f = ((rss0 - rss1) / k) / (np.maximum(rss1, 1e-300) / dof)
-        probability = float(self.est.models[:, 3] @ special.fdtrc(k, dof, f))
-        self.tests.append(Test(name, float(f[0]), probability, what, bad if probability < 0.05 else good))
-        back = turned[there].T / s[there] / size[:, None]
-        covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
-        return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.maximum(np.diag(covariance), 0.0))
-
-    def _whitened_moments(self, columns: Array) -> tuple[Array, Array, Array]:
-        """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
-        if not self.white:
-            tau, share, reading, weight = self.est.models.T
-            grid = noise_model.NoiseGrid(tau, share, weight, reading)
-            return noise_mixture_fit.moments(self.t_start, self.t_end, columns, grid)[:3]
-        Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
-        square = (Z.T @ Z)[None]
-        return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1]
-
-
-def _behind(first: Estimates, of: Estimates, p: int) -> Estimates:
-    """``first`` with all but the first p of ``of`` behind it, as uncorrelated with it."""
-    n = first.value.size
-    size = n + of.value.size - p
-    covariance = np.zeros((size, size))
-    covariance[:n, :n], covariance[n:, n:] = first.covariance, of.covariance[p:, p:]
-    rest = (np.concatenate([getattr(first, k), getattr(of, k)[p:]]) for k in ("u", "half_width", "p", "dof", "gain"))
-    return Estimates(np.concatenate([first.value, of.value[p:]]), covariance, *rest)

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.linear_fit import Findings, fit
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.window_checks import ReductionError
 
 Array = NDArray[np.float64]

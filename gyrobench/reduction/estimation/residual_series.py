@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import deviations
 
 Array = NDArray[np.float64]
-NORMAL = 1.959963984540054
 DRAWS = 500  # of white noise, for the distribution of Q
 LARGE = 2000  # values beyond which a fit does not change it
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 from gyrobench.result import NO_VERDICT, Result
 
 R = TypeVar("R", bound=Result)
-NORMAL = 1.959963984540054
+NORMAL = 1.959963984540054  # 97.5 % point of a normal distribution
 VERDICTS = ("void", "fail", "inconclusive", "pass")  # the worst one first
 DECISION_RULE = (
     "Guard band equal to U (coverage probability 95 %). Pass: the coverage interval lies within the limits. Fail: it "

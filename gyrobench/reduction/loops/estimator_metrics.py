@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.estimation import residual_series
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 
 Array = NDArray[np.float64]
 STRETCHES = 10
@@ -43,7 +44,7 @@ class UncertainValue:
     @property
     def k(self) -> float:
         """Coverage factor of the 95 % interval."""
-        return float(special.stdtrit(self.dof, 0.975)) if math.isfinite(self.dof) else residual_series.NORMAL
+        return float(special.stdtrit(self.dof, 0.975)) if math.isfinite(self.dof) else NORMAL
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -340,7 +340,7 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
     edges = np.linspace(0, t.size - 1, blocks + 1).astype(int)
     rates, start, end = np.diff(angle[edges]) / np.diff(t[edges]), t[edges[:-1]], t[edges[1:]]
     est = noise_mixture_fit.fit(np.ones((blocks, 1)), rates, ["drift"], start, end, readings=True)
-    mean, u = float(est.beta[0]), float(est.half_width[0]) / noise_mixture_fit.NORMAL
+    mean, u = float(est.beta[0]), float(est.half_width[0]) / NORMAL
     dt = float(t[1] - t[0])
     allan = residual_series.allan([(dt, np.diff(angle) / dt)])
     walk = None
@@ -349,7 +349,7 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
         first = falls.index(True)
         last = falls.index(False, first) if False in falls[first:] else len(falls)
         tau, dev, low, high = (allan[n][last] for n in ("tau", "dev", "lo", "hi"))
-        walk = (dev * math.sqrt(tau), (high - low) / (2.0 * residual_series.NORMAL) * math.sqrt(tau))
+        walk = (dev * math.sqrt(tau), (high - low) / (2.0 * NORMAL) * math.sqrt(tau))
     return Drift(mean, u, allan, walk)
 
 

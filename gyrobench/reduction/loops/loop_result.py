@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from gyrobench import units
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
-from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
+from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins as m
+from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated
 from gyrobench.reduction.loops.loop_measures import (
     LAST,
     Drift,
@@ -51,7 +52,6 @@ from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
-CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
@@ -184,12 +184,12 @@ class LoopFindings:
             dense = model_response(model, span)[:, 0, 0]
             limits = computed[kind] = m.margins(span, dense)
             rows.append(limits.row(label))
-            curves.append(_curve(label, span, dense))
+            curves.append(curve(label, span, dense))
             if limits.crossover is not None:
                 self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
             if kind == "discrete" and not self.unstable:
                 self._conditional(title, limits)
-        self.responses.append(_bode(title, "loop", caption, points, curves, "gain", "1"))
+        self.responses.append(bode(title, "loop", caption, points, curves, "gain", "1"))
         self.responses[-1].counts = counts
         self.tables.append(
             {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
@@ -286,9 +286,9 @@ class LoopFindings:
                 base = self.excited(model, kind, axis, reference, span)
                 values = None if base is None else values / base
             if values is not None:
-                curves.append(_curve(label, span, values / scale))
+                curves.append(curve(label, span, values / scale))
         shown = [Point(p.f, p.value / scale, p.u, p.coherence) for p in points]
-        self.responses.append(_bode(name, "ratio", caption or f"{name}, axis {axis}.", shown, curves, name, unit))
+        self.responses.append(bode(name, "ratio", caption or f"{name}, axis {axis}.", shown, curves, name, unit))
         return points
 
     def excited(
@@ -329,13 +329,13 @@ class LoopFindings:
         pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
         curves = []
         model = self.linear.closed.discrete
-        simulated = None if model is None else _simulated(model, gate, output)
-        if model is not None and simulated is not None and plus:
-            second = _simulated(model, gate, plus)
-            simulated = None if second is None else simulated + second
-        if simulated is not None:
+        predicted = None if model is None else simulated(model, gate, output)
+        if model is not None and predicted is not None and plus:
+            second = simulated(model, gate, plus)
+            predicted = None if second is None else predicted + second
+        if predicted is not None:
             curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
-            curves.append({**curve, "y": ((measures.initial + simulated[pick]) / scale).tolist()})
+            curves.append({**curve, "y": ((measures.initial + predicted[pick]) / scale).tolist()})
         what = y_name or output
         size = f"{gate.amplitude:g}".replace("-", "−")
         cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
@@ -429,64 +429,6 @@ class LoopFindings:
         )
         result.warnings += self.linear.warnings
         return run_metadata.finish(result, self.record)
-
-
-def _curve(label: str, f: Array, values: Any) -> dict[str, Any]:
-    """Return a model's curve, thinned for drawing; phase unwrapped, degrees."""
-    phase = np.degrees(np.unwrap(np.angle(values)))
-    pick = np.unique(np.linspace(0, len(f) - 1, CURVE).astype(int))
-    return {
-        "label": label,
-        "x": np.asarray(f)[pick].tolist(),
-        "y": np.abs(values)[pick].tolist(),
-        "phase": phase[pick].tolist(),
-    }
-
-
-def _bode(
-    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[dict[str, Any]], y_name: str, unit: str
-) -> Response:
-    return Response(
-        name=name,
-        kind=kind,
-        caption=caption,
-        x=[p.f for p in points],
-        x_name="frequency",
-        x_unit="Hz",
-        y=[abs(p.value) for p in points],
-        y_name=y_name,
-        y_unit=unit,
-        phase=np.degrees(np.unwrap(np.angle([p.value for p in points]))).tolist(),
-        u=[p.u for p in points],
-        coherence=[p.coherence for p in points],
-        curves=curves,
-    )
-
-
-def _simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:
-    """Return response of a channel to a unit step of the excitation at the gate's opening, at the gate's times; SI."""
-    name = f"{gate.kind}[{gate.axis}]"
-    wired = [j for j, n in enumerate(model.inputs) if n.partition(".")[2] == name]
-    if gate.shape != "step" or gate.kind == "motion" or output not in model.outputs or not wired:
-        return None
-    row = model.outputs.index(output)
-    n = len(model.states)
-    a, c = np.reshape(model.A, (n, n)), np.reshape(model.C, (-1, n))[row : row + 1]
-    b = np.reshape(model.B, (n, -1))[:, wired].sum(axis=1, keepdims=True)
-    d = np.reshape(model.D, (-1, len(model.inputs)))[row : row + 1, wired].sum(axis=1, keepdims=True)
-    count = round((gate.t[-1] - gate.t[0]) / model.step) + 1
-    # the input is constant, so a power of [[A, B], [0, 1]] moves all rows known so far: twice as many each time
-    power = np.block([[a, b], [np.zeros((1, n)), np.ones((1, 1))]])
-    rows = np.zeros((n + 1, count))
-    rows[-1, 0] = gate.amplitude
-    known = 1
-    while known < count:
-        new = min(known, count - known)
-        rows[:, known : known + new] = power @ rows[:, :new]
-        known, power = known + new, power @ power
-    y = (np.hstack([c, d]) @ rows)[0]
-    at = np.minimum(np.round((gate.t - gate.t[0]) / model.step).astype(int), count - 1)
-    return np.asarray(y[at])
 
 
 def _margin_note(run: RunDocument) -> str:

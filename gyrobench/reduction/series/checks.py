@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from gyrobench.errors import GyrobenchError
 
 Array = NDArray[np.float64]
-NORMAL = 1.959963984540054  # 97.5 % point of a normal distribution
 
 
 class SeriesError(GyrobenchError, ValueError):

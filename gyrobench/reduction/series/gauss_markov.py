@@ -22,7 +22,8 @@ from scipy import optimize
 from scipy.linalg import lapack
 
 from gyrobench.reduction.estimation import noise
-from gyrobench.reduction.series.checks import NORMAL, Array, checked, checked_step
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.series.checks import Array, checked, checked_step
 
 GAIN = 3.0  # of log likelihood against white noise, for two more parameters
 SHORTEST, LONGEST = 0.2, 10.0  # correlation time sought: of samples, of the record

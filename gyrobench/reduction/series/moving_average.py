@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
-from gyrobench.reduction.series.checks import NORMAL, Array, SeriesError, checked
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.series.checks import Array, SeriesError, checked
 
 LONGEST = 100_000
 FEWEST = 50  # values a coefficient

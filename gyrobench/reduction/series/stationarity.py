@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from gyrobench.reduction.estimation import noise_mixture_fit
-from gyrobench.reduction.series.checks import NORMAL, SeriesError, block_means, checked, checked_step
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.series.checks import SeriesError, block_means, checked, checked_step
 from gyrobench.reduction.series.gauss_markov import gauss_markov
 
 LEAST_BLOCKS = 21  # the normal law of a number of runs needs more than 20 symbols

@@ -15,8 +15,9 @@ has on the true mean, all at once, for any rule of selection, in at least 95 %; 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy import special
@@ -29,6 +30,8 @@ from gyrobench.reduction.estimation.regression import (
     least_squares,
 )
 from gyrobench.reduction.series.checks import Array
+
+F = TypeVar("F")
 
 
 @dataclass(frozen=True)
@@ -88,26 +91,42 @@ def eliminate(
             return least_squares(columns, y, kept)
         return generalized_least_squares(columns, y, kept, covariance)
 
-    kept = list(names)
+    full, fit, removed = backward(names, candidates, level, fit_of, _test, 1)
+    half = full.half_width()
+    # u of the reduced fit with the full model's s, which no selection has touched
+    wide = math.sqrt(p * float(special.fdtri(p, full.dof, 0.95))) * fit.u * full.s / fit.s
+    return Stepwise(fit, full, removed, fit.beta - wide, fit.beta + wide, full.beta - half, full.beta + half, level)
+
+
+def backward(
+    names: Sequence[str], candidates: Sequence[tuple[str, ...]], level: float, fit_of: Callable[[Sequence[str]], F],
+    test: Callable[[F, tuple[str, ...]], tuple[float, float]], fewest: int = 0,
+) -> tuple[F, F, tuple[Removal, ...]]:  # fmt: skip
+    """Return the fit with all columns, the one with what is kept, and what left, in order.
+
+    fit_of: of the named columns.  test: statistic and probability of a candidate in a fit.  fewest: columns that stay.
+    """
+    kept, left = list(names), list(candidates)
     full = fit = fit_of(kept)
     removed = []
-    while candidates and len(kept) > 1:
-        tests = [_test(fit, c) for c in candidates]
+    while left and len(kept) > fewest:
+        tests = [test(fit, c) for c in left]
         worst = max(range(len(tests)), key=lambda k: (tests[k][1], -tests[k][0]))
         if tests[worst][1] < level:
             break
-        out = candidates.pop(worst)
-        if len(out) == len(kept):
+        out = left.pop(worst)
+        if len(kept) - len(out) < fewest:
             break
         removed.append(Removal(out, *tests[worst]))
         kept = [name for name in kept if name not in out]
         fit = fit_of(kept)
-    half = full.half_width()
-    # u of the reduced fit with the full model's s, which no selection has touched
-    wide = math.sqrt(p * float(special.fdtri(p, full.dof, 0.95))) * fit.u * full.s / fit.s
-    return Stepwise(
-        fit, full, tuple(removed), fit.beta - wide, fit.beta + wide, full.beta - half, full.beta + half, level
-    )
+    return full, fit, tuple(removed)
+
+
+def joint_test(beta: Array, covariance: Array, dof: int) -> tuple[float, float]:
+    """Return F of several coefficients that are zero, and its probability."""
+    statistic = float(beta @ np.linalg.solve(covariance, beta)) / beta.size
+    return statistic, float(special.fdtrc(beta.size, dof, statistic))
 
 
 def _test(fit: Fit, names: Sequence[str]) -> tuple[float, float]:
@@ -115,6 +134,4 @@ def _test(fit: Fit, names: Sequence[str]) -> tuple[float, float]:
     k = [fit.names.index(name) for name in names]
     if len(k) == 1:
         return float(abs(fit.t[k[0]])), float(fit.p[k[0]])
-    beta, block = fit.beta[k], fit.covariance[np.ix_(k, k)]
-    F = float(beta @ np.linalg.solve(block, beta)) / len(k)
-    return F, float(special.fdtrc(len(k), fit.dof, F))
+    return joint_test(fit.beta[k], fit.covariance[np.ix_(k, k)], fit.dof)

@@ -1,0 +1,112 @@
+"""Where a campaign runs: a given dask client, the scheduler at an address, or local processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from gyrobench.bench import UsageError
+from gyrobench.campaign.store import CampaignError
+from gyrobench.files import temporary_folder
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+@contextlib.contextmanager
+def connect(
+    client: Client | None, scheduler: str | None, workers: int | None, runs: int,
+    notes: Callable[[Iterable[str]], None],
+) -> Iterator[Client]:  # fmt: skip
+    """Yield a client: the given one, that of a scheduler, that of the notebook, else one of local processes."""
+    from distributed import Client, default_client
+
+    if client is None and scheduler is None and workers is None:
+        with contextlib.suppress(ValueError):
+            client = default_client()
+    if client is not None:
+        if client.asynchronous:
+            raise UsageError("the dask client is asynchronous; a campaign needs Client(..., asynchronous=False)")
+        yield client
+        return
+    if scheduler is not None:
+        try:
+            connected = Client(scheduler, timeout="20s", set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise CampaignError(f"no scheduler at {scheduler}: {error}") from None
+        with connected:
+            notes([f"dashboard: {connected.dashboard_link}"])
+            yield connected
+        return
+    with local_cluster(min(workers or _cores(), runs)) as local:
+        notes([f"dashboard: {local.dashboard_link}{_without_bokeh()}"])
+        yield local
+
+
+def _without_bokeh() -> str:
+    import importlib.util
+
+    return "" if importlib.util.find_spec("bokeh") else " (its pages need bokeh: pip install bokeh)"
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int) -> Iterator[Client]:
+    """Yield a client of that many local processes, which end with this one."""
+    import logging
+
+    import dask
+    from distributed import Client, LocalCluster
+
+    settings = {
+        "distributed.scheduler.allowed-failures": 0,  # the campaign decides what is repeated
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.comm.timeouts.connect": "30s",
+    }
+    with (
+        dask.config.set(settings),
+        _without_main(),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            local_directory=str(temporary_folder()),
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@contextlib.contextmanager
+def _without_main() -> Iterator[None]:
+    """Let processes start without the user's script, which has no need to be imported there, nor a guard."""
+    import sys
+
+    main = sys.modules["__main__"]
+    held = {n: getattr(main, n) for n in ("__file__", "__spec__") if hasattr(main, n)}
+    main.__spec__ = None
+    if "__file__" in held:
+        del main.__file__
+    try:
+        yield
+    finally:
+        for name, value in held.items():
+            setattr(main, name, value)
+
+
+def has_own_processes(client: Client) -> bool:
+    """Return whether the workers are processes of their own, which a run may end."""
+    return os.getpid() not in client.run(os.getpid).values()
+
+
+def is_local(client: Client) -> bool:
+    """Return whether the workers are on this machine."""
+    return all("127.0.0.1" in a or "inproc" in a or "localhost" in a for a in client.nthreads())

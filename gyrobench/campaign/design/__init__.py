@@ -1,0 +1,1 @@
+"""Designs of tests: which positions, how long, in which order, for a wanted uncertainty."""

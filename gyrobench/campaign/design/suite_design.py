@@ -1,0 +1,93 @@
+"""Which tests of a suite, and which plan of each, reach wanted uncertainties soonest.
+
+Each test that offers plans is designed for all that is wanted of it; of the sets of tests in which every wanted value
+is reached by one test, the set that takes least time is chosen, the shortest test first.  Not used: that two tests that
+determine a value are together better than either, and that a test may be shorter if another has part of its values.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import UsageError
+from gyrobench.campaign.design.design_text import format_suite_design
+from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError
+from gyrobench.campaign.design.shortest_test import design_test
+from gyrobench.errors import GyrobenchError
+from gyrobench.system.suite import Suite
+
+
+@dataclass(frozen=True)
+class DesignedSuite:
+    """tests: in the order to be made.  others: designed and not needed.  left_out: test -> why it has no plan."""
+
+    suite: str
+    tests: tuple[DesignedTest, ...]
+    others: tuple[DesignedTest, ...]
+    left_out: Mapping[str, str]
+
+    @property
+    def time(self) -> float:
+        """Return the time of all tests, s; changes from one to the next are not in it."""
+        return sum(t.time for t in self.tests)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        named = {"tests": [t.as_dict() for t in self.tests], "others": [t.as_dict() for t in self.others]}
+        return {"suite": self.suite, "time": self.time, **named, "left_out": dict(self.left_out)}
+
+    def __str__(self) -> str:
+        return format_suite_design(self)
+
+
+def design_suite(
+    suite: Suite, wants: Mapping[str, str | float], *, criterion: str = "minimax",
+    parts: Mapping[str, str] | None = None, maps: Mapping[str, Path] | None = None, seed: int = 1, count: int = 0,
+) -> DesignedSuite:  # fmt: skip
+    """Return the tests of a suite that reach ``wants`` soonest.  Raises DesignError, UsageError, InvalidValueError."""
+    if not wants:
+        raise UsageError(f"{suite.name}: state what is wanted, --want D_I=0.001deg/h/g; a suite has no plan of its own")
+    members = suite.members()
+    given = suite.given_to(members)
+    swaps, mapped = suite.swaps(members, parts or {}), suite.swaps(members, maps or {})
+    found: dict[str, DesignedTest] = {}
+    left_out: dict[str, str] = {}
+    for name, system in members.items():
+        if not system.protocol:
+            left_out[name] = "offers no plans"
+            continue
+        try:
+            found[name] = design_test(
+                system, wants, criterion=criterion, parts=swaps[name], maps=mapped[name], seed=seed, count=count,
+                given={k: str(v) for k, v in given[name].items()}, only_known=True,
+            )  # fmt: skip
+        except GyrobenchError as error:
+            left_out[name] = str(error)
+    reached = {n: {v.name for v in t.values.values() if v.wanted is not None} for n, t in found.items()}
+    chosen = cheapest_cover({n: t.time for n, t in found.items()}, reached, frozenset(wants))
+    if chosen is None:
+        lost = sorted(set(wants) - set().union(*reached.values()))
+        reasons = "; ".join(f"{n}: {why}" for n, why in left_out.items())
+        raise DesignError(f"{', '.join(lost)}: no test of {suite.name} reaches it ({reasons})")
+    order = sorted(chosen, key=lambda n: found[n].time)
+    others = tuple(t for n, t in found.items() if n not in chosen)
+    return DesignedSuite(suite.name, tuple(found[n] for n in order), others, left_out)
+
+
+def cheapest_cover(
+    times: Mapping[str, float], reached: Mapping[str, Collection[str]], wanted: Collection[str]
+) -> tuple[str, ...] | None:
+    """Return the tests of least total time that reach all that is wanted between them; None where they do not."""
+    best: tuple[str, ...] | None = None
+    least = math.inf
+    for size in range(1, len(times) + 1):
+        for names in combinations(times, size):
+            total = sum(times[n] for n in names)
+            if total < least and set(wanted) <= set().union(*(reached[n] for n in names)):
+                best, least = names, total
+    return best

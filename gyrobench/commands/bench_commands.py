@@ -1,0 +1,109 @@
+"""The commands list, show, build: what a bench holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.commands.app import app, echo
+from gyrobench.commands.completion import complete_part
+from gyrobench.commands.options import (
+    Json,
+    Map,
+    Out,
+    Part,
+    Set,
+    System,
+    Target,
+)
+
+
+@app.command("list")
+def list_command(as_json: Json = False) -> None:
+    """List parts, systems, sockets and acceptance specifications.
+
+    \b
+    Example: gyrobench list
+    """
+    from gyrobench.commands.catalog import list_contents
+
+    contents = list_contents(Bench.find())
+    if as_json:
+        echo(json.dumps(contents, indent=2, ensure_ascii=False))
+        return
+    width = max((len(r["name"]) for rows in contents.values() for r in rows), default=0)
+    for title, rows in contents.items():
+        if rows:
+            echo(title)
+        for r in rows:
+            echo(f"  {r['name']:<{width}}  {r['what']}" + (f"  [{', '.join(r['spec'])}]" if r.get("spec") else ""))
+
+
+@app.command()
+def show(
+    system: System,
+    values: Set = None,
+    part: Part = None,
+    mapping: Map = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw the wiring.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Show wiring, plan and options of a system.
+
+    Print slots, wires, execution order, cut loops and their delays, plan, options; nothing is run.
+
+    \b
+    Example: gyrobench show tumble_single_axis --picture wiring.svg
+    """
+    from gyrobench.commands.arguments import load_with_values, parse_settings, parse_swaps
+    from gyrobench.commands.show_system import show_suite, show_system
+    from gyrobench.system.suite import Suite
+
+    test = load_with_values(system, parse_settings(values))
+    if isinstance(test, Suite):
+        show_suite(test, picture, as_json)
+    else:
+        show_system(test, *parse_swaps(part, mapping), picture, as_json)
+
+
+@app.command()
+def build(
+    parts: Annotated[
+        list[str] | None, typer.Argument(metavar="PART", help="Parts to build.", autocompletion=complete_part)
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Build every part of the bench.")] = False,
+    target: Annotated[
+        Target,
+        typer.Option(help="native: compiled C, self-contained; python: needs Python and numpy on the target machine."),
+    ] = Target.native,
+    fmi: Annotated[int, typer.Option(metavar="2|3", help="FMI version.", min=2, max=3)] = 2,
+    platform: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="linux64, win64, darwin64, aarch64-linux, aarch64-darwin.  Repeatable."),
+    ] = None,
+    out: Out = None,
+) -> None:
+    """Build parts into FMUs.
+
+    \b
+    Example: gyrobench build floated_gyro --target python
+    """
+    from gyrobench import packaging
+    from gyrobench.packaging.compiler import PLATFORMS
+
+    bench = Bench.find()
+    names = list(dict.fromkeys([*(parts or []), *(bench.parts() if every else ())]))
+    if not names:
+        raise UsageError(f"no part named; name one or more, or set --all; parts: {', '.join(bench.parts())}")
+    for name in names:
+        bench.part_folder(name)
+    unknown = [p for p in platform or [] if p not in PLATFORMS]
+    if unknown:
+        raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
+    for name in names:
+        path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
+        echo(display_path(path))

@@ -1,0 +1,48 @@
+"""A first mapping file of an FMU for a slot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, UsageError, suggest_names
+from gyrobench.commands.arguments import load_system
+from gyrobench.system.sockets import SOCKETS, Socket, socket
+from gyrobench.workflow.inputs import check_fmu_files
+
+
+def find_socket(slot: str) -> Socket:
+    """Return the socket of "SYSTEM.slot", or the socket of that name.  Raises UsageError."""
+    system, dot, name = slot.partition(".")
+    if not dot:
+        if slot not in SOCKETS:
+            near = suggest_names(slot, [*SOCKETS, *Bench.find().systems()])
+            raise UsageError(f"--slot {slot}: name SYSTEM.slot, as tumble_single_axis.gyro, or a socket; {near}")
+        return SOCKETS[slot]
+    slots = load_system(system, {}).all_slots()
+    if name not in slots:
+        raise UsageError(f"--slot {slot}: {system} has no slot '{name}'; {suggest_names(name, slots)}")
+    return socket(slots[name].socket).standing_for(slots[name].quantities)
+
+
+def write_mapping(fmu: Path, slot: str, out: Path | None) -> tuple[str, list[str]]:
+    """Return a first mapping file of the FMU, written to ``out`` where given, and what it still lacks."""
+    from fmpy import read_model_description
+
+    from gyrobench.system.binding import SocketMismatchError, fit, parse_mapping
+    from gyrobench.system.mapping_proposal import mapping_text
+
+    check_fmu_files({slot: fmu})
+    wanted = find_socket(slot)
+    description: Any = read_model_description(str(fmu), validate=False)
+    head = f"# Mapping of {description.modelName} ({fmu.name}) into the socket {wanted.name}."
+    text = mapping_text(wanted, description, head)
+    if out is not None:
+        if out.exists():
+            raise UsageError(f"--out {out}: the file exists; choose another name")
+        out.write_text(text, encoding="utf-8")
+    try:
+        fit(wanted, description, parse_mapping(text, "the proposal"), slot)
+    except SocketMismatchError as error:
+        return text, error.problems
+    return text, []

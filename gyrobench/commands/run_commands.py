@@ -1,0 +1,205 @@
+"""The commands run, reduce, report, compare, record: single runs and what becomes of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gyrobench.bench import display_path
+from gyrobench.commands.app import app, echo, exit_on_fail
+from gyrobench.commands.options import (
+    Data,
+    Engine,
+    Force,
+    Json,
+    Map,
+    NoReport,
+    Out,
+    Part,
+    Resume,
+    Set,
+    Spec,
+    Strict,
+    System,
+    Table,
+)
+
+
+@app.command()
+def run(
+    system: System,
+    values: Set = None,
+    part: Part = None,
+    mapping: Map = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the noise; default 1.", min=0)] = None,
+    engine: Annotated[
+        Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
+    ] = None,
+    step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
+    check_step: Annotated[
+        bool | None,
+        typer.Option(
+            "--check-step/--no-check-step",
+            help="Repeat the run with its step and half of it, noise off, and take the effect of the step into u. "
+            "Default: two short runs for a system with loops, else none.",
+        ),
+    ] = None,
+    timeout: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="Stop the run when one call of an FMU takes longer.  Default: 1min."),
+    ] = None,
+    spec: Spec = None,
+    strict: Strict = False,
+    no_report: NoReport = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
+    ] = None,
+    force: Force = False,
+    resume: Resume = False,
+    as_json: Json = False,
+) -> None:
+    """Run a system: record, reduction, report.
+
+    \b
+    Examples:
+      gyrobench run tumble_single_axis --set latitude=45.75deg --set gyro.D_I=0.9deg/h/g --seed 7
+      gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml
+      gyrobench run tumble_single_axis --spec floated_gyro --strict
+      gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
+    """
+    from gyrobench.commands import print_runs
+    from gyrobench.commands.arguments import load_with_values, parse_settings, parse_swaps, parse_time
+    from gyrobench.report import FORMATS
+    from gyrobench.workflow.run_execution import RunRequest
+
+    parts, maps = parse_swaps(part, mapping)
+    time_step = parse_time("--step", step)
+    test = load_with_values(system, parse_settings(values), time_step)
+    request = RunRequest(
+        parts=parts,
+        maps=maps,
+        seed=getattr(test, "seed", 1) if seed is None else seed,
+        engine=engine.value if engine else None,
+        step=time_step,
+        out=out,
+        force=force,
+        spec=spec,
+        check_step=check_step,
+        timeout=parse_time("--timeout", timeout),
+        resume=resume,
+        formats=("json",) if no_report else FORMATS,
+    )
+    exit_on_fail(print_runs.run(request, test, as_json), strict)
+
+
+@app.command()
+def reduce(
+    system: System,
+    data: Data = None,
+    values: Set = None,
+    template: Annotated[
+        bool, typer.Option("--template", help="Print an empty record: its columns, their units, the values to state.")
+    ] = False,
+    spec: Spec = None,
+    strict: Strict = False,
+    no_report: NoReport = False,
+    fit_to: Annotated[
+        str | None,
+        typer.Option(
+            "--fit-to",
+            metavar="PART",
+            help="drift_record: write the noise of the record as values of a gyro of the bench (floated_gyro), a file "
+            "for --set @FILE.",
+        ),
+    ] = None,
+    out: Out = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Reduce measured data and write the same report.
+
+    \b
+    Examples:
+      gyrobench reduce tumble_single_axis --template > record.csv
+      gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
+      gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
+    """
+    from gyrobench.commands import print_runs
+    from gyrobench.commands.arguments import parse_settings
+    from gyrobench.report import FORMATS
+    from gyrobench.workflow.inputs import load_test
+
+    test = load_test(system)
+    if template:
+        from gyrobench.workflow.measured_run import empty_record
+
+        echo(empty_record(test).rstrip("\n"))
+        return
+    formats = ("json",) if no_report else FORMATS
+    verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats, fit_to)
+    exit_on_fail(verdict, strict)
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    spec: Spec = None,
+    strict: Strict = False,
+    as_json: Json = False,
+) -> None:
+    """Reduce the record of a run again and rewrite its report.
+
+    \b
+    Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
+    """
+    from gyrobench.commands import print_runs
+    from gyrobench.workflow.inputs import load_saved_test
+
+    exit_on_fail(print_runs.report(folder, load_saved_test(folder), spec, as_json), strict)
+
+
+@app.command()
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders; the first is the baseline.")],
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Compare runs side by side, or two campaigns.
+
+    Of campaigns: what they differ in beyond chance, in pairs where settings and seeds are equal.
+
+    \b
+    Examples:
+      gyrobench compare reports/out/tumble_single_axis/1a2b3c4d vendor --out comparison
+      gyrobench compare reports/out/lot reports/out/lot_new
+    """
+    from gyrobench.commands import campaign_site, print_runs
+
+    if campaign_site.are_campaigns(runs):
+        campaign_site.compare(runs, out, as_json)
+    else:
+        print_runs.compare(runs, out, as_json)
+
+
+@app.command()
+def record(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    to: Annotated[Table, typer.Option("--to", help="csv: windows.csv and channels.csv, SI, units in the header.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder; default csv/ in the run.")] = None,
+) -> None:
+    """Write the record of a run as tables for other programs.
+
+    A row of windows.csv is a completed window (its columns: docs/systems.md), one of channels.csv a time; names are
+    those of the record, "gyro.u [V]" with the SI unit where it is not 1.  Numbers read back bit for bit.
+
+    \b
+    Example: gyrobench record reports/out/tumble_single_axis/1a2b3c4d --to csv --out tables
+    """
+    from gyrobench.record.record import Record
+    from gyrobench.workflow.inputs import require_run
+
+    assert to is Table.csv
+    for file in Record.load(require_run(folder)).to_csv(out or folder / "csv"):
+        echo(display_path(file))

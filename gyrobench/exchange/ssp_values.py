@@ -1,0 +1,182 @@
+"""Parameter values of an SSP archive: sets (SSV), mappings (SSM), units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from gyrobench import units
+from gyrobench.errors import GyrobenchError
+
+SSP = "http://ssp-standard.org/SSP1/"
+SSD, SSC, SSV, SSM = (
+    f"{SSP}SystemStructure{n}" for n in ("Description", "Common", "ParameterValues", "ParameterMapping")
+)
+NS = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "ssm": SSM}
+
+Scale = tuple[tuple[Any, ...], float, float]  # exponents, factor, offset: SI = factor * value + offset
+
+
+class ArchiveError(GyrobenchError, ValueError):
+    """Something in an archive that is not read; the text says what."""
+
+
+class Units:
+    """Units by name: those of an SSD or SSV element, and those that the bench knows."""
+
+    def __init__(self, *elements: ET.Element | None) -> None:
+        self.declared: dict[str, Scale] = {}
+        for element in elements:
+            for u in element.findall("ssc:Unit", NS) if element is not None else ():
+                base = u.find("ssc:BaseUnit", NS)
+                if base is not None:
+                    exponents = tuple(int(base.get(s, "0")) for s in units.BASE)
+                    scale = float(base.get("factor", "1")), float(base.get("offset", "0"))
+                    self.declared[u.get("name", "")] = (exponents, *scale)
+
+    def scale(self, name: str) -> Scale | None:
+        """Return exponents, factor and offset of a unit; None where it is not known."""
+        if name in self.declared:
+            return self.declared[name]
+        try:
+            u = units.unit(name)
+        except units.UnitError:
+            return None
+        return tuple(u.exponents), u.factor, u.offset
+
+    def convert(self, source: str, target: str) -> tuple[float, float]:
+        """Return (factor, offset) from one unit to another; (1, 0) where one is not given, or is "1" as no unit.
+
+        Raises ArchiveError for units that are not known, or not of one dimension (rad may be left out).
+        """
+        if not source or not target or source == target:
+            return 1.0, 0.0
+        a, b = self.scale(source), self.scale(target)
+        if a is None or b is None:
+            raise ArchiveError(f"unit '{source if a is None else target}' is not known")
+        if a[0][:-1] != b[0][:-1]:
+            if "1" in (source, target):  # a connector that takes any unit often says so
+                return 1.0, 0.0
+            raise ArchiveError(f"{source} into {target}: the dimensions differ")
+        return a[1] / b[1], (a[2] - b[2]) / b[1]
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value of a parameter set."""
+
+    kind: str  # "Real", "Integer", "Boolean", "String", "Enumeration"
+    value: Any
+    unit: str = ""
+
+
+def transformation(element: ET.Element) -> tuple[float, float]:
+    """Return factor and offset of a connection or mapping entry.  Raises ArchiveError for another transformation."""
+    for child in element:
+        name = child.tag.rpartition("}")[2]
+        if name == "LinearTransformation":
+            return float(child.get("factor", "1")), float(child.get("offset", "0"))
+        if name.endswith("Transformation"):
+            raise ArchiveError(f"a transformation of the kind {name} is not read")
+    return 1.0, 0.0
+
+
+def _values(element: ET.Element) -> dict[str, Value]:
+    found = {}
+    for p in element.findall("ssv:Parameters/ssv:Parameter", NS):
+        child, name = next(iter(p), None), p.get("name", "")
+        if child is None:
+            raise ArchiveError(f"parameter '{name}' has no value")
+        kind, text = child.tag.rpartition("}")[2], child.get("value", "")
+        try:
+            value: Any = text
+            if kind == "Real":
+                value = float(text)
+            elif kind in ("Integer", "Enumeration"):
+                value = int(text)
+            elif kind == "Boolean":
+                value = text in ("true", "1")
+            elif kind != "String":
+                raise ArchiveError(f"parameter '{name}': type {kind} is not read")
+        except ValueError as error:
+            if isinstance(error, ArchiveError):
+                raise
+            raise ArchiveError(f"parameter '{name}' = '{text}': not a value of the type {kind}") from None
+        found[name] = Value(kind, value, child.get("unit", ""))
+    return found
+
+
+def _read(binding: ET.Element, folder: Path, inline: str, what: str) -> ET.Element | None:
+    """Return an element that stands in the binding or in the file that it names."""
+    element = binding.find(inline, NS)
+    source = binding.get("source")
+    if element is not None or source is None:
+        return element
+    if binding.get("sourceBase", "SSD") != "SSD":
+        raise ArchiveError(f"{what} {source}: a source inside a component is not read")
+    file = (folder / source).resolve()
+    if not file.is_relative_to(folder.resolve()) or not file.is_file():
+        raise ArchiveError(f"{what} {source}: no such file in the archive")
+    try:
+        return ET.parse(file).getroot()
+    except ET.ParseError as error:
+        raise ArchiveError(f"{what} {source}: {error}") from None
+
+
+def bound_values(element: ET.Element, folder: Path, ssd_units: ET.Element | None) -> Iterator[tuple[str, Value, Units]]:
+    """Yield name, value and units of all that is bound to a system or a component, after mappings.
+
+    With a mapping only its entries are applied.  Raises ArchiveError.
+    """
+    for binding in element.findall("ssd:ParameterBindings/ssd:ParameterBinding", NS):
+        kind = binding.get("type", "application/x-ssp-parameter-set")
+        if kind != "application/x-ssp-parameter-set":
+            raise ArchiveError(f"parameters of the type {kind} are not read")
+        holder = binding.find("ssd:ParameterValues", NS)
+        found = _read(binding, folder, "ssd:ParameterValues/ssv:ParameterSet", "parameter set")
+        if found is None:
+            raise ArchiveError("a parameter binding has neither source nor values" if holder is None else "no values")
+        known = Units(ssd_units, found.find("ssv:Units", NS))
+        values = {binding.get("prefix", "") + n: v for n, v in _values(found).items()}
+        mapping = binding.find("ssd:ParameterMapping", NS)
+        if mapping is None:
+            yield from ((name, value, known) for name, value in values.items())
+            continue
+        entries = _read(mapping, folder, "ssm:ParameterMapping", "parameter mapping")
+        if entries is None:
+            raise ArchiveError("a parameter mapping has neither source nor entries")
+        for entry in entries.findall("ssm:MappingEntry", NS):
+            source, target = entry.get("source", ""), entry.get("target", "")
+            if source not in values:
+                raise ArchiveError(f"parameter mapping: no parameter '{source}' in the set for {target}")
+            yield target, _mapped(entry, values[source]), known
+
+
+def _mapped(entry: ET.Element, value: Value) -> Value:
+    factor, offset = transformation(entry)
+    suppressed = entry.get("suppressUnitConversion") == "true"
+    if (factor, offset) == (1.0, 0.0):
+        return Value(value.kind, value.value, "" if suppressed else value.unit)
+    if value.kind not in ("Real", "Integer"):
+        raise ArchiveError(f"parameter mapping: {entry.get('source')} is {value.kind}, which no factor applies to")
+    if offset and value.unit and not suppressed:
+        raise ArchiveError(
+            f"parameter mapping: {entry.get('source')}: an offset beside a unit conversion has no defined order; "
+            "set suppressUnitConversion"
+        )
+    return Value(value.kind, factor * value.value + offset, "" if suppressed else value.unit)
+
+
+def as_kind(name: str, value: Value, kind: str, target_unit: str, known: Units) -> Any:
+    """Return a value as one of a variable of the FMU, in its unit.  Raises ArchiveError."""
+    if kind == "Real" and value.kind in ("Real", "Integer"):
+        factor, offset = known.convert(value.unit, target_unit)
+        return float(value.value) if (factor, offset) == (1.0, 0.0) else factor * value.value + offset
+    if kind == "Integer" and value.kind in ("Integer", "Enumeration"):
+        return value.value
+    if kind == value.kind:
+        return value.value
+    raise ArchiveError(f"{name}: a value of the type {value.kind} for a variable of the type {kind}")

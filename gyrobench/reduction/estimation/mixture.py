@@ -1,0 +1,93 @@
+"""Mixture of t distributions over candidate noise models: standard deviation, 95 % half width, tails.
+
+Every candidate gives an estimate, a covariance and a weight (:mod:`gyrobench.reduction.estimation.noise_mixture_fit`,
+:mod:`gyrobench.reduction.series.column_regression`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+Array = NDArray[np.float64]
+DOUBT = 0.05  # probability from which on a verdict must hold if the noise is slow drift, too
+LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Candidates that count: weights (g,), their estimates less the mean (g, p), covariances (g, p, p), t's dof."""
+
+    weight: Array
+    off: Array
+    covariance: Array
+    dof: int
+    slow: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, bool))  # (g,): with drift slower than SLOW
+
+    def spread(self, J: Array) -> tuple[Array, Array]:
+        """Standard deviation and 95 % half width of the combinations J (q, p) of the coefficients."""
+        off = self.off @ J.T
+        variance = np.einsum("qi,gij,qj->gq", J, self.covariance, J)
+        sd = np.sqrt(np.maximum(variance, 0.0))
+        half = _half_width(self.weight, off, sd, self.dof)
+        return np.sqrt(self.weight @ (sd**2 + off**2)), half
+
+    def if_slow(self, J: Array) -> tuple[float, Array]:
+        """Return the probability of slow drift, and the 95 % half widths of the combinations, about the mean of all
+        candidates, if that is the noise; zeros where it is less probable than DOUBT.
+        """
+        probability = float(self.weight[self.slow].sum())
+        if probability < DOUBT:
+            return probability, np.zeros(len(J))
+        variance = np.einsum("qi,gij,qj->gq", J, self.covariance[self.slow], J)
+        sd = np.sqrt(np.maximum(variance, 0.0))
+        return probability, _half_width(self.weight[self.slow] / probability, self.off[self.slow] @ J.T, sd, self.dof)
+
+    def outside(self, J: Array, distance: Array) -> Array:
+        """Return the probability that a combination lies farther than ``distance`` (q,) from its mean."""
+        sd = np.sqrt(np.maximum(np.einsum("qi,gij,qj->gq", J, self.covariance, J), 1e-300))
+        return _tails(self.weight, self.off @ J.T, sd, self.dof, distance)
+
+
+def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
+    """Return the probability of the mixture outside +-distance from its mean, per coefficient."""
+    upper = special.stdtr(dof, -(distance - off) / sd)
+    lower = special.stdtr(dof, -(distance + off) / sd)
+    out: Array = w @ (upper + lower)
+    return np.clip(out, 0.0, 1.0)
+
+
+def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) -> Array:
+    """Newton's method on the tails between bounds that close in; bisection where a narrow candidate makes it creep."""
+    quantile = float(special.stdtrit(dof, 0.5 + level / 2))
+    high = np.max(np.abs(off) + quantile * sd, axis=0)
+    low = np.zeros_like(high)
+    height = math.exp(math.lgamma((dof + 1) / 2) - math.lgamma(dof / 2)) / math.sqrt(dof * math.pi)
+    size = np.maximum(sd, 1e-300)
+    x = np.minimum(quantile * np.sqrt(w @ (sd**2 + off**2)), high)
+    for k in range(40):
+        excess = _tails(w, off, size, dof, x) - (1.0 - level)
+        low, high = np.where(excess > 0.0, x, low), np.where(excess > 0.0, high, x)
+        with np.errstate(over="ignore"):  # a constant that a combination does not have: sd 0
+            density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
+        step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
+        new = np.where((step >= low) & (step <= high) & (k < 12), step, (low + high) / 2.0)
+        done = bool(np.all(np.abs(new - x) <= 1e-9 * high))
+        x = new
+        if done:
+            break
+    out: Array = x
+    return out
+
+
+def equivalent_dof(ratio: Array) -> Array:
+    """Return the degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
+    table = np.concatenate([np.arange(1.0, 30.0, 0.25), np.geomspace(30.0, 1e4, 60)])
+    quantile = special.stdtrit(table, 0.975)
+    out = np.interp(ratio, quantile[::-1], table[::-1])
+    result: Array = np.where(ratio <= quantile[-1], np.inf, out)
+    return result

@@ -1,0 +1,349 @@
+"""Grades of sensors, linear error model of an alignment, predicted standard deviation, and the settings it asks for.
+
+    history(settings, psi)      responses of the heading to each constant error, variance by each noise, over time
+    designed(...)               windows and frequencies for a wanted standard deviation
+
+The model is that of ALIGN-GYRO in continuous time, errors in platform axes:
+
+    phi' = u + d + m + kappa c_z z + white + phi x Omega        t = phi + a + white
+    u_z = I + k_z y,  y' = (t_x - y)/lag
+
+Not modelled: period and delay of the controller, lag of the platform (both below 1 % of the times here).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import units
+
+Array = NDArray[np.float64]
+DPH, UG = units.factor("deg/h"), 9.80665e-6
+LEVEL, COARSE, TURN, SECOND, TO_NORTH, FAST, SLOW = range(1, 8)
+STAGES = ("levelling", "coarse heading", "half a turn", "second window", "turn to north", "gyrocompass, fast",
+          "gyrocompass, falling")  # fmt: skip
+FALL, LAG, RISE = 0.25, 0.1, 0.3  # of alignment_controller
+N = 18
+PHI, J, I, V, D, M, A, KAPPA, Y = 0, 3, 5, 6, 8, 11, 14, 16, 17  # noqa: E741
+#: white noise of density 1 in the steady state: standard deviation of the heading times N, over w^1.5 (tilt) and w^0.5
+#: (rates); Lyapunov equation, damping 0.7071
+NOISE = {3: (1.2640, 0.9939), 2: (0.5746, 0.6139)}
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Standard deviations, SI: constant and Gauss-Markov drift (tau: s), densities of white noise, biases.
+
+    latitude, rad, and scale (relative, azimuth torquer) are those of the place and the torquer.
+    """
+
+    bias: float
+    markov: float
+    white: float
+    accelerometer: float
+    force: float
+    tau: float = 300.0
+    latitude: float = 0.0
+    scale: float = 0.0
+
+
+#: constant drift, Gauss-Markov drift, white drift, accelerometer bias and noise; our own assumptions of typical sensors
+GRADES = {
+    "precise": Sensors(0.002 * DPH, 0.0005 * DPH, 0.006 * DPH, 5.0 * UG, 5.0 * UG),
+    "navigation": Sensors(0.01 * DPH, 0.002 * DPH, 0.0178 * DPH, 20.0 * UG, 10.0 * UG),
+    "tactical": Sensors(0.1 * DPH, 0.02 * DPH, 0.178 * DPH, 100.0 * UG, 50.0 * UG),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of alignment_controller, SI; level: time from switch-on to the first window."""
+
+    latitude: float
+    gravity: float = 9.80665
+    earth_rate: float = units.EARTH_RATE
+    positions: int = 1
+    coarse_time: float = 60.0
+    order: int = 3
+    damping: float = math.sqrt(0.5)
+    level_frequency: float = 0.3
+    fast_frequency: float = 0.03
+    fast_time: float = 100.0
+    slow_frequency: float = 0.005
+    rate_max: float = math.radians(1.0)
+    level: float = 60.0
+
+    @property
+    def north(self) -> float:
+        return self.earth_rate * math.cos(self.latitude)
+
+    @property
+    def up(self) -> float:
+        return self.earth_rate * math.sin(self.latitude)
+
+    def gains(self, stage: int, w: float, rise: float = 1.0) -> tuple[float, float, float, float, float, float]:
+        """Return k of x and y, of J_x and J_y, of tilt and its integral in the azimuth (rise: share of these)."""
+        z = 2.0 * self.damping
+        first = (z if self.order == 2 else 1.0 + z) * w
+        if stage < TO_NORTH or (stage == TO_NORTH and w > self.fast_frequency):  # still turning
+            j = w * w if stage <= COARSE else 0.0
+            return z * w, z * w, j, j, 0.0, 0.0
+        if stage == TO_NORTH:
+            return first, z * w, 0.0, 0.0, 0.0, 0.0
+        share = rise / self.north
+        if self.order == 2:
+            return first, z * w, 0.0, w * w, share * w * w, 0.0
+        return first, z * w, 0.0, w * w, share * first * w, share * w**3
+
+    def poles(self, stage: int, w: float) -> list[complex]:
+        """Return the poles of the levelling (stages before the gyrocompass) or of the gyrocompass loop, rad/s."""
+        k = self.gains(stage, w)
+        north = self.north if stage >= FAST else 0.0
+        if stage < FAST:
+            return [complex(p) for p in np.roots([1.0, k[0], k[2]])] if k[2] else [complex(-k[0])]
+        A = [[-k[0], -north, 0.0, 0.0], [north, 0.0, k[4], 1.0], [w / LAG, 0.0, -w / LAG, 0.0], [k[5], 0.0, 0.0, 0.0]]
+        n = 4 if k[5] else 3  # phi_x, phi_z, y, integral
+        return [complex(p) for p in np.linalg.eigvals(np.array(A)[:n, :n])]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of time with one law: heading in its middle, rate of turning (of the heading), weight of the window."""
+
+    stage: int
+    time: float
+    psi: float
+    turning: float = 0.0
+    weight: float = 0.0
+    w: float = 0.0
+    rise: float = 1.0
+
+
+@dataclass(frozen=True)
+class History:
+    """t: s, n instants; stage; usable: from the end of the turn to north on.
+
+    response (n, 3, 18): of phi to each error at switch-on; variance (n, 3 noises, 3).
+    """
+
+    t: Array
+    stage: Array
+    usable: Array
+    response: Array
+    variance: Array
+
+    def sources(self, settings: Settings, s: Sensors) -> dict[str, tuple[float, str, Array]]:
+        """Return, by source, size and unit of a constant error (0 of a noise), and what it does to phi over t (n, 3).
+
+        Of constant errors with sign, the response to one standard deviation; of noises their standard deviation.
+        """
+        r, g = self.response, settings.gravity
+        north = settings.north
+        lean = s.accelerometer / g
+        out = {
+            f"constant drift along {axis}": (s.bias, "rad/s", s.bias * r[:, :, D + k]) for k, axis in enumerate("xyz")
+        }
+        out["accelerometer bias along x"] = (s.accelerometer, "m/s2", -lean * r[:, :, A + 1])  # t_y = phi_y - b_x/g
+        out["accelerometer bias along y"] = (s.accelerometer, "m/s2", lean * r[:, :, A])
+        out["latitude"] = (s.latitude, "rad", s.latitude * (north * r[:, :, D + 2]))
+        out["azimuth torquer"] = (s.scale, "1", s.scale * r[:, :, KAPPA])
+        names = ("white drift", "Gauss-Markov drift", "accelerometer noise")
+        for k, (name, size) in enumerate(zip(names, (s.white, s.markov, s.force / g), strict=True)):
+            out[name] = (0.0, "", size * np.sqrt(np.maximum(self.variance[:, k], 0.0)))
+        out["start: tilt 0.1 rad, heading unknown"] = (0.0, "", np.sqrt(
+            np.sum((0.1 * r[:, :, :2]) ** 2, axis=2) + 0.5 * north**2 * np.sum(r[:, :, J : J + 2] ** 2, axis=2)
+        ))  # fmt: skip
+        return out
+
+    def sigma(self, settings: Settings, s: Sensors) -> Array:
+        """Return the standard deviation of phi over t (n, 3)."""
+        return np.asarray(np.sqrt(sum(v**2 for _, _, v in self.sources(settings, s).values())))
+
+
+def model(c: Settings, p: Piece) -> Array:
+    """Return F of a stretch."""
+    k1, k2, j1, j2, kz, ki = c.gains(p.stage, p.w, p.rise)
+    heading = p.stage >= TURN
+    x, y = (-c.north * math.sin(p.psi), c.north * math.cos(p.psi)) if heading else (0.0, 0.0)
+    z = c.up - p.turning
+    F = np.zeros((N, N))
+    F[:3, :3] = [[-k1, z, -y], [-z, -k2, x], [y, -x, 0.0]]  # phi x Omega, and - k t
+    F[0, J] = F[1, J + 1] = 1.0
+    F[:3, D : D + 3] = F[:3, M : M + 3] = np.eye(3)
+    F[0, A], F[1, A + 1], F[2, Y] = -k1, -k2, kz
+    if p.stage >= FAST:
+        F[Y, [PHI, A, Y]] = p.w / LAG * np.array([1.0, 1.0, -1.0])
+    F[J, [PHI, A]] = -j1
+    F[J + 1, [PHI + 1, A + 1]] = -j2
+    F[2, I], F[2, KAPPA] = 1.0, z
+    F[I, [PHI, A]] = ki
+    F[V, [PHI, A]] = -p.weight * k1
+    F[V + 1, [PHI + 1, A + 1]] = -p.weight * k2
+    if p.stage == COARSE:
+        F[V, J] = F[V + 1, J + 1] = p.weight
+    return F
+
+
+def windowed(c: Settings, stage: int, psi: float) -> Array:
+    """Return what the end of a window makes of the errors."""
+    s, o = math.sin(psi), math.cos(psi)
+    T = np.eye(N)
+    T[V : V + 2] = 0.0
+    if stage == COARSE:
+        T[2] = 0.0
+        T[J : J + 2] = 0.0
+        T[2, V : V + 2] = -np.array([o, s]) / c.north
+        T[J : J + 2, V : V + 2] = np.outer([-s, o], [-s, o])
+    else:
+        T[2, V : V + 2] = -0.5 * np.array([o, s]) / c.north
+        T[J, V] = T[J + 1, V + 1] = 0.5
+    return T
+
+
+def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
+    """Yield the stretches of an alignment whose axis y points to psi at switch-on, for ``total`` s."""
+    w = c.level_frequency
+    yield from (Piece(LEVEL, c.level / 60, psi, w=w) for _ in range(60))
+
+    def window(stage: int, at: float) -> Iterator[Piece]:
+        n = 40
+        for k in range(n):
+            x = (k + 0.5) / n
+            yield Piece(stage, c.coarse_time / n, at, weight=6.0 * x * (1.0 - x) / c.coarse_time, w=w)
+
+    def turn(stage: int, start: float, angle: float) -> Iterator[Piece]:
+        n = max(1, math.ceil(abs(angle) / 0.2))
+        for k in range(n):
+            rate = math.copysign(c.rate_max, angle)
+            yield Piece(stage, abs(angle) / c.rate_max / n, start + angle * (k + 0.5) / n, rate, w=w)
+
+    yield from window(COARSE, psi)
+    if c.positions == 2:
+        yield from turn(TURN, psi, math.pi)
+        rest = 3.0 / (c.damping * w)
+        yield from (Piece(TURN, rest / 5, psi + math.pi, w=w) for _ in range(5))
+        psi = math.remainder(psi + math.pi, 2.0 * math.pi)
+        yield from window(SECOND, psi)
+    yield from turn(TO_NORTH, psi, -psi)
+    level = 1.0 / (c.damping * c.fast_frequency)
+    yield from (Piece(TO_NORTH, level / 10, 0.0, w=c.fast_frequency) for _ in range(10))
+    begun = c.level + c.positions * c.coarse_time + abs(psi) / c.rate_max + level
+    if c.positions == 2:
+        begun += math.pi / c.rate_max + rest
+    left, elapsed = max(total - begun, 0.0), 0.0
+    while elapsed < left - 1e-9:
+        fast = elapsed < c.fast_time - 1e-9
+        frequency = c.fast_frequency
+        if not fast:
+            frequency = max(c.slow_frequency, 1.0 / (1.0 / frequency + FALL * (elapsed - c.fast_time)))
+        step = min(0.15 / frequency, left - elapsed, *([c.fast_time - elapsed] if fast else []))
+        rise = min((elapsed + 0.5 * step) * c.fast_frequency / RISE, 1.0)
+        yield Piece(FAST if fast else SLOW, step, 0.0, w=frequency, rise=rise)
+        elapsed += step
+
+
+def transition(F: Array) -> Array:
+    """Return exp(F) by its series, for the small steps of an alignment (1e-4 and better)."""
+    unit = np.eye(N)
+    return np.asarray(unit + F @ (unit + F @ (unit + F @ (unit + F / 4.0) / 3.0) / 2.0))
+
+
+@lru_cache(maxsize=64)
+def history(c: Settings, psi: float, total: float, tau: float = 300.0) -> History:
+    """Return the responses over time."""
+    X = np.eye(N)
+    P = np.zeros((3, N, N))  # of the noises: white drift, Gauss-Markov drift, tilt
+    P[1, M : M + 3, M : M + 3] = np.eye(3)
+    t, rows = 0.0, []
+    before = LEVEL
+    at = psi
+    for p in pieces(c, psi, total):
+        if p.stage != before:
+            if before in (COARSE, SECOND):
+                T = windowed(c, before, at)
+                X, P = T @ X, T @ P @ T.T
+            if p.stage >= FAST > before and c.positions == 1:
+                X[J] = 0.0
+                P[:, J, :] = P[:, :, J] = 0.0
+            before = p.stage
+        F = model(c, p)
+        F[M : M + 3, M : M + 3] = -np.eye(3) / tau
+        half = transition(F * (0.5 * p.time))
+        T = half @ half
+        X, P = T @ X, T @ P @ T.T
+        for noise, columns in ((0, range(D, D + 3)), (2, range(A, A + 2))):
+            for k in columns:
+                pushes = [F[:, k], half @ F[:, k], T @ F[:, k]]  # Simpson
+                P[noise] += p.time / 6.0 * sum(f * np.outer(v, v) for f, v in zip((1, 4, 1), pushes, strict=True))
+        for k in range(M, M + 3):
+            unit = np.eye(N)[k]
+            pushes = [unit, half @ unit, T @ unit]
+            P[1] += 2.0 / tau * p.time / 6.0 * sum(
+                f * np.outer(v, v) for f, v in zip((1, 4, 1), pushes, strict=True)
+            )  # fmt: skip
+        t += p.time
+        at = p.psi
+        rows.append(
+            (
+                t,
+                p.stage,
+                p.stage >= FAST or (p.stage == TO_NORTH and not p.turning),
+                X[:3].copy(),
+                P[:, [0, 1, 2], [0, 1, 2]].copy(),
+            )
+        )
+    return History(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def window_noise(c: Settings, s: Sensors) -> float:
+    """Return the standard deviation of the coarse heading by white noise and Gauss-Markov drift, rad."""
+    lean, T = s.force / c.gravity, c.coarse_time
+    wander = s.markov**2 * (1.0 if c.positions == 1 else 1.0 - math.exp(-(T + 200.0) / s.tau))
+    white = 1.2 * s.white**2 / T + 12.0 * lean**2 / T**3
+    return math.sqrt((white + wander) / c.positions) / c.north
+
+
+def designed(c: Settings, s: Sensors, wanted: float, psi: float, total: float) -> Settings:
+    """Return the settings with what is not given (coarse_time, frequencies 0, fast_time below 0) chosen for ``wanted``.
+
+    Windows of two positions: their noise is 0.7 of what is wanted.  The gyrocompass falls until its noise is 0.3 of
+    that; it begins where it is predicted to be ready first, between there and where its noise is that of the windows.
+    """
+    if not c.coarse_time:
+        times = np.geomspace(30.0, 600.0, 40) if c.positions == 2 else [60.0]
+        good = [T for T in times if window_noise(replace(c, coarse_time=float(T)), s) <= 0.7 * wanted]
+        c = replace(c, coarse_time=float(round(good[0] if good else times[-1])))
+    lean = s.force / c.gravity
+
+    def frequency(sigma: float) -> float:
+        """Return where the noise of the gyrocompass is sigma."""
+        tilt, rate = NOISE[c.order]
+        grid = np.geomspace(1e-3, 0.05, 200)
+        noise = np.hypot(tilt * lean * grid**1.5, rate * s.white * grid**0.5) / c.north
+        below = grid[noise <= sigma]
+        return float(f"{below[-1] if below.size else grid[0]:.3g}")
+
+    slow = c.slow_frequency or frequency(0.3 * wanted)
+    first = max(frequency(window_noise(c, s)), slow)
+    tried = []
+    for fast in [c.fast_frequency] if c.fast_frequency else sorted({first, max(slow, 0.5 * first), slow}):
+        time = c.fast_time if c.fast_time >= 0.0 else (3.0 / fast if c.positions == 1 else 0.0)
+        one = replace(c, slow_frequency=min(slow, fast), fast_frequency=fast, fast_time=float(round(time)))
+        h = history(one, psi, total, s.tau)
+        ready = ready_after(h, h.sigma(one, s)[:, 2], wanted)
+        tried.append((total if ready is None else ready, float(h.sigma(one, s)[-1, 2]), one))
+    return min(tried, key=lambda x: x[:2])[2]
+
+
+def ready_after(h: History, sigma: Array, wanted: float) -> float | None:
+    """Return when, at north, the standard deviation falls to what is wanted, for good; None: it does not."""
+    bad = (h.usable == 0.0) | (sigma > wanted)
+    if bad[-1]:
+        return None
+    return float(h.t[h.t.size - int(np.argmax(bad[::-1]))])

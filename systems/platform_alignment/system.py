@@ -1,0 +1,247 @@
+"""Alignment of a gyro platform from switch-on: levelled, a coarse heading, gyrocompassed by its own instruments."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench import drift, frames
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families import loop_test as loop
+from gyrobench.system.families.loop_test import AXES, data_sheet, three
+from gyrobench.system.families.moving_bases import BASES
+from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.system import Option, Slot, System
+
+from . import plans
+
+DEG = math.pi / 180.0
+MOST = 85.0 * DEG  # latitude
+#: rows: gyro axes I, O, S in platform axes [GYRO-OA-COUPLING-Y2]
+MOUNTS = {
+    "gyro_x": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "gyro_y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+    "gyro_z": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
+}
+GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2}  # [GYRO-SDF-EOM]
+MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current
+COMMANDS = {f"controller.command[{k}] -> {gyro}.i": loop.torquer(f"{gyro}.k", 9) for k, gyro in enumerate(MOUNTS, 1)}
+CONTROLLER = Socket(
+    "AlignmentController",
+    "levels a platform and finds its heading: specific force in, rates of the platform out",
+    (
+        inp("f", "m/s2", "measured specific force, platform axes", 3),
+        out("command", "rad/s", "rate asked for, platform axes", 3),
+        out("heading", "rad", "heading of the platform axis y as computed, clockwise"),
+        out("sigma", "rad", "its standard deviation"),
+        out("tilt", "rad", "tilt about x and y as measured", 2, optional=True),
+        out("sigma_tilt", "rad", "standard deviation of the true tilt about x and y", 2, optional=True),
+        out("correction", "rad/s", "rates beside those of the Earth", 3, optional=True),
+        out("mode", "1", "1 levelling, 2 coarse, 3 turn, 4 second window, 5 to north, 6, 7 gyrocompass", whole=True),
+        out("status", "1", "0 no heading, 1 valid, 2 rates contradict, 3 not level", whole=True),
+        out("ready", "1", "1 while the heading is ready for use", whole=True),
+        out("ready_time", "s", "since when; -1: it is not"),
+        out("done", "1", "1 at the end", whole=True),
+    ),
+)
+
+
+class PlatformAlignment(System):
+    """The three-axis platform with three floated gyros and three accelerometers aligns itself: levelling, coarse
+    heading in one or two positions, turn to north, gyrocompass of second or third order.
+
+    [ALIGN-GYRO, PLATFORM-3AXIS-DYN, DECOUPLE-T2]
+    """
+
+    title = "Alignment of a gyro platform"
+    spec = ("ALIGN-GYRO", "PLATFORM-3AXIS-DYN", "DECOUPLE-T2")
+    reduction = "reduction"
+    slots = {
+        "site": Slot("Site", "site"),
+        "platform": Slot("Platform", "platform_three_axis"),
+        **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in MOUNTS},
+        "accelerometers": Slot("Accelerometers", "accelerometer_triad"),
+        "controller": Slot(CONTROLLER, "alignment_controller"),
+        "decoupler": Slot("Decoupler", "decoupler_t2"),
+        **{axis: loop.stabilizer("stabilizer_lead_lag") for axis in AXES},
+    }
+    wires = """
+        site -> platform: omega=omega_b alpha=alpha_b f=f_b
+        platform -> decoupler: theta
+        platform -> accelerometers: f
+        accelerometers -> controller: f_read=f
+        """ + "\n".join(COMMANDS) + "".join(
+        f"""
+        platform -> {gyro}: omega alpha f
+        {gyro}.M_react[{k}] -> platform.M_gyro[{k}]
+        {gyro}.u -> decoupler.u[{k}]
+        decoupler.u_axes[{k}] -> {axis}.u
+        {axis}.v -> platform.v[{k}]
+        """
+        for k, (gyro, axis) in enumerate(zip(MOUNTS, AXES, strict=True), 1)
+    )  # fmt: skip
+    open = ("platform.M_load", *(f"{axis}.test" for axis in AXES), *(f"{axis}.command" for axis in AXES))
+    factors = COMMANDS
+    options = SITE | {
+        "grade": Option("navigation", str, f"grade of gyros and accelerometers: {', '.join(plans.GRADES)}"),
+        "wanted": Option("5arcmin", "rad", "standard deviation of the heading that is ready for use", 1e-6),
+        "positions": Option(1, int, "windows of the coarse heading: 1, or 2 half a turn apart", 1, 2),
+        "order": Option(3, int, "order of the gyrocompass loop", 2, 3),
+        "coarse_time": Option(0.0, "s", "length of a window of the coarse heading; 0: by what is wanted", 0.0, 3600.0),
+        "fast": Option(0.0, "rad/s", "natural frequency of the gyrocompass at first; 0: by what is wanted", 0.0, 0.3),
+        "fast_time": Option(-1.0, "s", "time for which it stays there; below 0: by the frequency", -1.0),
+        "slow": Option(0.0, "rad/s", "natural frequency to which it falls; 0: by what is wanted", 0.0, 0.3),
+        "hold": Option(120.0, "s", "time for which the heading is held ready", 0.0),
+        "time": Option(1800.0, "s", "time after which the run ends, ready or not", 100.0, 36000.0),
+        "heading": Option("40deg", "rad", "heading of the platform at switch-on (simulated)", -math.pi, math.pi),
+        "pitch": Option("2deg", "rad", "angle of the middle gimbal at switch-on (simulated)", -30 * DEG, 30 * DEG),
+        "roll": Option("-1.5deg", "rad", "angle of the outer gimbal at switch-on (simulated)", -30 * DEG, 30 * DEG),
+        "base": Option("rest", str, f"what the platform stands on (simulated): {', '.join(BASES)}"),
+        "crossover": Option(5.0, "Hz", "crossover of the stabilizer loops", 1.0, 15.0),
+        "u_latitude": Option(0.0, "rad", "standard uncertainty of the latitude", 0.0),
+        "u_scale": Option(0.0, "1", "relative std. unc. of the scale factor of the azimuth torquer", 0.0),
+    }
+    noises = (
+        *loop.noises(MOUNTS), *(f"accelerometers.white_{a}" for a in "xyz"), "site.local_e", "site.local_n",
+    )  # fmt: skip
+    step = 1e-3
+    done = "controller.done"
+    channels = (
+        *three("platform.theta"), "controller.heading", "controller.sigma",
+        "controller.tilt[1]", "controller.tilt[2]", "controller.sigma_tilt[1]", "controller.sigma_tilt[2]",
+        *three("controller.correction"), "controller.mode", "controller.status", "controller.ready",
+        "controller.ready_time", "platform.lock", "platform.saturated",
+        *(f"{slot}.saturated" for slot in (*MOUNTS, *AXES)),
+    )  # fmt: skip
+    shown = ("platform.theta", "controller.tilt", "controller.heading", "controller.sigma", "controller.mode",
+             "controller.status controller.ready")  # fmt: skip
+    channel_period = 1.0
+
+    def set(self, name: str, value: Any) -> None:
+        """Set an option; a moving base puts its ground into the slot site, and its tilt into the record."""
+        super().set(name, value)
+        if name == "base":
+            moving = self["base"] != "rest"
+            site = replace(self.slots["site"], part="ground_motion" if moving else "site")
+            tilts = three("site.tilt") if moving else ()
+            own = type(self)
+            vars(self).update(slots={**self.slots, "site": site}, channels=(*own.channels, *tilts))
+            vars(self)["noises"] = own.noises if moving else own.noises[:-2]
+
+    @property
+    def sensors(self) -> plans.Sensors:
+        """What the controller is told of its sensors: the grade, and the options of type B."""
+        grade = plans.GRADES.get(self["grade"], plans.GRADES["navigation"])
+        return replace(grade, latitude=self["u_latitude"], scale=self["u_scale"])
+
+    def settings(self, psi: float = math.pi / 2.0) -> plans.Settings:
+        """Return the settings of the controller; psi: rough heading at switch-on, for the time of the turns."""
+        gravity = self["gravity"] or frames.normal_gravity(self["latitude"], self["height"])
+        given = plans.Settings(
+            self["latitude"], gravity, positions=self["positions"], coarse_time=self["coarse_time"],
+            order=self["order"], fast_frequency=self["fast"], fast_time=self["fast_time"], slow_frequency=self["slow"],
+        )  # fmt: skip
+        return plans.designed(given, self.sensors, self["wanted"], psi, self["time"])
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        found: dict[str, Any] = {
+            **self.owned(),
+            **BASES.get(self["base"], {}),
+            "platform.theta_0": [self["pitch"], self["roll"], -self["heading"]],
+            **parts.all_given({f"platform.{n}": [x] * 3 for n, x in MOTOR.items()}),
+            "platform.i_max": [48.0] * 3,
+        }
+        sensors = self.sensors
+        for k, (axis, (slot, mount)) in enumerate(zip(AXES, MOUNTS.items(), strict=True)):
+            gyro = {n: parts.given(f"{slot}.{n}", x) for n, x in GYRO.items()}
+            found |= {f"{slot}.mount": mount, f"{slot}.reaction": True, **{f"{slot}.{n}": x for n, x in gyro.items()}}
+            found[f"{slot}.k"] = data_sheet(parts[f"{slot}.k"])
+            noise = {"turn_on": "bias", "markov": "markov", "white": "white", "markov_tau": "tau"}
+            found |= {f"{slot}.{n}?": getattr(sensors, field) for n, field in noise.items()}
+            gain = found["platform.k_t"][k] / found["platform.R"][k]
+            found |= {f"{axis}.{n}?": x for n, x in self.stabilizer(_inertia(parts)[k], gain, gyro).items()}
+        found |= {f"accelerometers.white_{a}?": sensors.force for a in "xyz"}
+        return found | self._controller(parts)
+
+    def stabilizer(self, inertia: float, motor: float, gyro: dict[str, float]) -> dict[str, float]:
+        """F of PLATFORM-1AXIS, as in platform_three_axis: the loop crosses at the option crossover."""
+        wc = 2.0 * math.pi * self["crossover"]
+        s = 1j * wc
+        f = (1 + 1 / 15j) * (1 + 4j) / (1 + 0.25j)
+        sensor = gyro["K_sg"] * gyro["H"] / gyro["C"] / (s * (gyro["J"] / gyro["C"] * s + 1))
+        K = 1.0 / abs(f * sensor / (inertia * s)) / motor
+        return {"K": K, "tau1": 1.0, "T1": 1.0, "tau2": 4 / wc, "T2": 0.25 / wc, "integral": wc / 15, "v_max": 48.0}
+
+    def _controller(self, parts: PartValues) -> dict[str, Any]:
+        c, s = self.settings(), self.sensors
+        values = {
+            "latitude": c.latitude, "gravity": c.gravity, "positions": c.positions, "coarse_time": c.coarse_time,
+            "order": c.order, "damping": c.damping, "level_frequency": c.level_frequency, "rate_max": c.rate_max,
+            "fast_frequency": c.fast_frequency, "fast_time": c.fast_time, "slow_frequency": c.slow_frequency,
+            "wanted": self["wanted"], "hold": self["hold"], "time_limit": self["time"],
+            "errors_bias": s.bias, "errors_markov": s.markov, "errors_tau": s.tau, "errors_white": s.white,
+            "errors_accelerometer": s.accelerometer, "errors_force": s.force, "errors_latitude": s.latitude,
+            "errors_scale": s.scale,
+        }  # fmt: skip
+        known = {f"controller.drift[{k}]?": x for k, x in enumerate(_level_drift(parts, c.gravity), 1)}
+        return {f"controller.{n}?": x for n, x in values.items()} | known
+
+    def check(self) -> list[str]:
+        problems = frames.gravity_problems(self["gravity"]) if self["gravity"] else []
+        for name, known in (("grade", plans.GRADES), ("base", BASES)):
+            if self[name] not in known:
+                problems.append(f"{name} = {self[name]}: must be one of {', '.join(known)}")
+        if abs(self["latitude"]) > MOST:
+            problems.append(
+                f"latitude = {math.degrees(self['latitude']):.4g}°: within 5° of a pole the horizontal Earth rate is "
+                "below 9 % of that at the equator; no gyrocompass"
+            )
+        if self["slow"] and self["fast"] and self["slow"] > self["fast"]:
+            problems.append(f"slow = {self['slow']:g} rad/s: must be at most fast = {self['fast']:g} rad/s")
+        if self["fast"] > 0.3 or 2.0 * math.pi * self["crossover"] * self.step > 0.1:
+            problems.append(
+                f"crossover = {self['crossover']:g} Hz: the stabilizers are closed through a delay of one step, "
+                f"{self.step:g} s, which wants a crossover up to {0.1 / (2.0 * math.pi * self.step):.3g} Hz"
+            )
+        return problems
+
+    def warnings(self) -> list[str]:
+        found = []
+        if abs(self["latitude"]) > 80.0 * DEG:
+            factor = math.cos(40.0 * DEG) / math.cos(self["latitude"])
+            found.append(f"Latitude above 80°: the error of the heading is {factor:.2g} times that at 40°.")
+        if self.check():
+            return found
+        c, s = self.settings(), self.sensors
+        h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
+        sigma = h.sigma(c, s)[:, 2]
+        if plans.ready_after(h, sigma, self["wanted"]) is None:
+            arcmin = DEG / 60.0
+            sources = {n: float(np.abs(v[-1, 2])) for n, (_, _, v) in h.sources(c, s).items()}
+            worst = max(sources, key=lambda n: sources[n])
+            found.append(
+                f"A standard deviation of {self['wanted'] / arcmin:.3g}′ is not expected within {self['time']:g} s: "
+                f"{sigma[-1] / arcmin:.3g}′ then, {sources[worst] / arcmin:.3g}′ of it by {worst}. Take two positions, "
+                "better sensors, or more time."
+            )
+        return found
+
+
+def _inertia(parts: PartValues) -> list[float]:
+    """Inertia about each motor axis (A order) at joint angles 0, as in platform_three_axis."""
+    roll, pitch, inner = (parts[f"platform.{name}"] for name in ("I_r", "I_f", "I_a"))
+    return [pitch[0] + inner[0], roll[1] + pitch[1] + inner[1], inner[2]]
+
+
+def _level_drift(parts: PartValues, gravity: float) -> list[float]:
+    """Static drift of each gyro on the level platform, from the coefficients that the parts have."""
+    found = []
+    for slot, mount in MOUNTS.items():
+        values = {n: float(parts.get(f"{slot}.{n}", 0.0)) for n in drift.NAMES}
+        load = -np.asarray(mount, dtype=float) @ [0.0, 0.0, gravity / frames.G0]
+        found.append(float(drift.drift(load, values)))
+    return found

@@ -1,0 +1,87 @@
+"""The test as choices of turns and of the dwell's share, each with the time of turning."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift
+from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
+from gyrobench.campaign.design.visit_protocol import GUARD, gyro_noise, gyro_unseen
+from gyrobench.frames import EARTH_RATE
+from gyrobench.record.record import Record
+from gyrobench.reduction.drift.window_regressors import Turning
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.system.system import System
+from gyrobench.system.visits import format_time
+
+from . import budget
+from .setup import TumbleSetup, setup_of
+
+Array = NDArray[np.float64]
+TURN = 2.0 * math.pi
+TURNS = (1, 2, 4)
+SHARES = (0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # of a dwell against the turning of a mount
+FASTEST = 60.0 * EARTH_RATE  # of the table; the errors of its axis grow with its rate
+
+
+def protocol_of(system: System, record: Record) -> OptionProtocol:
+    """Return turns in each mount and shares of the dwells; the length is the time of turning in a mount, s.
+
+    Faster turning costs no time and lifts the signal above slow drift; the rate is kept below 60 Earth rates.
+    """
+    setup, p = setup_of(record.run), record.run.parameters
+    share = float(system["dwell"] * system["rate"] / (TURN * system["turns"]))
+    own = (int(system["turns"]), share)
+    each = [own, *((n, s) for n in TURNS for s in SHARES if (n, s) != own)]
+    if system["both_senses"]:
+        each = [own]  # its plan has four turnings, which the windows below do not
+    choices = []
+    for turns, part in each:
+        options = functools.partial(_options, turns, part)
+        start = TURN * turns / float(system["rate"])
+        known = functools.partial(_windows, system, setup, turns, part) if (turns, part) != own else None
+        label = f"{turns} turn{'s' if turns > 1 else ''}, dwells {part:.2g} of a mount's turning"
+        choices.append(Choice(label, options, start, TURN * turns / FASTEST, known))
+    noise = gyro_noise(p)
+
+    def covariances(fits: Sequence[Findings], record: Record) -> list[Array]:
+        return [noise.covariance(f.t_start, f.t_end) for f in fits]
+
+    names = drift.terms(9 if setup.terms == 10 else setup.terms)
+    unseen = ("D_OO, which constant |g| folds into D_F, D_II and D_SS", *gyro_unseen(p))
+    return OptionProtocol(tuple(choices), covariances, names, unseen, noise)
+
+
+def _options(turns: int, share: float, length: float) -> Mapping[str, Any]:
+    rate = math.degrees(TURN * turns / length)
+    return {"turns": turns, "rate": f"{rate:.8g}deg/s", "dwell": format_time(share * length)}
+
+
+def _windows(system: System, setup: TumbleSetup, turns: int, share: float, length: float) -> tuple[Array, Array, Array]:
+    """Return design matrix and times of the windows of the plan, the table's run-up left out."""
+    n, settle, dwell = int(system["windows"]) * turns, float(system["settle"]), share * length
+    still = max(1, round(dwell / (length / n)))
+    t0, t1, a0, a1, faces = [], [], [], [], []
+    t, angle = 0.0, 0.0
+    for phase in sorted(setup.faces):
+        t += settle + GUARD
+        turning = setup.turns(phase)
+        count, width = (n, length / n) if turning else (still, dwell / still)
+        step = -TURN * turns / n if turning else 0.0
+        k = np.arange(count)
+        t0.append(t + width * k)
+        t1.append(t + width * (k + 1))
+        first = angle + step * settle / width  # where the gate opens
+        a0.append(first + step * k)
+        a1.append(first + step * (k + 1))
+        faces += [np.asarray(setup.faces[phase], dtype=float)] * count
+        t, angle = t + width * count, angle + step * count
+    start, end, before, after = (np.concatenate(x) for x in (t0, t1, a0, a1))
+    turned = Turning(before, after, start, end, np.array(faces))
+    return budget.design(setup, turned, drift.terms(9 if setup.terms == 10 else setup.terms)), start, end

@@ -1,0 +1,59 @@
+"""Designs of tests: predicted against counted uncertainty, and the time against the system's own plan.
+
+    python tests/benchmarks/designs.py [CASE ...] [--runs N]
+
+Each case is designed, its plan run N times with seeds of their own.  Printed: time over that of the system's own plan
+at equal uncertainty; over all values the root mean square of predicted over mean stated u, and of predicted over
+counted rms error, with the standard error that N runs leave to a single value (values of one run are correlated).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+
+import numpy as np
+
+from gyrobench.campaign.design.shortest_test import design_test
+from gyrobench.system.system import load_system
+
+CASES: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
+    "accelerometer, k2": ("accelerometer_multipoint", {"k2": "0.5ug/g2"}, {}),
+    "accelerometer, all": ("accelerometer_multipoint", {}, {}),
+    "two-axis tumble, D_I and D_F": ("tumble_two_axis", {"D_I": "0.001deg/h/g", "D_F": "0.002deg/h"}, {}),
+    "two-axis tumble, all": ("tumble_two_axis", {}, {}),
+    "single-axis tumble, D_I and D_F": ("tumble_single_axis", {"D_I": "0.001deg/h/g", "D_F": "0.002deg/h"}, {}),
+    "north finder": ("north_finder", {"ψ": "0.2deg"}, {}),
+    "four accelerometers": ("accelerometer_four", {}, {}),
+    "eight positions, scale factors": ("eight_position", {"k_x": "0.002deg/h/mA", "k_y": "0.002deg/h/mA"}, {}),
+    "eight positions, all": ("eight_position", {}, {}),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"one of: {'; '.join(CASES)}")
+    parser.add_argument("--runs", type=int, default=300)
+    asked = parser.parse_args()
+    for name in asked.cases or CASES:
+        system, wants, values = CASES[name]
+        start = time.perf_counter()
+        found = design_test(load_system(system).with_values(values), wants, count=asked.runs)
+        u, error = ([], [])
+        for v in found.values.values():
+            counted = found.counted[v.name]
+            u.append(v.u / counted[0])
+            error.append(v.error / counted[1])
+        rms = [math.sqrt(float(np.mean(np.square(x)))) for x in (u, error)]
+        print(
+            f"{name}: {found.time:.0f} s, {found.time / found.book_time:.2f} of own {found.book_time:.0f} s; "
+            f"predicted over stated u {rms[0]:.3f} ({min(u):.3f} to {max(u):.3f}), over rms error {rms[1]:.3f} "
+            f"({min(error):.3f} to {max(error):.3f}), +-{1.0 / math.sqrt(2.0 * asked.runs):.3f}; "
+            f"bound {found.bound:.0f} s; {time.perf_counter() - start:.0f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""The linked form: the same bits as FMI calls in every system; failures, checkpoints, when it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.engine import linked_system
+from gyrobench.engine.session import RunError, RunInterrupted, Session, run
+from gyrobench.record.record import Record
+from gyrobench.system.suite import Suite, load_test
+from gyrobench.system.system import System
+from gyrobench.system.values import InvalidValueError
+
+STEPS = 64
+QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
+FOREIGN = Path(__file__).parents[1] / "foreign"
+SYSTEMS = sorted(n for n in Bench(standard_folder()).systems() if not isinstance(load_test(n), Suite))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_the_linked_form_gives_the_same_bits_in_every_system(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first steps, each a row of the channels, and all wired values after the last one."""
+    found: list[tuple[Record, bytes]] = []
+    with Session(name, engine="linked", bench=standard_folder()) as session:
+        system, step = type(session.system), session.system.step
+        for attribute, value in {"stop": STEPS * step, "channel_period": step, "loops": ()}.items():
+            monkeypatch.setattr(system, attribute, value)
+        for engine in ("linked", "native", "reference"):
+            session.engine, session.linkable = engine, engine == "linked"
+            found.append((session.run(seed=7), session.program.out.tobytes()))
+    (linked, values), *others = found
+    assert linked.run.steps == STEPS
+    assert [r.run.linked for r, _ in found] == [True, False, False]
+    assert all(linked.same_data(r) and values == v for r, v in others)
+
+
+def test_a_whole_plan_with_windows(small: System) -> None:
+    linked, native = (run(small, values=QUICK, engine=e, seed=5) for e in ("linked", "native"))
+    assert len(linked.windows["mean"]) > 4
+    assert linked.same_data(native)
+    assert linked.run.steps == native.run.steps
+    assert set(linked.run.timing) == set(native.run.timing) == set(small.slots)
+    assert all(0.0 < s < 1.0 for s in linked.run.timing.values())  # sampled, as by FMI calls
+
+
+def test_a_part_that_fails_tells_why(small: System) -> None:
+    # the float reaches its stop of 1e-6 rad
+    messages = []
+    for engine in ("linked", "native", "reference"):
+        with pytest.raises(RunError) as failed:
+            run(small, values={**QUICK, "gyro.stop": 1e-6}, engine=engine)
+        messages.append(str(failed.value))
+        assert failed.value.record is not None
+    assert "gyro: doStep failed at t = " in messages[0]
+    assert "stop" in messages[0]
+    assert messages[0] == messages[1] == messages[2]
+
+
+def test_a_run_is_continued_in_the_other_form(small: System, tmp_path: Path) -> None:
+    whole = run(small, values=QUICK, engine="native", seed=2)
+    for first, second in (("linked", "native"), ("native", "linked")):
+        out = tmp_path / first
+        with pytest.raises(RunInterrupted):
+            run(small, values=QUICK, engine=first, seed=2, out=out, stop_at=0.333)
+        assert run(small, values=QUICK, engine=second, seed=2, out=out, resume=True).same_data(whole)
+
+
+def test_it_is_used_where_it_is_there_or_worth_it(
+    small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = tmp_path / "linked.so"
+    monkeypatch.setattr(linked_system, "library_path", lambda name, source: library)
+    # some 2000 steps of 6 parts save 0.1 ms, which is less than the compiler takes
+    assert not run(small, values=QUICK).run.linked
+    assert not library.exists()
+    with monkeypatch.context() as cheap:
+        cheap.setattr(linked_system, "COMPILATION", 1e-6)
+        assert run(small, values=QUICK).run.linked
+    assert library.exists()
+    assert run(small, values=QUICK).run.linked  # it is there
+    assert not run(small, values=QUICK, engine="native").run.linked
+
+
+def test_foreign_and_python_parts_are_not_linked(small: System, make: Callable[[str], Path]) -> None:
+    with Session(small, target="python") as session:
+        assert not session.linkable
+    setup = {"parts": {"gyro": make("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
+    with Session(small, **setup) as session:  # type: ignore[arg-type]
+        assert not session.linkable
+    with pytest.raises(InvalidValueError, match="engine 'linked': gyro: not a native part of this bench"):
+        Session(small, engine="linked", **setup)  # type: ignore[arg-type]
+
+
+def test_an_fmu_of_other_sources_is_not_linked(small: System, monkeypatch: pytest.MonkeyPatch) -> None:
+    # its instance may have another layout
+    monkeypatch.setattr(linked_system, "native_guid", lambda name, cls: f"other {name}")
+    with pytest.raises(InvalidValueError, match=r"site.*files of the part have changed since its FMU was built"):
+        Session(small, engine="linked")
