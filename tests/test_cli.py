@@ -351,7 +351,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 
 # ---------------------------------------------------------------------------- interrupted and failed runs
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if status.windows >= 2:

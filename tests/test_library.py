@@ -271,7 +271,7 @@ def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monke
         bare.result  # noqa: B018
 
 
-def test_an_interrupted_run_holds_what_was_recorded(folder: Path) -> None:
+def test_an_interrupted_run_holds_what_was_recorded(folder: Path, unhurried: None) -> None:
     """Ctrl-C in a notebook: an error with the record until then, in memory or, with out, in the folder to resume."""
 
     def interrupt(status: object) -> None:
