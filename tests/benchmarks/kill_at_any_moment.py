@@ -19,6 +19,10 @@ import time
 from collections import Counter
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from processes import processes_in
+
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint, run_driver
 from gyrobench.files import TEMPORARY
@@ -51,18 +55,6 @@ def start(out: Path, *more: str) -> int:
                     folder.rmdir()
             os._exit(code)
     return pid
-
-
-def living(folder: Path) -> list[str]:
-    """Return the processes but this one that have files below a folder mapped."""
-    found = []
-    for maps in Path("/proc").glob("[0-9]*/maps"):
-        try:
-            if int(maps.parent.name) != os.getpid() and str(folder) in maps.read_text():
-                found.append(maps.parent.name)
-        except OSError:
-            continue
-    return found
 
 
 def contents(folder: Path) -> tuple[list[str], list[object]]:
@@ -101,9 +93,9 @@ def main(count: int) -> None:
             there = [stage for stage in STAGES if (out / stage).is_file()]
             stages["had ended" if ended else there[0] if there else "nothing on disk"] += 1
             end = time.monotonic() + 2.0
-            while living(temporary) and time.monotonic() < end:
+            while processes_in(temporary) and time.monotonic() < end:
                 time.sleep(0.01)
-            wrong["processes"] += len(living(temporary))
+            wrong["processes"] += len(processes_in(temporary))
             begun = (out / ".lock").is_file()
             if not ended:
                 began = time.monotonic()

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import processes_in
 
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint, supervision
@@ -88,18 +89,6 @@ def killed(words: list[str], folder: Path, moment: str, patch: pytest.MonkeyPatc
     assert os.waitstatus_to_exitcode(status) == -signal.SIGKILL
 
 
-def writers(folder: Path) -> list[str]:
-    """Return the processes that have a file of the folder's run open or mapped."""
-    found = []
-    for maps in Path("/proc").glob("[0-9]*/maps"):
-        try:
-            if int(maps.parent.name) != os.getpid() and str(folder) in maps.read_text():
-                found.append(maps.parent.name)
-        except OSError:
-            continue
-    return found
-
-
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_killed_and_resumed(
     command: Command, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None, moment: str
@@ -110,9 +99,9 @@ def test_killed_and_resumed(
     with monkeypatch.context() as patch:
         killed(["run", NAME, *TINY, "--no-report", "--out", str(out)], out, moment, patch)
     end = time.monotonic() + 5.0
-    while writers(tmp_path / "tmp") and time.monotonic() < end:
+    while processes_in(tmp_path / "tmp") and time.monotonic() < end:
         time.sleep(0.01)
-    assert writers(tmp_path / "tmp") == []
+    assert processes_in(tmp_path / "tmp") == []
     code, _, err = command("run", NAME, *TINY, "--out", out, "--resume")
     assert code == 0, err
     record = Record.load(out)
