@@ -11,8 +11,43 @@ import pytest
 
 import gyrobench
 from gyrobench.bench import Bench, BenchError, display_path, standard_folder, suggest_names
+from gyrobench.commands import catalog
 from gyrobench.commands.catalog import init_bench, list_contents
 
+ODD = '''"""A module."""
+class Helper:
+    """Derives from nothing."""
+    title = "no"
+
+
+class Mine(  # a comment
+    Base,
+    other.Base,
+):
+
+    """Test (of its own).
+
+    More.
+    """
+
+    number = 1
+    title = (
+        "A title "
+        "(in two lines)"
+    )
+    spec = ("TEST-A",
+            "TEST-B")
+
+    def check(self):
+        title = "not this"
+
+
+class Undocumented(Base):
+    title = "not this"
+
+
+title = "not this"
+'''
 TOOL = Path(gyrobench.__file__).parent if gyrobench.__file__ else Path(gyrobench.__path__[0])
 
 
@@ -75,6 +110,24 @@ def test_listing_reads_what_each_part_says_of_itself() -> None:
     assert "GYRO-DYN-1" in rows["floated_gyro"]["spec"]
     assert rows["tumble_single_axis"]["what"] == "Single-axis tumble test"
     assert "TEST-TUMBLE1-SDF" in rows["tumble_single_axis"]["spec"]
+
+
+def test_listing_finds_what_the_syntax_trees_hold(tmp_path: Path) -> None:
+    """Docstring, title and spec of the last class that derives from another and has a docstring."""
+    bench = Bench(standard_folder())
+    files = [f / "model.py" for f in bench.parts().values()] + [f / "system.py" for f in bench.systems().values()]
+    odd = tmp_path / "system.py"
+    odd.write_text(ODD, encoding="utf-8")
+    for file in (*files, odd):
+        expected = ("", "", ())
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and node.bases and (doc := ast.get_docstring(node)):
+                given = {ast.unparse(s.targets[0]): s.value for s in node.body if isinstance(s, ast.Assign)}
+                title, spec = (ast.literal_eval(given[n]) if n in given else "" for n in ("title", "spec"))
+                expected = doc.splitlines()[0], title, tuple(spec)
+        doc, attributes = catalog._class_text(file)
+        assert (doc.splitlines()[0], attributes.get("title", ""), tuple(attributes.get("spec", ()))) == expected
+    assert expected == ("Test (of its own).", "A title (in two lines)", ("TEST-A", "TEST-B"))
 
 
 def test_listing_survives_a_specification_that_cannot_be_read(tmp_path: Path) -> None:

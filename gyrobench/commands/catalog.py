@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import re
 import shutil
 import tomllib
@@ -11,21 +12,28 @@ from typing import Any
 
 from gyrobench.bench import ROOMS, Bench, BenchError, suggest_names
 
+#: a class that derives from another: what its docstring is indented by, and the docstring
+CLASS = re.compile(r'^class \w+\([^)]*\w[^)]*\):[^\n]*\n\s*?([ \t]+)[rR]?"""\s*(.*?)"""', re.MULTILINE | re.DOTALL)
+OUTSIDE = re.compile(r"^\S", re.MULTILINE)
+
 
 def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
-    """Return (docstring, literal class attributes) of the class that a file is about: its last one with a docstring."""
-    last: tuple[str, dict[str, Any]] = ("", {})
-    for node in ast.parse(file.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ClassDef) and node.bases and (doc := ast.get_docstring(node)):
-            attributes: dict[str, Any] = {}
-            for s in node.body:
-                if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name):
-                    try:
-                        attributes[s.targets[0].id] = ast.literal_eval(s.value)
-                    except ValueError:
-                        continue
-            last = doc, attributes
-    return last
+    """Return (docstring, title and spec) of the class that a file is about: its last one with a docstring.
+
+    The text is searched: parsing it would take as long as all else that ``gyrobench list`` does.  A title or spec that
+    is not written out is left out.
+    """
+    text = file.read_text(encoding="utf-8")
+    found: tuple[str, dict[str, Any]] = ("", {})
+    for match in CLASS.finditer(text):
+        end = OUTSIDE.search(text, match.end())
+        body = text[match.end() : end.start() if end else len(text)]
+        attributes = {}
+        for name, value in re.findall(rf"^{match[1]}(title|spec) = (\(.*?\)|[^\n]*)$", body, re.MULTILINE | re.DOTALL):
+            with contextlib.suppress(ValueError, SyntaxError):
+                attributes[name] = ast.literal_eval(value)
+        found = match[2], attributes
+    return found
 
 
 def _entry(name: str, file: Path) -> dict[str, Any]:

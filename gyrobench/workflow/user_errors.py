@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from gyrobench.bench import Bench, display_path, standard_folder
 from gyrobench.errors import GyrobenchError
-from gyrobench.report import ReportError
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
@@ -69,6 +68,8 @@ def content_location(error: BaseException) -> str | None:
 def user_message(error: BaseException) -> str:
     """Return the message of an error for the user: its text; of errors that are not gyrobench's also type and place."""
     if isinstance(error, GyrobenchError):
+        from gyrobench.report import ReportError  # after an error only: every command starts with this module
+
         if isinstance(error, ReportError):
             lines = [f"  - {name}: {user_message(cause)}" for name, cause in error.failures.items()]
             return "\n".join(["report not complete:", *lines])
