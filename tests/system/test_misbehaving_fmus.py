@@ -24,6 +24,15 @@ SOURCE = (Path(__file__).parents[1] / "foreign" / "faulty.c").read_text(encoding
 FAULTS = {name: n for n, name in enumerate(re.findall(r"\w+", SOURCE.split("enum FAULTS {")[1].split("}")[0]))}
 
 
+@pytest.fixture(autouse=True)
+def limit_of_the_gyro_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half a second is asked of the calls of the faulty FMU only: loading others may take longer on a slow machine."""
+    patience = supervision._Supervisor._patience
+    monkeypatch.setattr(
+        supervision._Supervisor, "_patience", lambda s: patience(s) if s._call()[0] == "gyro" else supervision.START
+    )
+
+
 STEP = [
     ("CRASH", "its process crashed (SIGSEGV)"),
     ("HANG", "no answer within 0.5 s; its process was stopped"),
@@ -52,7 +61,7 @@ def test_a_fault_in_a_step(
     if fault == "MEMORY":
         monkeypatch.setattr(supervision, "memory_limit", lambda: 700_000_000)
     values = {"gyro.fault": FAULTS[fault], "gyro.at": 150, **QUIET}
-    timeout = 30.0 if fault in ("ALARM", "MEMORY") else 0.5
+    timeout = 0.5 if "no answer" in words else 60.0  # the others end by themselves, on a slow machine too
     with pytest.raises(RunError) as caught:
         run(small, {"gyro": make("faulty")}, values=values, child=True, timeout=timeout, out=tmp_path / "run")
     text = str(caught.value)
@@ -83,7 +92,7 @@ def test_a_fault_before_the_first_step(
             {"gyro": make("faulty", *flags)},
             values={"gyro.fault": FAULTS[fault]},
             child=True,
-            timeout=0.5,
+            timeout=0.5 if "no answer" in words else 60.0,
             out=tmp_path / "run",
         )
     assert words in str(caught.value) and caught.value.exit_code == 3
@@ -125,8 +134,8 @@ def test_what_does_not_touch_the_run(
     values = {"gyro.at": 150, **QUIET, **SHORT}
     good = run(small, {"gyro": make("faulty")}, values=values)
     found = run(
-        small, {"gyro": make("faulty")}, values={**values, "gyro.fault": FAULTS[fault]}, child=True, timeout=0.5,
-        out=Path("run"),
+        small, {"gyro": make("faulty")}, values={**values, "gyro.fault": FAULTS[fault]}, child=True,
+        timeout=0.5 if "no answer" in words else 60.0, out=Path("run"),
     )  # fmt: skip
     assert found.complete and found.same_data(good) and Record.load(tmp_path / "run").same_data(good)
     assert any(words in n for n in found.run.notes)
@@ -149,7 +158,7 @@ def test_nothing_is_left_of_a_process_that_an_fmu_started(small: System, make: M
                 continue
         return found
 
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while ours() and time.monotonic() < end:
         time.sleep(0.01)
     assert ours() == []

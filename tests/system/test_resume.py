@@ -202,10 +202,18 @@ NAME = "tumble_single_axis"
 WORDS = ["run", NAME, "--set", "rate=2deg/s", "--set", "dwell=20", "--set", "windows=36", "--json"]
 PLAIN = ["--no-report", "--no-check-step"]  # of the runs whose record alone is of interest
 CODE = """
-import sys
+import sys, time
+from pathlib import Path
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint
 checkpoint.PERIOD, checkpoint.SHARE = 0.0, 0.0
+write, written = checkpoint.CheckpointManager.write, []
+def write_four(manager, state):
+    written.append(write(manager, state))
+    if len(written) == 4:
+        Path("four").touch()
+        time.sleep(3600.0)  # until it is killed
+checkpoint.CheckpointManager.write = write_four
 sys.argv = ["gyrobench", *sys.argv[1:]]
 cli.main()
 """
@@ -271,14 +279,11 @@ def test_a_killed_process_is_resumed(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {root!r})\n{CODE}", *words], cwd=tmp_path
     )
     file = tmp_path / "k" / FILE
-    written: set[int] = set()
-    deadline = time.monotonic() + 120.0
-    while len(written) < 4 and process.poll() is None and time.monotonic() < deadline:
-        if file.is_file():
-            written.add(file.stat().st_mtime_ns)
+    deadline = time.monotonic() + 300.0
+    while not (tmp_path / "four").is_file() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL and len(written) == 4
+    assert process.wait() == -signal.SIGKILL and file.is_file()
     assert not (tmp_path / "k" / "run.json").exists()
     code, _, err = command([*WORDS, "--out", "k", "--seed", "2"], capsys, monkeypatch)
     assert code == 2 and "k: holds another run (its parameters, seed differ)" in err

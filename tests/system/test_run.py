@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import signal
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -203,13 +201,18 @@ def test_interrupt_keeps_the_record(make: Make, tmp_path: Path) -> None:
         stop = 1e6
         channel_period = 100.0
 
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     seen: list[Any] = []
+
+    def interrupt(report: Any) -> None:
+        seen.append(report)
+        if report.time > 1000.0:
+            signal.raise_signal(signal.SIGINT)
+
     with pytest.raises(RunInterrupted) as caught:
-        run(Long(), **ring(make), out=tmp_path, progress=seen.append)
+        run(Long(), **ring(make), out=tmp_path, progress=interrupt)
     record = Record.load(tmp_path)
     assert not record.complete
-    assert 0.0 < record.run.stopped_at < 1e6
+    assert 1000.0 < record.run.stopped_at == seen[-1].time < 1e6
     assert len(record.channels["time"]) == int(record.run.stopped_at / 100.0 + 1e-9) + 1
     assert caught.value.exit_code == 3
     assert seen[-1].rate > 0.0

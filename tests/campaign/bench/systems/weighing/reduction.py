@@ -31,6 +31,9 @@ def from_record(record, specification):
             raise ZeroDivisionError("by nothing")
         case "disk":
             raise OSError(28, "No space left on device")
+        case "wait" if record.run.seed > 100:
+            while not os.path.exists(options["times"] + ".go"):
+                time.sleep(0.05)
         case "once":  # the first time only
             file = options["times"] + ".once"
             if not os.path.exists(file):
