@@ -110,6 +110,7 @@ class Session:
         self.notes += [f"{s}: {paths[s].name} is not of this bench: SHA-256 {self.hashes[s]}" for s in foreign]
         self.engine = self._choose(engine)
         self.linkable = self.engine != "reference" and engine != "native" and not self._obstacle()
+        self.steps = 0  # of all runs
         self.folder = temporary_folder()
         self.instances: dict[str, FmuInstance] = {}
         self.board: RunBoard | None = None
@@ -148,17 +149,23 @@ class Session:
 
     def _library(self, system: System) -> tuple[Path | None, bool]:
         """Return the file of the loop in C, None for the reference engine, and whether it is that of the linked form:
-        where that is asked for or worth it.
+        where that is asked for or, with the runs before, worth it.
         """
         from gyrobench.engine.engine_library import engine_library
         from gyrobench.engine.linked_system import linked_library
+        from gyrobench.packaging import CompilerError
 
         if self.engine == "reference":
             return None, False
         if self.linkable:
-            steps = (system.stop or system.plan().duration()) / system.step
-            if library := linked_library(self.program, None if self.engine == "linked" else steps):
-                return library, True
+            steps = self.steps + (system.stop or system.plan().duration()) / system.step
+            try:
+                if library := linked_library(self.program, None if self.engine == "linked" else steps):
+                    return library, True
+            except CompilerError:
+                if self.engine == "linked":
+                    raise
+                self.linkable = False  # the loop on FMI calls was brought here, or is in the cache
         return engine_library(), False
 
     def _load(self) -> None:
@@ -296,6 +303,7 @@ class Session:
         document.timing = {slot: s * scale for slot, s in state.timed_seconds.items()}
         document.complete = problem is None
         document.steps = state.k
+        self.steps += state.k
         document.stopped_at = state.k * system.step
         if checkpoints is not None and checkpoints.resumed_at:
             document.resumed_at = checkpoints.resumed_at

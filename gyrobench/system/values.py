@@ -33,21 +33,24 @@ def flatten(name: str, value: Any) -> dict[str, Any]:
 
 def nest(values: Mapping[str, Any]) -> dict[str, Any]:
     """The inverse of :func:`flatten`: ``{"a[1]": 1, "a[2]": 2, "b": 3}`` -> ``{"a": [1, 2], "b": 3}``"""
-    arrays: dict[str, dict[tuple[int, ...], Any]] = {}
+    nested: dict[str, Any] = {}
+    arrays: dict[str, dict[int, Any]] = {}  # index -> value, or the same of the next index
     for key, value in values.items():
         name, bracket, index = key.partition("[")
-        place = tuple(int(i) for i in index[:-1].split(",")) if bracket else ()
-        arrays.setdefault(name, {})[place] = value
+        if not bracket:
+            nested[name] = value
+            continue
+        cells = arrays.setdefault(name, {})
+        nested.setdefault(name, None)  # its place
+        *outer, last = map(int, index[:-1].split(","))
+        for i in outer:
+            cells = cells.setdefault(i, {})
+        cells[last] = value
 
-    def build(cells: dict[tuple[int, ...], Any]) -> Any:
-        if () in cells:
-            return cells[()]
-        rows: dict[int, dict[tuple[int, ...], Any]] = {}
-        for place, value in cells.items():
-            rows.setdefault(place[0], {})[place[1:]] = value
-        return [build(rows[k]) for k in sorted(rows)]
+    def build(cells: Any) -> Any:
+        return [build(cells[k]) for k in sorted(cells)] if isinstance(cells, dict) else cells
 
-    return {name: build(cells) for name, cells in arrays.items()}
+    return nested | {name: build(cells) for name, cells in arrays.items()}
 
 
 def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.engine import linked_system
+from gyrobench.engine import engine_library, linked_system
 from gyrobench.engine.session import RunError, RunInterrupted, Session, run
+from gyrobench.packaging import CompilerError
 from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System
@@ -83,6 +84,35 @@ def test_it_is_used_where_it_is_there_or_worth_it(
     assert library.exists()
     assert run(small, values=QUICK).run.linked  # it is there
     assert not run(small, values=QUICK, engine="native").run.linked
+
+
+def test_many_short_runs_are_worth_it_together(small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    library = tmp_path / "linked.so"
+    monkeypatch.setattr(linked_system, "library_path", lambda name, source: library)
+    with Session(small, child=False) as session:
+        records = [session.run(QUICK)]
+        # worth a run and a half; that this one has moves, which its plan does not count, is known after it
+        worth = 1.5 * records[0].run.steps * len(session.program.parts) * linked_system.SAVED
+        monkeypatch.setattr(linked_system, "COMPILATION", worth)
+        records += [session.run(QUICK) for _ in range(3)]
+    assert [r.run.linked for r in records] == [False, False, True, True]
+    assert all(r.same_data(records[0]) for r in records)
+
+
+def test_without_a_compiler_a_long_run_is_not_linked(
+    small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a worker to which FMUs and engine were sent."""
+
+    def none(*_: object) -> None:
+        raise CompilerError("no C compiler")
+
+    monkeypatch.setattr(linked_system, "library_path", lambda name, source: tmp_path / "linked.so")
+    monkeypatch.setattr(linked_system, "COMPILATION", 0.0)
+    monkeypatch.setattr(engine_library.compiler, "compile_library", none)
+    assert not run(small, values=QUICK).run.linked
+    with pytest.raises(CompilerError):
+        run(small, values=QUICK, engine="linked")
 
 
 def test_foreign_and_python_parts_are_not_linked(small: System, make: Callable[[str], Path]) -> None:
