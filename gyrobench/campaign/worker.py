@@ -158,10 +158,8 @@ class _Desk:
                 f"worker {self.name}: its gyrobench differs from the one that sent the run; install the same everywhere"
             )
         self.root, self.inbox = unpack(self.bundle), temporary_folder()
-        self.engine = None
         if (self.root / "engine").is_dir() and compiler.command(compiler.this_platform()) is None:
             engine_library.provide(next((self.root / "engine").iterdir()))
-            self.engine = "native"  # the linked form is compiled for each system
         self.bench = self.root / "bench"
         self.test: System | Suite = load_test(self.order.system, self.bench)
         self.limits = load_limits(self.root / self.order.spec) if self.order.spec else None
@@ -264,7 +262,6 @@ class _Desk:
                 system,
                 parts,
                 {s: root / f for s, f in assigned.maps.items()},
-                engine=self.engine,
                 bench=self.bench,
                 prebuilt={name: root / f for name, f in assigned.prebuilt.items()},
             )

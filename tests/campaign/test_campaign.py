@@ -98,6 +98,28 @@ def test_threads_of_this_process_are_workers_too(two: Any, tmp_path: Path) -> No
     assert rows(tmp_path / "a") == rows(tmp_path / "b")
 
 
+def test_a_worker_started_by_hand_needs_no_compiler_and_no_bench(two: Any, tmp_path: Path) -> None:
+    asked = {"system": "weighing", "over": AXES, "set": {"duration": "0.05s"}}
+    (tmp_path / "w").mkdir()
+    env = {k: v for k, v in os.environ.items() if k not in ("CC", "PATH")}
+    env |= {"PATH": "", "PYTHONPATH": str(Path(gb.__file__).parents[1]), "GYROBENCH_CACHE": str(tmp_path / "w")}
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, "--nthreads", "1"]
+        worker = subprocess.Popen(
+            [*command, "--no-dashboard"], env=env, cwd=tmp_path / "w", stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            gb.campaign(asked, scheduler=cluster.scheduler_address, out=tmp_path / "a")
+        finally:
+            worker.terminate()
+            worker.wait(60)
+    gb.campaign(asked, client=two, out=tmp_path / "b")
+    assert rows(tmp_path / "a") == rows(tmp_path / "b")
+    assert set(Campaign.open(tmp_path / "a").arrow()["state"].to_pylist()) == {"done"}
+    assert not list((tmp_path / "w").rglob("*.so"))
+
+
 # -------------------------------------------------------------------------------------------- faults
 FAULTS = {
     "": ("done", None),
