@@ -14,6 +14,7 @@ Not modelled: dead time; jitter of the samples themselves (time stamps more than
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -35,7 +36,9 @@ BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
 JUMP = 100.0  # spreads of the increments of an angle
+ROUNDING = 8.0 * float(np.finfo(float).eps)  # of an angle: its differences differ by so much where they are the same
 LONG = 1 << 20  # steps of a gap at most on the grid; of a longer one the rest is left out
+CLOCKS = ("s", "ms", "min", "h")
 TURNS = (2.0 * math.pi,)
 WRAPS = tuple(2.0**k for k in (8, 12, 14, 16, 18, 20, 24, 32))  # of counts
 
@@ -98,10 +101,11 @@ class _Angle:
         there = d[np.isfinite(d)]
         if not self.spread and there.size > 8:
             self.usual = float(np.median(there))
-            self.spread = 1.4826 * float(np.median(np.abs(there - self.usual)))
-            if not self.spread:
-                off = np.abs(there - self.usual)
-                self.spread = float(np.min(off[off > 0.0], initial=math.inf)) if np.any(off > 0.0) else 0.0
+            off = np.abs(there - self.usual)
+            self.spread = 1.4826 * float(np.median(off))
+            rounding = ROUNDING * float(np.max(np.abs(value)))
+            if self.spread <= rounding:  # most increments are the same number of counts
+                self.spread = float(np.min(off[off > rounding])) if np.any(off > rounding) else 0.0
         if not self.spread:
             return d
         jumped = np.flatnonzero(np.abs(d - self.usual) > JUMP * self.spread)
@@ -127,8 +131,8 @@ class DriftReader:
         if not self.timed and not sampling:
             raise DataError(
                 table.source,
-                ["column 'time [s]' is missing, and no sampling rate is given: write '# sampling = 100Hz' in the file "
-                 "or --set sampling=100Hz"],
+                [f"column 'time [s]' is missing{_clock_of(table)}, and no sampling rate is given: write "
+                 "'# sampling = 100Hz' in the file or --set sampling=100Hz"],
             )  # fmt: skip
         self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
         self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
@@ -141,6 +145,7 @@ class DriftReader:
         self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
         self.beginning = {s.name: np.empty(0) for s in signals}  # first values, rad/s or rad, as they are in the file
         self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
+        self.steps = {name: [math.inf, -math.inf, 0.0] for name in self.angles}  # least, largest; largest angle
 
     def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
         """Return the means that are held, NaN in gaps: time, rates in rad/s, other columns in SI.  Raises DataError."""
@@ -269,7 +274,12 @@ class DriftReader:
             return value
         if s.kind == PER_SAMPLE:
             return value / self.about.step
-        return self.angles[s.name].increments(value, follows) / dt
+        d = self.angles[s.name].increments(value, follows)
+        if (there := d[np.isfinite(d)]).size:
+            low, high, size = self.steps[s.name]
+            largest = max(size, float(np.max(np.abs(value))))
+            self.steps[s.name] = [min(low, float(there.min())), max(high, float(there.max())), largest]
+        return d / dt
 
     def _extreme(self, s: Signal, value: Array) -> None:
         """Count samples that stay at the largest or smallest value: a converter at its limit."""
@@ -360,8 +370,21 @@ class DriftReader:
                 raise DataError(
                     self.table.source, [f"column '{s.name}': all its values are {e[0] * s.factor:.6g} (SI)"]
                 )
+        for name, (low, high, size) in self.steps.items():
+            if high - low <= ROUNDING * size:
+                raise DataError(
+                    self.table.source,
+                    [f"column '{name}': every step of it is {high:.6g} rad: the noise is below its resolution, there "
+                     "is nothing to estimate; read a finer angle, or more seldom"],
+                )  # fmt: skip
         about.resets = {n: a.resets for n, a in self.angles.items() if a.resets}
         about.wraps = {n: a.wraps for n, a in self.angles.items() if a.wraps}
+
+
+def _clock_of(table: Table) -> str:
+    """Return a question about columns in a unit of time, which may be the clock under another name; "" for none."""
+    found = [n for n in table.head.names if (m := re.search(r"\[(.*)\]$", n)) and m[1].strip() in CLOCKS]
+    return f" (is it '{found[0]}'? name it time)" if found else ""
 
 
 def _rounding(t: Array, step: float) -> float:

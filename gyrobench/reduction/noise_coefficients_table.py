@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.record.record import Record
-from gyrobench.reduction.series.noise_coefficients import fit
+from gyrobench.reduction.series.noise_coefficients import JUST, fit
 from gyrobench.result import DriftTestResult
 
 Array = NDArray[np.float64]
@@ -54,13 +54,15 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         e = getattr(found, name)
         value = e.value / si if e.determined else None
         high = None if residual and name in SLOW else float(e.high) / si
-        finding = "" if e.determined else "not determined"
+        finding = "just determined" if e.just_determined else "" if e.determined else "not determined"
         rows.append([f"{name}, {meaning}", value, float(e.low) / si, high, unit, finding])
     count = sum(int(np.isfinite(x).sum()) for x in stretches)
     caption = (
         f"IEEE 952, from {count} means of {length:g} s by maximum likelihood; not determined: the interval holds 0. "
         "Gauss-Markov drift is not among the five terms: B and K take it up"
     )
+    if just := [row[0].partition(",")[0] for row in rows if row[5] == "just determined"]:
+        caption = f"{caption}. {', '.join(just)}: {JUST}"
     if found.check is not None and (departs := found.check.finding()):
         caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]

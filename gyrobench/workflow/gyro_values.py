@@ -95,4 +95,5 @@ def _words(c: Coefficient) -> str:
     if c.no_value:
         return f"{c.name}: {c.no_value}"
     low, high = c.interval
-    return f"{c.name} = {c.estimate:.4g} {c.unit} ({low:.4g} to {high:.4g})"
+    just = ", just determined" if estimate_of(c, 1.0).just_determined else ""
+    return f"{c.name} = {c.estimate:.4g} {c.unit} ({low:.4g} to {high:.4g}){just}"

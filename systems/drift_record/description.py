@@ -16,7 +16,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation
-from gyrobench.reduction.series.noise_coefficients import NoiseCoefficients, slopes
+from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficients, slopes
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.report.numbers import write_number, write_p
 
@@ -27,6 +27,7 @@ Json = dict[str, Any]
 DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
 STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
 WILD = 20.0  # standard deviations
+COUNTS = 3.0  # steps of the values' resolution within which a sample is not called wild
 MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
 
 
@@ -181,16 +182,22 @@ def _p(p: float) -> str:
 
 def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[str]:
     about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
     out = list[str]()
     if (check := noise.check) is not None and check.p <= MISFIT:
         out.append(
             f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
             "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time."
         )
-    out += step_warnings(p)
+    if just := [term for term in TERMS if getattr(noise, term).just_determined]:
+        out.append(f"{', '.join(just)}: {JUST}.")
+    coarse = 0.0  # rad/s: where most samples are the same number of counts, one more is neither wild nor a step
+    if column and (q := column["resolution"]):
+        coarse = COUNTS * (q if column["kind"] == "rate" else q / p.step)
+    out += step_warnings(p, coarse)
     off = np.abs(p.clean - np.nanmedian(p.clean))
     spread = 1.4826 * float(np.nanmedian(off))
-    if spread and (wild := np.flatnonzero(off > WILD * spread)).size:
+    if spread and (wild := np.flatnonzero(off > max(WILD * spread, coarse))).size:
         many = f"{wild.size} samples lie" if wild.size > 1 else "A sample lies"
         out.append(
             f"{many} more than {WILD:g} standard deviations from the median, the first at {number(p.time[wild[0]])} s. "
@@ -206,7 +213,6 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
             f"{about['stuck'][p.name]} samples stay at the largest or smallest value of the file: the converter may "
             "have been at its limit. The coefficients are too small then. Use a larger range."
         )
-    column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
     if column and column["kind"] == "rate" and not column["white"]:
         q = column["resolution"]
         out.append(
@@ -223,14 +229,17 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
     return out
 
 
-def step_warnings(p: Prepared) -> list[str]:
-    """Return a warning where one change from block to block stands out of all: a step, which no noise makes."""
+def step_warnings(p: Prepared, coarse: float = 0.0) -> list[str]:
+    """Return a warning where one change from block to block stands out of all: a step, which no noise makes.
+
+    coarse: change of a single sample that says nothing, rad/s.
+    """
     m = max(1, p.stretch.size // STEP_BLOCKS)
     change = np.diff(block_means(p.stretch, m))
     off = change - np.median(change)
     k = int(np.argmax(np.abs(off)))
     spread = 1.4826 * float(np.median(np.abs(off)))
-    if not spread or abs(off[k]) < STEP * spread:
+    if not spread or abs(off[k]) < max(STEP * spread, coarse / m):
         return []
     hours = (k + 1) * m * p.stretch_step / 3600.0
     return [

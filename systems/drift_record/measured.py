@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from gyrobench.record import sampling
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import TIME, find_signals, harmonic_names, open_table, with_harmonics
+from gyrobench.record.drift_columns import (
+    RATE,
+    TIME,
+    Signal,
+    find_signals,
+    harmonic_names,
+    open_table,
+    with_harmonics,
+)
 from gyrobench.record.drift_series import DriftReader, Progress, as_dict
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
@@ -79,7 +87,9 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     run.window_units = {"t_start": "s", "t_end": "s", **{n: si[n] for n in reader.others}, **dict.fromkeys(
         (s.name for s in signals), "rad/s")}  # fmt: skip
     run.series = {
-        "columns": {s.name: {"kind": s.kind, "unit": s.unit, **_rounding(reader.beginning[s.name])} for s in signals},
+        "columns": {
+            s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name])} for s in signals
+        },
         "others": reader.others,
         "factor": reader.held.factor,
         "samples": kind,
@@ -90,8 +100,11 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     return Record(windows, {}, run)
 
 
-def _rounding(values: Array) -> dict[str, Any]:
+def _rounding(s: Signal, values: Array) -> dict[str, Any]:
     """Return the step to which values (rad/s or rad) are rounded, 0: none, and whether that is a white error."""
+    counts = values / s.factor
+    if s.unit in ("", "1") and s.kind != RATE and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
+        return {"resolution": abs(s.factor), "white": True}  # a cumulative count repeats no value to see its step by
     try:
         q = quantization(values)
     except SeriesError:

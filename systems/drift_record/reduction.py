@@ -141,6 +141,8 @@ def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, rel
         why = f"not determined, below {below:.2g} {unit} (95 %): the record is too short or other noise covers it"
         return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
                            no_value=why)  # fmt: skip
+    if e.just_determined:
+        meaning = f"{meaning}; just determined"
     u_a = (high - low) / (2.0 * NORMAL)
     u = math.hypot(u_a, relative * value)
     more = NORMAL * (u - u_a)

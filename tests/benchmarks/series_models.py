@@ -1,7 +1,8 @@
 """How often the 95 % intervals of autoregressive coefficients and of the correlation time hold the truth, and how often
 a record without lines shows one.
 
-python tests/benchmarks/series_models.py [records]      # 1000: an hour
+python tests/benchmarks/series_models.py                # 1000 records of each: an hour of CPU
+python tests/benchmarks/series_models.py --only coefficients --samples 100000 1000000
 
 Each coefficient of three models by Burg and by Yule-Walker, 10^3 to 10^6 samples; correlation time of 20 samples
 alone, of 1/20 of the record, and of 20 samples under white noise of the same variance; false alarms at 5 %.
@@ -9,8 +10,9 @@ alone, of 1/20 of the record, and of 20 samples under white noise of the same va
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,22 +35,22 @@ def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
     return signal.lfilter([1.0], np.r_[1.0, -np.array(phi)], rng.normal(size=n + settle))[settle:]
 
 
-def coefficients(runs: int) -> None:
-    for n, part in ((1000, 1), (10_000, 1), (100_000, 2), (1_000_000, 10)):  # of longer records fewer
+def coefficients(runs: int, lengths: Sequence[int]) -> None:
+    for n in lengths:
         for name, phi in MODELS.items():
             rng = np.random.default_rng(n)
             held = {"burg": np.zeros(len(phi)), "yule-walker": np.zeros(len(phi))}
-            for _ in range(runs // part):
+            for _ in range(runs):
                 x = record(phi, n, rng)
                 for method, count in held.items():
                     fit = fit_ar(x, 1.0, len(phi), method)  # type: ignore[arg-type]
                     count += (fit.low <= phi) & (phi <= fit.high)
-            each = {m: " ".join(f"{v / (runs // part):.3f}" for v in c) for m, c in held.items()}
+            each = {m: " ".join(f"{v / runs:.3f}" for v in c) for m, c in held.items()}
             print(f"{name}, {n} samples: Burg {each['burg']}; Yule-Walker {each['yule-walker']}", flush=True)
 
 
-def times(runs: int) -> None:
-    for n in (1000, 10_000, 100_000, 1_000_000):
+def times(runs: int, lengths: Sequence[int]) -> None:
+    for n in lengths:
         for tau in (20.0, n / 20.0):
             rng = np.random.default_rng(n + 1)
             phi = math.exp(-1 / tau)
@@ -59,18 +61,24 @@ def times(runs: int) -> None:
                 found = gauss_markov(signal.lfilter([1.0], [1.0, -phi], x), 1.0, white=False)
                 held += found.low <= tau <= found.high
             print(f"correlation time {tau:g} of {n} samples alone: {held / runs:.3f}", flush=True)
-    for n, few in ((1000, runs), (10_000, runs // 5), (100_000, runs // 50)):
+
+
+def times_under_white(runs: int, lengths: Sequence[int]) -> None:
+    """3 s for a record of 1e5 samples, of more in proportion: of those above 1e4 a tenth, above 1e5 none."""
+    for n in lengths:
+        few = runs if n <= 10_000 else runs // 10 if n <= 100_000 else 0
         rng, phi = np.random.default_rng(n + 2), math.exp(-1 / 20)
         held = 0
         for _ in range(few):
             x = record((phi,), n, rng)
             found = gauss_markov(x + rng.normal(size=n) / math.sqrt(1 - phi * phi), 1.0)
             held += found.low <= 20.0 <= found.high
-        print(f"correlation time 20 of {n} samples under white noise: {held / few:.3f} of {few}", flush=True)
+        if few:
+            print(f"correlation time 20 of {n} samples under white noise: {held / few:.3f} of {few}", flush=True)
 
 
-def alarms(runs: int) -> None:
-    for n in (1000, 5000, 50_000):
+def alarms(runs: int, lengths: Sequence[int]) -> None:
+    for n in lengths:
         rng = np.random.default_rng(n + 3)
         seen = dict.fromkeys(
             ("white", "Gauss-Markov", "random walk", "differenced white", "AR(2)", "white on a walk"), 0
@@ -89,8 +97,20 @@ def alarms(runs: int) -> None:
         print(f"lines in {n} samples without: " + ", ".join(f"{k} {v / runs:.3f}" for k, v in seen.items()), flush=True)
 
 
+COUNTS = {
+    "coefficients": (coefficients, (1000, 10_000, 100_000, 1_000_000)),
+    "times": (times, (1000, 10_000, 100_000, 1_000_000)),
+    "white": (times_under_white, (1000, 10_000, 100_000)),
+    "alarms": (alarms, (1000, 5000, 50_000)),
+}
+
+
 if __name__ == "__main__":
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    coefficients(runs)
-    times(runs)
-    alarms(runs)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--records", type=int, default=1000)
+    parser.add_argument("--only", choices=COUNTS, nargs="+", default=list(COUNTS))
+    parser.add_argument("--samples", type=int, nargs="+", help="lengths of the records; default: those of each count")
+    given = parser.parse_args()
+    for name in given.only:
+        count, lengths = COUNTS[name]
+        count(given.records, given.samples or lengths)

@@ -110,6 +110,9 @@ def test_rate_of_angles_and_counts(tmp_path: Path) -> None:
     assert np.flatnonzero(np.isnan(out["b"])).tolist() == [0, 600]
     assert np.allclose(np.delete(out["b"], [0, 600]), np.delete(expected, 599))
     assert np.allclose(reader.beginning["a"] / ARCSEC, 0.5 * (counts % 65536))
+    coarse = np.cumsum(np.where(np.arange(N) % 3 == 1, 16, 15))  # most steps are 15: one more is no reset
+    reader, out, _ = read(write(tmp_path, {"time [s]": TIME, "c": coarse}, "# scale = 0.5arcsec"), scale="0.5arcsec")
+    assert not reader.about.resets and np.allclose(out["c"][1:], np.diff(coarse) * 0.5 * ARCSEC / STEP)
     _, out, _ = read(write(tmp_path, {"time [s]": TIME, "angle [deg]": turned}))
     assert np.allclose(out["angle"][1:], RATE[1:] * DPH * 1e5, rtol=1e-6)
     _, out, _ = read(write(tmp_path, {"time [s]": TIME, "turn [arcsec]": RATE}), increments=True)
@@ -168,6 +171,8 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time [s]": TIME, "i [mA]": RATE}, "17.2", "scale = 17.2: no unit"),
         ({"time [s]": TIME, "i [mA]": RATE}, "17.2deg/h/V", "neither a rate nor an angle"),
         ({"rate [deg/h]": RATE}, "", "no sampling rate is given: write '# sampling = 100Hz'"),
+        ({"t [ms]": TIME, "rate [deg/h]": RATE}, "", "column 'time [s]' is missing (is it 't [ms]'? name it time)"),
+        ({"time [s]": TIME, "n": 15.0 * np.arange(N)}, "0.5arcsec", "column 'n': every step of it is 3.6361e-05 rad"),
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, np.nan)}, "", "0 samples with a value; 1000 of 1000 rows have"),
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, 2.0)}, "", "all its values are"),
         ({"time [s]": TIME, "rate [deg/h]": ["0.1", "fast"] * 500}, "", "column 'rate': 500 cells are not a number"),

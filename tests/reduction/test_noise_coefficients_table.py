@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gyrobench.reduction import noise_coefficients_table as table_module
 from gyrobench.reduction.noise_coefficients_table import LEAST, RESIDUAL, noise_coefficients_table, on_grid
+from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
 T = 60.0  # s
 N = 0.6  # deg/h/sqrt(Hz): 0.01 deg/sqrt(h)
@@ -71,6 +73,14 @@ def test_drift_that_is_none_of_the_five_is_told() -> None:
     caption = noise_coefficients_table(result, record)[0]["caption"]
     assert caption.startswith("The five terms do not describe the record (p < 0.001)")
     assert caption.count("do not describe") == 1
+
+
+def test_just_determined_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    just, none = Estimate(1e-7, 3e-8, 1.7e-7, True), Estimate(0.0, 0.0, 1e-7, False)
+    monkeypatch.setattr(table_module, "fit", lambda *_: NoiseCoefficients(none, none, just, none, none))
+    (table,) = noise_coefficients_table(*long_test())
+    assert [row[5] for row in table["rows"]] == ["not determined"] * 2 + ["just determined"] + ["not determined"] * 2
+    assert "K: just determined, below 4 u: of such" in table["caption"]
 
 
 def test_a_missing_window_is_a_gap() -> None:

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from gyrobench.engine.session import Session
 from gyrobench.record import block_means
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.deviations import deviations
-from gyrobench.reduction.series.noise_coefficients import fit
+from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
 from gyrobench.result import DriftRecordResult
 from gyrobench.system.system import System, load_system
 
@@ -180,6 +181,36 @@ def test_noise_that_the_terms_do_not_describe(tmp_path: Path) -> None:
     result = reduce(write(tmp_path / "r.csv", {"time [s]": np.arange(n, dtype=float), "rate [deg/h]": x}))
     assert any("The spectrum is not that of the five terms" in w for w in result.warnings), result.warnings
     assert any("correlation time" in s for s in result.columns[0].texts["model"])
+
+
+def test_a_coarse_counter(tmp_path: Path) -> None:
+    """15.36 counts of 0.5 arcsec a sample: two steps in three are the same, and none is a reset or wild.
+
+    Q is that of rounding, 0.5/sqrt 12 = 0.144 arcsec.
+    """
+    n = 4000
+    angle = np.cumsum(15.36 + 0.3 * np.random.default_rng(6).normal(size=n))  # counts
+    file = write(tmp_path / "r.csv", {"n": np.floor(angle) % 65536}, "# scale = 0.5arcsec\n# sampling = 2Hz")
+    result = reduce(file, type_b="none")
+    facts = {row[0]: row[1] for row in result.columns[0].tables["acquisition"][0]["rows"]}
+    assert facts["resets of the angle or counter"] == 0 and facts["turns or overflows unwrapped"] == 0
+    assert facts["resolution of the values"] == pytest.approx(0.5) and facts["gaps"] == 0
+    assert result["Q"].interval[0] < 0.5 / math.sqrt(12.0) < result["Q"].interval[1]
+    assert not [w for w in result.warnings if "standard deviations from the median" in w]
+
+
+def test_what_is_just_determined_is_said_with_the_figure() -> None:
+    """3.3 u: in the table beside the estimate, and in a warning with what the counts say; 5 u, or nothing: not."""
+    reduction = importlib.import_module(".reduction", type(load()).__module__)
+    description = importlib.import_module(".description", type(load()).__module__)
+    just, clear, none = Estimate(1.0, 0.4, 1.6, True), Estimate(-1.0, -1.4, -0.6, True), Estimate(0.0, 0.0, 1.0, False)
+    noise = NoiseCoefficients(clear, just, none, clear, just)
+    assert [getattr(noise, n).just_determined for n in "NBKRQ"] == [False, True, False, False, True]
+    meanings = {n: reduction._coefficient(SimpleNamespace(noise=noise), n, False, None, 0.0).meaning for n in "NBKRQ"}
+    assert [n for n, words in meanings.items() if words.endswith("; just determined")] == ["B", "Q"]
+    quiet = SimpleNamespace(clean=np.zeros(600), stretch=np.zeros(600), name="rate")
+    (said,) = description.warnings(quiet, noise, SimpleNamespace(series=None, options={}))
+    assert said.startswith("B, Q: just determined, below 4 u: of such estimates at least one interval in four misses")
 
 
 # ------------------------------------------------------------------------------------------- refusals, words
