@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         load_suite,
         open_run,
         reduce,
+        site,
         sweep,
     )
 
@@ -48,6 +49,7 @@ __all__ = [
     "load_suite",
     "open_run",
     "reduce",
+    "site",
     "sweep",
 ]
 

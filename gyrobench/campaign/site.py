@@ -48,6 +48,8 @@ def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None
     out: folder of the site, default ``site`` in the campaign; reports are linked where they are.  publish: a folder
     that shall hold everything, reports included.  Raises UsageError.
     """
+    if out and publish:
+        raise UsageError("out and publish: name one; a published site holds the reports, one of out links them")
     folder = publish or out or (campaign.local / "site" if campaign.local else None)
     if folder is None:
         raise UsageError(f"{campaign.url}: not a folder of this machine; say where the site goes: --publish DIR")

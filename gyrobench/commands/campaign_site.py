@@ -9,14 +9,11 @@ from gyrobench.bench import Bench, UsageError, display_path
 
 
 def write(url: str, out: Path | None, publish: Path | None) -> None:
-    """Write the site, print what it answers and where it is.  Raises UsageError."""
+    """Write the site, print what it answers and where it is."""
     from gyrobench.campaign.site import write_site
     from gyrobench.campaign.store import Campaign
 
-    if out and publish:
-        raise UsageError("--out and --publish: name one; a published site holds the reports, one of --out links them")
-    campaign = Campaign.open(url)
-    written = write_site(campaign, out, publish)
+    written = write_site(Campaign.open(url), out, publish)
     for sentence in written.answer:
         print(sentence)
     print(display_path(written.index))

@@ -12,6 +12,7 @@
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
     gb.sweep("tumble_single_axis", {"latitude": "0deg..80deg:9"}, seeds=20)   # a data frame, a row a run
     gb.campaign("campaign.toml", out="folder")
+    gb.site("folder").index                      # the page of a stored campaign
 
 The bench is the nearest folder above the working folder with components/, systems/ and reports/, as for the command.
 Every error with a message for the user is a :class:`gyrobench.errors.GyrobenchError`; an exception in the code of a
@@ -27,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 from gyrobench.bench import UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.library.experiment import Experiment, File, Run, open_run
-from gyrobench.library.many_runs import campaign, sweep
+from gyrobench.library.many_runs import campaign, site, sweep
 from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
 from gyrobench.record.record import Record
 from gyrobench.result import Result
@@ -54,6 +55,7 @@ __all__ = [
     "load_suite",
     "open_run",
     "reduce",
+    "site",
     "sweep",
 ]
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from gyrobench.campaign.campaign_execution import CampaignProgress
     from gyrobench.campaign.definition import Definition
+    from gyrobench.campaign.site import Site
 
 
 def campaign(
@@ -64,6 +65,20 @@ def sweep(
 
     asked = from_mapping({"system": system, "over": dict(over or {}), "seeds": seeds, **more}, where="sweep")
     return _executed(asked, out, client, scheduler, workers, False, progress)
+
+
+def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> Site:
+    """Write the site of a stored campaign; ``.index`` is its page, ``.answer`` the sentences with which it opens.
+
+    campaign: folder or URL, the ``out`` of :func:`campaign` or :func:`sweep`.  out: folder of the site, default
+    ``site`` in the campaign.  publish: a folder that shall hold everything, reports included.  Raises errors of type
+    GyrobenchError.
+    """
+    from gyrobench.campaign.site import write_site
+    from gyrobench.campaign.store import Campaign
+
+    places = (None if p is None else Path(p) for p in (out, publish))
+    return write_site(Campaign.open(campaign), *places)
 
 
 def _executed(

@@ -13,6 +13,7 @@ import pytest
 import synthetic_campaign as synthetic
 from browser import OVERLAPS, Browser, needs_chromium
 
+import gyrobench as gb
 from gyrobench.bench import UsageError
 from gyrobench.campaign.analysis import analyse
 from gyrobench.campaign.measures import numbers
@@ -111,6 +112,17 @@ def test_command_prints_the_answer(command: Callable[..., tuple[int, str, str]],
     assert (tmp_path / "site" / "index.html").is_file()
     assert command("site", tmp_path / "nothing")[0] == 3
     assert command("site", small, "--out", "a", "--publish", "b")[0] == 2
+
+
+def test_a_site_from_python_is_that_of_the_command(tmp_path: Path) -> None:
+    small = synthetic.sweep(tmp_path / "small", 6)
+    made = gb.site(small)
+    assert made.index == small / "site" / "index.html" and "of 6 runs have a result" in made.answer[0]
+    assert gb.site(str(small), publish=tmp_path / "public").index.read_text() == made.index.read_text()
+    with pytest.raises(gb.GyrobenchError, match="no campaign there"):
+        gb.site(tmp_path)
+    with pytest.raises(UsageError, match="name one"):
+        gb.site(small, "a", publish="b")
 
 
 # ------------------------------------------------------------------------------------------------- browser
