@@ -2,8 +2,8 @@
 
     python reports/platform_alignment_times.py [FILE]
 
-Error model of systems/platform_alignment/plans.py, with the settings that follow from what is wanted, heading 90 deg at
-switch-on; a line ends where the standard deviation is not reached within an hour.  Written to
+Error model of systems/platform_alignment/plans.py, with the settings that are ready first, heading 90 deg at switch-on;
+a line ends where the standard deviation is not reached within an hour.  Written to
 reports/gallery/platform_alignment_times.svg.
 """
 
@@ -34,8 +34,7 @@ def ready(latitude: float, sensors: plans.Sensors, positions: int, wanted: float
         latitude, positions=positions, coarse_time=0.0, fast_frequency=0.0, fast_time=-1.0, slow_frequency=0.0
     )
     settings = plans.designed(given, sensors, wanted, math.pi / 2.0, LONGEST)
-    history = plans.history(settings, math.pi / 2.0, LONGEST, sensors.tau)
-    found = plans.ready_after(history, history.sigma(settings, sensors)[:, 2], wanted)
+    found = plans.ready_after(*plans.predicted(settings, sensors, math.pi / 2.0, LONGEST), wanted)
     return math.nan if found is None else found
 
 
@@ -51,7 +50,7 @@ def main() -> None:
         axis.set_title(f"latitude {name}", fontsize=10)
         axis.set_xlabel("standard deviation wanted / ′")
         axis.grid(True, which="both", linewidth=0.3, alpha=0.5)
-        axis.set_ylim(0.0, 40.0)
+        axis.set_ylim(0.0, 25.0)
     axes[0].set_ylabel("time to be ready / min")
     handles = [plt.Line2D([], [], color=c, label=g) for g, c in COLOURS.items()]
     handles += [

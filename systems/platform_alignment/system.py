@@ -217,10 +217,10 @@ class PlatformAlignment(System):
         if self.check():
             return found
         c, s = self.settings(), self.sensors
-        h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
-        sigma = h.sigma(c, s)[:, 2]
-        if plans.ready_after(h, sigma, self["wanted"]) is None:
+        reached, sigma = plans.predicted(c, s, math.pi / 2.0, self["time"])
+        if plans.ready_after(reached, sigma, self["wanted"]) is None:
             arcmin = DEG / 60.0
+            h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
             sources = {n: float(np.abs(v[-1, 2])) for n, (_, _, v) in h.sources(c, s).items()}
             worst = max(sources, key=lambda n: sources[n])
             found.append(
