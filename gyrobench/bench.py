@@ -124,14 +124,14 @@ class Bench:
 
     def part_folder(self, name: str) -> Path:
         """Raises BenchError, naming the parts that are like it."""
-        return self._folder("part", name, self.parts())
+        return self._folder("part", "components", "model.py", name)
 
     def system_folder(self, name: str) -> Path:
         """Raises BenchError, naming the systems that are like it."""
-        return self._folder("system", name, self.systems())
+        return self._folder("system", "systems", "system.py", name)
 
-    @staticmethod
-    def _folder(kind: str, name: str, found: dict[str, Path]) -> Path:
-        if name not in found:
-            raise BenchError(f"no {kind} '{name}'; {suggest_names(name, found)}")
-        return found[name]
+    def _folder(self, kind: str, room: str, file: str, name: str) -> Path:
+        for root in (self.folder, standard_folder()):
+            if name not in ("", "..") and Path(name).name == name and (root / room / name / file).is_file():
+                return root / room / name
+        raise BenchError(f"no {kind} '{name}'; {suggest_names(name, self._listing(room, file))}")

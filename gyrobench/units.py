@@ -120,6 +120,7 @@ def _clean(name: str) -> str:
 LARGEST_POWER = 9
 
 
+@lru_cache(maxsize=1024)
 def unit(name: str) -> Unit:
     """The unit called ``name``; raises :class:`UnitError` with the offending symbol when it is not one."""
     text = _clean(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.util
 import re
 from pathlib import Path
@@ -184,11 +185,17 @@ ROOMS["campaign"] = BELOW | {"workflow"}
 ROOMS["library"] = BELOW | {"workflow", "campaign"}
 
 
+@functools.cache
+def tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@functools.cache
 def imports(file: Path) -> set[str]:
     """Modules of gyrobench that a file imports, anywhere in it, as absolute names."""
     package = ["gyrobench", *file.relative_to(TOOL).parent.parts]
     found: set[str] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(file)):
         if isinstance(node, ast.Import):
             found |= {a.name for a in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -222,7 +229,7 @@ def module_of(file: Path) -> str:
 def imported_modules(file: Path, modules: set[str]) -> set[str]:
     """Modules of gyrobench that a file imports when it runs, in functions too; not what only the type checker reads."""
     package = ["gyrobench", *file.relative_to(TOOL).parent.parts]
-    pending: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    pending: list[ast.AST] = [tree(file)]
     names: set[str] = set()
     while pending:
         node = pending.pop()
@@ -282,10 +289,9 @@ def test_the_tool_names_no_content() -> None:
     rooms = ("components", "systems", "fmus")
     for file in FILES:
         assert not {m.split(".")[0] for m in imports(file)} & set(rooms)
-        tree = ast.parse(file.read_text(encoding="utf-8"))
         texts = {
             n.value
-            for n in ast.walk(tree)
+            for n in ast.walk(tree(file))
             if isinstance(n, ast.Constant) and isinstance(n.value, str) and n.value in names
         }
         assert not texts, f"{file} names {texts}"

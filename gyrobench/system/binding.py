@@ -96,6 +96,7 @@ class Binding:
 
     slot: str
     socket: Socket
+    variables: dict[str, Variable]  # all that the FMU has
     inputs: dict[str, Bound] = field(default_factory=dict)  # by element name
     outputs: dict[str, Bound] = field(default_factory=dict)
     parameters: dict[str, Bound] = field(default_factory=dict)
@@ -129,15 +130,21 @@ def _bound(element: str, v: Variable, gain: float, unit: str, offset: float = 0.
 
 class _Fitter:
     def __init__(self, slot: str, socket: Socket, description: Any, mapping: Mapping[str, Any]) -> None:
-        self.binding = Binding(slot, socket)
-        self.socket, self.mapping = socket, mapping
         self.variables = variables(description)
+        self.binding = Binding(slot, socket, self.variables)
+        self.socket, self.mapping = socket, mapping
         self.units = {u.name: u for u in description.unitDefinitions}
+        self.known: dict[str, tuple[tuple[Fraction, ...], float, float] | None] = {}  # units, as far as asked for
         self.problems: list[str] = []
 
     # ------------------------------------------------------------------------------ units
     def understood(self, name: str) -> tuple[tuple[Fraction, ...], float, float] | None:
         """Exponents, factor and offset of a unit name of the FMU; None when it cannot be understood."""
+        if name not in self.known:
+            self.known[name] = self._read_unit(name)
+        return self.known[name]
+
+    def _read_unit(self, name: str) -> tuple[tuple[Fraction, ...], float, float] | None:
         definition = self.units.get(name)
         if definition is not None and definition.baseUnit is not None:
             b = definition.baseUnit

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from gyrobench.files import sha256
 from gyrobench.system.connectors import element_names
 
 #: type of an FMU variable -> family: what can be connected with what, and how values are given as text
@@ -40,6 +43,21 @@ class Variable:
     quantity: str
     start: str | None
     description: str
+
+
+def read_description(path: Path) -> Any:
+    """Return the model description of an FMU as FMPy reads it, without validation.
+
+    A process reads a file of the same content once: what is returned is not to be changed.
+    """
+    return _read_description(path, sha256(path))
+
+
+@functools.lru_cache(maxsize=128)
+def _read_description(path: Path, _digest: str) -> Any:
+    from fmpy import read_model_description
+
+    return read_model_description(str(path), validate=False)
 
 
 def variables(description: Any) -> dict[str, Variable]:

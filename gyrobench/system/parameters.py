@@ -10,7 +10,6 @@ from typing import Any
 from gyrobench import units
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.binding import Binding, Bound
-from gyrobench.system.fmu_variables import variables
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError, flatten, nest, parse
@@ -32,9 +31,8 @@ def defaults(assembly: Assembly) -> dict[str, Any]:
     """
     found: dict[str, Any] = {}
     for slot, binding in assembly.bindings.items():
-        own = variables(assembly.descriptions[slot])
         for name, bound in binding.parameters.items():
-            text = own[bound.variable].start
+            text = binding.variables[bound.variable].start
             if text is None:
                 continue
             if bound.kind == "Real":

@@ -11,7 +11,7 @@ from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
 from gyrobench.system.execution_order import AlgebraicLoopError, Cut, Link, Order, execution_order
-from gyrobench.system.fmu_variables import feedthrough
+from gyrobench.system.fmu_variables import feedthrough, read_description
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System
@@ -215,8 +215,6 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
 
     Raises SocketMismatchError, WiringError, AlgebraicLoopError; nothing is loaded or run.
     """
-    from fmpy import read_model_description
-
     unchanged = {slot: s.part in (str(paths[slot]), paths[slot].stem) for slot, s in system.slots.items()}
     maps = {**{slot: file for slot, file in system.maps.items() if unchanged[slot]}, **(maps or {})}
     for what, given in (("part", paths), ("mapping", maps)):
@@ -225,7 +223,7 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
                 raise WiringError(system.name, [f"{what} for slot '{slot}': slots: {', '.join(system.slots)}"])
     descriptions, bindings = {}, {}
     for slot, declared in system.slots.items():
-        d = read_model_description(str(paths[slot]), validate=False)
+        d = read_description(Path(paths[slot]))
         if d.coSimulation is None or not d.fmiVersion.startswith(("2.", "3.")):
             what = "has no co-simulation interface" if d.coSimulation is None else f"is FMI {d.fmiVersion}"
             text = f"{slot}: {paths[slot]} {what}; the engines run FMI 2.0 and 3.0 co-simulation"
