@@ -4,21 +4,26 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check style bench clean
 
 # The whole single-axis tumble test of the standard gyro: FMUs, run, step check, coefficients, report.
 demo: $(VENV)/demo.stamp
 	$(BIN)/gyrobench build --all
 	$(BIN)/gyrobench run tumble_single_axis --set latitude=45.75deg --check-step
 
+# mypy, on one core, runs beside the tests and is printed after them.
 # Without reordering: xdist would put files of few, long tests last.
-test: check
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+test: style
+	@$(BIN)/mypy > $(VENV)/mypy.log 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder; failed=$$?; \
+	wait $$types || failed=1; cat $(VENV)/mypy.log; exit $$failed
 
-check: $(VENV)/test.stamp
+check: style
+	$(BIN)/mypy
+
+style: $(VENV)/test.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 
 # Speed against the budgets and against other tools.
 bench: $(VENV)/bench.stamp

@@ -28,11 +28,7 @@ def variables(cls: type[Component], *sections: str) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------ the same run
-@pytest.mark.parametrize("how", ["plain", "native", "python", "native-fmi3"])
-def test_reference_run_bit_for_bit(part: str, how: str) -> None:
-    assert run_reference(reference_of(part), how) == []
-
-
+# Bit for bit, of every part in all four targets: test_parts_have_no_problems in test_validate.py.
 def test_reference_run_is_rich(part: str) -> None:
     """Every noise port is on, every input moves or is a switch of its part, and the outputs move."""
     cls, reference = load_part(part), read_reference(reference_of(part))
@@ -79,7 +75,7 @@ def test_sources_say_how_to_build(part: str, fmu: Callable) -> None:
 def test_description(part: str, target: str, fmu: Callable) -> None:
     """Units known and spelled out, starts, bounds and causalities as declared, structure complete."""
     cls = load_part(part)
-    d = fmpy.read_model_description(str(fmu(part, target)))
+    d = fmpy.read_model_description(str(fmu(part, target)), validate=False)  # against the schema: test_validate
     by_name = {v.name: v for v in d.modelVariables}
     assert list(by_name) == [s.name for s in cls.layout]
     units = {u.name: u for u in d.unitDefinitions}
