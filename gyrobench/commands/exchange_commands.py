@@ -38,8 +38,8 @@ def export(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="fmu: parameter, unwired input or output of a part (gyro.D_I), or option.  Repeatable.  Default: the "
-            "options that set values of parts and nothing else.",
+            help="fmu, container: parameter, unwired input or output of a part (gyro.D_I), or option.  Repeatable.  "
+            "Default: the options that set values of parts and nothing else.",
         ),
     ] = None,
     fmi: Annotated[int, typer.Option(metavar="2|3", help="fmu: FMI version.", min=2, max=3)] = 2,

@@ -24,11 +24,16 @@ def export(
     fmi: int = 2,
     platforms: Iterable[str] = (),
 ) -> Path:
-    """Write the system as "ssp", "container" or "fmu"; return the file.  The last three arguments are of "fmu"."""
+    """Write the system as "ssp", "container" or "fmu"; return the file.
+
+    expose: of "container" and "fmu".  fmi, platforms: of "fmu".
+    """
     from gyrobench.exchange import container, ssp_export, system_fmu
 
-    if to != "fmu" and (expose or fmi != 2 or platforms):
-        raise UsageError(f"--expose, --fmi and --platform belong to --to fmu, not to --to {to}")
+    if to != "fmu" and (fmi != 2 or platforms):
+        raise UsageError(f"--fmi and --platform belong to --to fmu, not to --to {to}")
+    if to == "ssp" and expose:
+        raise UsageError("--expose belongs to --to fmu and container: an SSP archive offers all that its FMUs do")
     if unknown := [p for p in platforms if p not in PLATFORMS]:
         raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
     suffix = ".ssp" if to == "ssp" else ".fmu"
@@ -42,8 +47,9 @@ def export(
         notes = system_fmu.export_fmu(
             system, path, parts, maps, None, seed, bench, expose=expose, fmi=fmi, platforms=tuple(platforms)
         )
+    elif to == "container":
+        notes = container.export_container(system, path, parts, maps, None, seed, bench, expose)
     else:
-        write = ssp_export.export_ssp if to == "ssp" else container.export_container
-        notes = write(system, path, parts, maps, None, seed, bench)
+        notes = ssp_export.export_ssp(system, path, parts, maps, None, seed, bench)
     console.print_notes(notes)
     return path

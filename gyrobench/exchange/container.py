@@ -5,11 +5,13 @@ from __future__ import annotations
 import logging
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.exchange.ssp_export import ExportError, prepare, recorded
+from gyrobench.exchange.exposure import choose
+from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
+from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, with_experiment
 from gyrobench.system.system import System
 
 
@@ -21,30 +23,30 @@ def export_container(
     values: Mapping[str, Any] | None = None,
     seed: int = 1,
     bench: Path | None = None,
+    expose: Iterable[str] = (),
 ) -> list[str]:
     """Write a container FMU (FMI 2.0 co-simulation); return notes for the user.
 
-    Its variables "slot.output" are those that a record needs: outputs, or locals where they are wired inside too.
-    Its step is the system's, the values are built in.  Within a step the FMUs run in the execution order of the bench,
-    each with the newest values; initial outputs are not propagated around cut loops (the toolbox logs this).
-    Raises ExportError without the toolbox, or when a connection has a factor (a container only copies), and what a
-    run would raise before it runs.
+    Its variables "slot.output" are those that a record needs: outputs, or locals where they are wired inside too; in SI
+    by a gain part where a mapping file gives an FMU other units.  Its step is the system's, the plan is built in.
+    expose: as for :func:`gyrobench.exchange.exposure.choose`; a parameter of parts that share a value sets all of them.
+    Within a step the FMUs run in the execution order of the bench, each with the newest values, factors of wires right
+    before the part that takes them; initial outputs are not propagated around cut loops (the toolbox logs this).
+    Raises ExportError without the toolbox, or where a mapping file states a delay, and what a run would raise before
+    it runs.
     """
     try:
         from fmu_manipulation_toolbox.assembly import AssemblyNode
     except ImportError:
         raise ExportError("container: needs fmu-manipulation-toolbox; pip install gyrobench[container]") from None
-    assembly, starts, notes = prepare(system, parts, maps, values, seed, bench)
-    scaled = sorted({c.wire for c in assembly.connections if c.gain != 1.0 or c.offset})
-    if scaled:
-        raise ExportError(
-            f"container: a container FMU copies values and cannot apply the factors and offsets of "
-            f"{', '.join(scaled)}; "
-            "use a part in SI units, or export to SSP"
-        )
+    chosen = system.with_values(values or {})
+    assembly, starts, notes = prepare(chosen, parts, maps, None, seed, bench)
     if late := sorted({c.wire for c in assembly.connections if c.delayed}):
         raise ExportError(f"container: a container FMU cannot carry the delay of {', '.join(late)}; export to SSP")
-    wires = [c for c in assembly.connections if c.output.constant is None]
+    gains = gains_of(assembly)
+    choices = choose(chosen, assembly, seed, expose)
+    outputs = {port: (slot, b) for port, (slot, b) in recorded(assembly).items() if b.constant is None}
+    in_si = {port: f"{port.replace('.', '_')}_in_SI" for port, (_, b) in outputs.items() if b.gain != 1.0 or b.offset}
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="gyrobench-") as name:
@@ -57,17 +59,27 @@ def export_container(
             auto_input=False,
             auto_output=False,
         )
-        for slot in assembly.order.order:
-            shutil.copyfile(assembly.paths[slot], folder / f"{slot}.fmu")
-            node.add_fmu(f"{slot}.fmu")
-        for c in wires:
-            node.add_link(f"{c.source}.fmu", c.output.variable, f"{c.target}.fmu", c.input.variable)
-        wired = {(c.source, c.output.variable) for c in wires}
-        for port, (slot, bound) in recorded(assembly).items():
-            if (slot, bound.variable) not in wired:  # a wired output is a local of that name by itself
-                node.add_output(f"{slot}.fmu", bound.variable, port)
-        for slot, chosen in starts.items():
-            for bound, value in chosen:
+        gain = gain_fmu(bench) if gains.parts or in_si else b""
+        for part in (*gains.order, *in_si.values()):
+            data = assembly.paths[part].read_bytes() if part in assembly.paths else gain
+            (folder / f"{part}.fmu").write_bytes(with_experiment(data, assembly.system))
+            node.add_fmu(f"{part}.fmu")
+        links = [(c.source, c.output.variable, c.target, c.input.variable) for c in gains.links]
+        links += [(*_end(outputs[port]), part, INPUT.variable) for port, part in in_si.items()]
+        for source, output, target, into in links:
+            node.add_link(f"{source}.fmu", output, f"{target}.fmu", into)
+        wired = {link[:2] for link in links}
+        exposed = {c.name: c.ends[0] for c in choices if c.section == "output"}
+        exposed |= {port: (in_si[port], OUTPUT.variable) if port in in_si else _end(outputs[port]) for port in outputs}
+        for port, (slot, variable) in exposed.items():
+            if (slot, variable) not in wired:  # a wired output is a local of that name by itself
+                node.add_output(f"{slot}.fmu", variable, port)
+        for choice in choices:
+            for slot, variable in choice.ends if choice.section != "output" else ():
+                node.add_input(choice.name, f"{slot}.fmu", variable)
+        of_outputs = {part: [(FACTOR, outputs[p][1].gain), (OFFSET, outputs[p][1].offset)] for p, part in in_si.items()}
+        for slot, given in {**starts, **gains.starts(), **of_outputs}.items():
+            for bound, value in given:
                 text = repr(value) if bound.kind == "Real" else str(value).lower() if bound.kind == "Boolean" else value
                 node.add_start_value(f"{slot}.fmu", bound.variable, str(text))
         logger = logging.getLogger("fmu_manipulation_toolbox")
@@ -81,3 +93,8 @@ def export_container(
             logger.setLevel(level)
         shutil.move(folder / path.name, path)
     return notes
+
+
+def _end(of: tuple[str, Any]) -> tuple[str, str]:
+    slot, bound = of
+    return slot, bound.variable

@@ -1,8 +1,9 @@
 """The annotation ``org.gyrobench`` of an archive: what the bench needs to repeat run, channels and report exactly.
 
 It holds the name of the system, the options and parameters that were set, seed and step, the parts of the bench in the
-slots, the mapping files, and a digest of everything else in the archive.  An archive that was changed since, or whose
-system this bench does not have, runs as it is wired, with a warning.
+slots, the mapping files, and a digest of everything else in the archive; beside these, which components stand for
+factors of connections.  An archive that was changed since, or whose system this bench does not have, runs as it is
+wired, with a warning.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -63,10 +64,31 @@ def annotate(
         "maps": {slot: Path(file).read_text("utf-8") for slot, file in maps.items()},
         "digest": digest(root, files),
     }
+    ET.SubElement(_own(root), f"{{{NAMESPACE}}}Run", content=json.dumps(content, sort_keys=True))
+
+
+def annotate_gains(root: ET.Element, names: Iterable[str]) -> None:
+    """Add which components stand for factors of connections.
+
+    This is said of the whole: OMSimulator refuses a component with an annotation of its own.
+    """
+    for name in names:
+        ET.SubElement(_own(root), f"{{{NAMESPACE}}}Gain", component=name)
+
+
+def read_gains(root: ET.Element) -> set[str]:
+    """Return the components that stand for factors of connections."""
+    ours = (one for one in root.findall("ssd:Annotations/ssc:Annotation", NS) if one.get("type") == TYPE)
+    return {g.get("component", "") for one in ours for g in one.findall(f"{{{NAMESPACE}}}Gain")}
+
+
+def _own(root: ET.Element) -> ET.Element:
+    """Return the annotation of this type, made where there is none."""
     ET.register_namespace("gyrobench", NAMESPACE)
-    annotations = ET.SubElement(root, f"{{{SSD}}}Annotations")
-    one = ET.SubElement(annotations, f"{{{SSC}}}Annotation", type=TYPE)
-    ET.SubElement(one, f"{{{NAMESPACE}}}Run", content=json.dumps(content, sort_keys=True))
+    found = root.find(f"ssd:Annotations/ssc:Annotation[@type='{TYPE}']", NS)
+    if found is not None:
+        return found
+    return ET.SubElement(ET.SubElement(root, f"{{{SSD}}}Annotations"), f"{{{SSC}}}Annotation", type=TYPE)
 
 
 def read_annotation(root: ET.Element) -> dict[str, Any] | None:

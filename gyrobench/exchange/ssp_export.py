@@ -4,7 +4,7 @@
                               as the annotation that OMSimulator reads (SSP has no other place for it)
 ``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
 ``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
-``resources/<slot>.fmu``      one FMU for each slot
+``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...)
 
 What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 
@@ -13,9 +13,9 @@ What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
   the bench only the cut ones.
 - FMPy's ``simulate_ssp`` couples in parallel too, starts from zero inputs, and applies parameter values only when they
   are handed over: ``simulate_ssp(f, parameter_set=read_ssv(f, "resources/parameters.ssv"), step_size=..., ...)``.
-  It ignores linear transformations.
-- A factor of a connection (a unit or sign of a mapping file) is a LinearTransformation; the connection then
-  suppresses the conversion by units, so that it is not done twice.
+- FMPy and OMSimulator ignore linear transformations, so a factor of a connection (a torquer's scale factor, a unit or
+  sign of a mapping file) is a small FMU of its own (:mod:`gyrobench.exchange.gains`).  The connections to and from it
+  suppress conversions of units.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from xml.etree import ElementTree as ET
 
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
-from gyrobench.exchange.ssp_annotation import annotate
+from gyrobench.exchange.gains import INPUT, Gains, gain_fmu, gains_of, varying
+from gyrobench.exchange.ssp_annotation import annotate, annotate_gains
 from gyrobench.exchange.ssp_values import SSC, SSD, SSV
 from gyrobench.system.binding import Bound
 from gyrobench.system.parameters import Starts, defaults, resolve
@@ -100,30 +101,28 @@ def export_ssp(
     Raises what a run would raise before it runs (misfit, wires, algebraic loop, values).
     """
     assembly, starts, notes = prepare(system, parts, maps, values, seed, bench)
-    varying = [c for c in assembly.connections if c.output.constant is None]
-    scaled = sorted({c.wire for c in varying if c.gain != 1.0 or c.offset})
-    if scaled:
-        notes.append(
-            f"factors are LinearTransformations, which FMPy's simulate_ssp ignores (results are wrong there): "
-            f"{', '.join(scaled)}"
-        )
+    gains = gains_of(assembly)
     late = sorted({c.wire for c in assembly.connections if c.delayed})
     if late:
         notes.append(f"delays stated in a mapping file are not in the archive: {', '.join(late)}")
-    initial, missing = initial_inputs(assembly, parts, maps, seed, bench)
+    initial, missing = initial_inputs(assembly, gains, parts, maps, seed, bench)
     notes += missing
-    values_of = {slot: [*initial.get(slot, ()), *v] for slot, v in starts.items()}
+    values_of = {name: [*initial.get(name, ()), *v] for name, v in {**starts, **gains.starts()}.items()}
+    fmus = {slot: path.read_bytes() for slot, path in assembly.paths.items()}
+    if gains.parts:
+        fmus |= dict.fromkeys(gains.parts, gain_fmu(bench))
     files = {
         PARAMETERS: _xml(_values(assembly.system.name, values_of, prefix=True)),
         **{f"resources/{s}.ssv": _xml(_values(assembly.system.name, {s: v})) for s, v in values_of.items() if v},
-        **{f"resources/{slot}.fmu": _with_step(assembly, slot) for slot in assembly.paths},
+        **{f"resources/{name}.fmu": with_experiment(data, assembly.system) for name, data in fmus.items()},
         **{f"resources/{slot}.toml": Path(file).read_bytes() for slot, file in (maps or {}).items()},
     }
-    root = _structure(assembly, values_of)
+    root = structure(assembly, gains, values_of)
     if assembly.system.folder is not None:  # a system of a bench
         chosen = {slot: str((parts or {}).get(slot, s.part)) for slot, s in assembly.system.slots.items()}
         own = {slot: name for slot, name in chosen.items() if not name.endswith(".fmu")}
         annotate(root, assembly, own, maps or {}, seed, files)
+    annotate_gains(root, gains.parts)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(path.suffix + ".part")
@@ -136,6 +135,7 @@ def export_ssp(
 
 def initial_inputs(
     assembly: Assembly,
+    gains: Gains,
     parts: Mapping[str, Path | str] | None,
     maps: Mapping[str, Path] | None,
     seed: int,
@@ -149,8 +149,7 @@ def initial_inputs(
     from gyrobench.engine.session import RunError, run
 
     system = assembly.system.with_values({})
-    varying = [c for c in assembly.connections if c.output.constant is None]
-    outputs = tuple(dict.fromkeys(f"{c.source}.{c.output.element}" for c in varying))
+    outputs = tuple(dict.fromkeys(f"{c.source}.{c.output.element}" for c in varying(assembly)))
     short = {"channels": outputs, "windows": None, "done": None, "stop": system.step, "channel_period": system.step}
     cls = type(system)
     system.__class__ = type(cls.__name__, (cls,), {"loops": {}, **short})
@@ -161,25 +160,28 @@ def initial_inputs(
     except RunError as error:
         return {}, [f"start values of inputs are not in the archive: {error}"]
     starts: Starts = {}
-    for c in varying:
-        value = c.gain * c.output.own(found[f"{c.source}.{c.output.element}"][0]) + c.offset
+    own = {n: assembly.output(n)[1].own(found[n][0]) for n in outputs}
+    for c in varying(assembly):
+        value = c.gain * own[f"{c.source}.{c.output.element}"] + c.offset
         kind = {"Integer": int, "Boolean": bool}.get(c.input.kind, float)
         starts.setdefault(c.target, []).append((c.input, kind(value)))
+    for name, c in gains.parts.items():
+        starts[name] = [(INPUT, float(own[f"{c.source}.{c.output.element}"]))]
     return starts, []
 
 
-def _with_step(assembly: Assembly, slot: str) -> bytes:
-    """Return the file of an FMU; the DefaultExperiment of one of the bench's own has the system's step."""
-    path = assembly.paths[slot]
-    if assembly.descriptions[slot].generationTool != "gyrobench":
-        return path.read_bytes()
-    with zipfile.ZipFile(path) as source:
-        entries = [(info, source.read(info)) for info in source.infolist()]
+def with_experiment(fmu: bytes, system: System) -> bytes:
+    """Return an FMU; the DefaultExperiment of one of the bench's own has the step and the stop time of the system."""
+    with zipfile.ZipFile(io.BytesIO(fmu)) as source:
+        entries = {info: source.read(info) for info in source.infolist()}
+    info, text = next((i, d) for i, d in entries.items() if i.filename == "modelDescription.xml")
+    if b'generationTool="gyrobench"' not in text:
+        return fmu
+    experiment = f'<DefaultExperiment startTime="0.0" stopTime="{stop_time(system)!r}" stepSize="{system.step!r}" />'
+    entries[info] = re.sub(rb"<DefaultExperiment [^>]*>", experiment.encode(), text, count=1)
     changed = io.BytesIO()
     with zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as target:
-        for info, data in entries:
-            if info.filename == "modelDescription.xml":
-                data = re.sub(rb'stepSize="[^"]*"', f'stepSize="{assembly.system.step!r}"'.encode(), data, count=1)
+        for info, data in entries.items():
             target.writestr(info, data, zipfile.ZIP_DEFLATED)
     return changed.getvalue()
 
@@ -197,7 +199,8 @@ def _unit(assembly: Assembly, slot: str, bound: Bound) -> str:
     return "" if bound.kind != "Real" or anything else bound.unit
 
 
-def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
+def structure(assembly: Assembly, gains: Gains, starts: Starts) -> ET.Element:
+    """Return the structure without the annotation of the bench.  starts: what is set, by component."""
     for prefix, uri in (("ssd", SSD), ("ssc", SSC)):
         ET.register_namespace(prefix, uri)
     system = assembly.system
@@ -207,40 +210,38 @@ def _structure(assembly: Assembly, starts: Starts) -> ET.Element:
     top = ET.SubElement(root, f"{{{SSD}}}System", name=system.name)
     elements = ET.SubElement(top, f"{{{SSD}}}Elements")
     used: set[str] = set()
-    for slot in assembly.order.order:
+    for name in gains.order:
         component = ET.SubElement(
             elements,
             f"{{{SSD}}}Component",
-            name=slot,
+            name=name,
             type="application/x-fmu-sharedlibrary",
-            source=f"resources/{slot}.fmu",
+            source=f"resources/{name}.fmu",
         )
+        if name in gains.parts:
+            component.set("description", f"factor of {gains.parts[name].wire}")
         ports = ET.SubElement(component, f"{{{SSD}}}Connectors")
-        for kind, bound in _ports(assembly, slot):
+        for kind, bound in _ports(assembly, gains, name):
             connector = ET.SubElement(ports, f"{{{SSD}}}Connector", name=bound.variable, kind=kind)
-            unit = _unit(assembly, slot, bound)
+            unit = "" if name in gains.parts else _unit(assembly, name, bound)
             ET.SubElement(connector, f"{{{SSC}}}{bound.kind}", {"unit": unit} if unit else {})
             used.add(unit)
-        if starts[slot]:
+        if starts[name]:
             bindings = ET.SubElement(component, f"{{{SSD}}}ParameterBindings")
             kind = "application/x-ssp-parameter-set"
-            ET.SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=kind, source=f"resources/{slot}.ssv")
+            ET.SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=kind, source=f"resources/{name}.ssv")
     connections = ET.SubElement(top, f"{{{SSD}}}Connections")
-    for c in assembly.connections:
-        if c.output.constant is not None:
-            continue  # a start value
+    for link in gains.links:
         element = ET.SubElement(
             connections,
             f"{{{SSD}}}Connection",
-            startElement=c.source,
-            startConnector=c.output.variable,
-            endElement=c.target,
-            endConnector=c.input.variable,
+            startElement=link.source,
+            startConnector=link.output.variable,
+            endElement=link.target,
+            endConnector=link.input.variable,
         )
-        if c.gain != 1.0 or c.offset:
+        if link.gain:
             element.set("suppressUnitConversion", "true")
-            attributes = {"factor": repr(c.gain)} | ({"offset": repr(c.offset)} if c.offset else {})
-            ET.SubElement(element, f"{{{SSC}}}LinearTransformation", attributes)
     _fixed_step(top, system.step)
     _units(root, assembly, used)
     ET.SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0", stopTime=repr(stop_time(system)))
@@ -258,12 +259,11 @@ def _fixed_step(top: ET.Element, step: float) -> None:
     ET.SubElement(information, f"{{{OMS}}}FixedStepMaster", attributes)
 
 
-def _ports(assembly: Assembly, slot: str) -> Iterable[tuple[str, Bound]]:
+def _ports(assembly: Assembly, gains: Gains, name: str) -> Iterable[tuple[str, Bound]]:
     """Return connected inputs, connected and recorded outputs; an input that is not connected keeps its start value."""
-    varying = [c for c in assembly.connections if c.output.constant is None]
-    inputs = {c.input.variable: c.input for c in varying if c.target == slot}
-    outputs = {c.output.variable: c.output for c in varying if c.source == slot}
-    outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == slot and b.constant is None}
+    inputs = {link.input.variable: link.input for link in gains.links if link.target == name}
+    outputs = {link.output.variable: link.output for link in gains.links if link.source == name}
+    outputs |= {b.variable: b for s, b in recorded(assembly).values() if s == name and b.constant is None}
     return [*(("input", b) for b in inputs.values()), *(("output", b) for b in outputs.values())]
 
 

@@ -24,7 +24,8 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from gyrobench.bench import Bench
-from gyrobench.exchange.ssp_annotation import read_annotation, repeated
+from gyrobench.exchange.gains import is_gain
+from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, Value, as_kind, bound_values, transformation
 from gyrobench.system.binding import Binding, Bound, fit
 from gyrobench.system.sockets import Socket
@@ -71,6 +72,8 @@ class _Structure:
     system_connectors: dict[Node, str] = field(default_factory=dict)  # -> kind
     links: dict[Node, _Link] = field(default_factory=dict)
     bound: list[tuple[Place, ET.Element]] = field(default_factory=list)  # outer ones last
+    factors: set[str] = field(default_factory=set)  # components that stand for factors of connections, by the bench
+    gains: dict[Place, dict[str, float]] = field(default_factory=dict)  # of these: the values of factor and offset
     problems: list[str] = field(default_factory=list)
 
     # ------------------------------------------------------------------ reading
@@ -119,8 +122,11 @@ class _Structure:
         except Exception as error:  # of the zip archive, of the XML, or FMPy's own
             self.problems.append(f"component '{where}': {file.name} is not a readable FMU: {error}")
             return
-        self.slots[place], self.files[slot] = slot, file
         self.bindings[place] = fit(ANY, description, None, slot)
+        if len(place) == 1 and place[0] in self.factors and is_gain(description):
+            self.gains[place] = {"factor": 1.0, "offset": 0.0}
+        else:
+            self.slots[place], self.files[slot] = slot, file
         self.connectors(element, place)
         self.bound.append((place, element))
 
@@ -165,6 +171,10 @@ class _Structure:
 
     def feed(self, node: Node, seen: tuple[Node, ...] = ()) -> _Feed:
         """Return where the value of a connector comes from.  Raises ArchiveError."""
+        if node[0] in self.gains and node[1] == "y":
+            into, gain = self.feed((node[0], "u"), seen), self.gains[node[0]]
+            factor, offset = gain["factor"], gain["offset"]
+            return _Feed(into.source, factor * into.factor, factor * into.offset + offset, "")
         link = self.links.get(node)
         if link is None:
             return _Feed(node, 1.0, 0.0, self.unit(node))
@@ -198,6 +208,9 @@ class _Structure:
             number = as_kind(name, value, bound.kind, self.unit(feed.source), known)
             if (feed.factor, feed.offset) != (1.0, 0.0):
                 number = feed.factor * number + feed.offset
+            if node[0] in self.gains:
+                self.gains[node[0]][bound.variable] = number
+                continue
             raw[f"{self.slots[node[0]]}.{bound.variable}"] = number
 
     def targets(self, place: Place, name: str) -> list[tuple[Node, _Feed]]:
@@ -326,6 +339,8 @@ def _read(path: Path, step: float | None) -> System:
         unlike = found
     ssd_units = root.find("ssd:Units", NS)
     s = _Structure(folder, Units(ssd_units), ssd_units)
+    fed = {c.get("endElement", "") for c in top.findall("ssd:Connections/ssd:Connection[@endConnector='u']", NS)}
+    s.factors = fed & read_gains(root)
     s.walk(top, ())
     raw: dict[str, Any] = {}
     wires: list[str] = []
@@ -338,7 +353,7 @@ def _read(path: Path, step: float | None) -> System:
                 s.set_value(place, name, value, known, raw)
         except ArchiveError as error:
             s.problems.append(str(error))
-    for end in () if s.problems else s.links:
+    for end in () if s.problems else [n for n in s.links if n[0] not in s.gains]:
         try:
             feed = s.feed(end)
         except ArchiveError as error:

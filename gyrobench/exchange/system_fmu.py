@@ -19,10 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.component.component import Component
-from gyrobench.component.declarations import Scalar
 from gyrobench.engine.linked_system import obstacle
 from gyrobench.engine.program import build_program
-from gyrobench.errors import GyrobenchError
+from gyrobench.exchange.exposure import SECTIONS, Choice, choose
 from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, stop_time
 from gyrobench.exchange.system_source import Exposed, SystemSource, source_files
 from gyrobench.packaging import load_part
@@ -31,11 +30,9 @@ from gyrobench.packaging.description import add_variable, units
 from gyrobench.packaging.description3 import add_time, build_description, reference, xml_text
 from gyrobench.packaging.description3 import add_variable as add_variable3
 from gyrobench.packaging.fmu import content_hash, guid_of, native_entries, write_archive
-from gyrobench.system.parameters import Starts, defaults, resolve
+from gyrobench.system.parameters import Starts
 from gyrobench.system.system import System
 from gyrobench.system.wiring import Assembly
-
-PROBES = (1.0 + 2.0**-10, 1.0 - 2.0**-10)  # an option times these
 
 
 def export_fmu(
@@ -71,7 +68,7 @@ def export_fmu(
         program,
         classes,
         [(slot, b.reference, float(v)) for slot, given in starts.items() for b, v in given],
-        _Exposure(chosen, assembly, starts, classes, seed).variables(list(expose)),
+        _exposed(chosen, assembly, starts, classes, choose(chosen, assembly, seed, expose)),
         chosen.step,
     )
     draft = source_files(source, "", fmi)
@@ -87,106 +84,30 @@ def export_fmu(
     return notes
 
 
-class _Exposure:
-    """The variables of the FMU: found by name, in the order parameters, inputs, outputs."""
-
-    def __init__(
-        self,
-        system: System,
-        assembly: Assembly,
-        starts: Starts,
-        classes: Mapping[str, tuple[str, type[Component]]],
-        seed: int,
-    ) -> None:
-        self.system, self.assembly, self.seed = system, assembly, seed
-        self.scalars = {f"{slot}.{s.name}": s for slot, (_, cls) in classes.items() for s in cls.layout}
-        self.given = {(slot, b.reference): v for slot, set_here in starts.items() for b, v in set_here}
-        self.wired = {f"{c.target}.{c.input.variable}": c.wire for c in assembly.connections}
-
-    def variables(self, asked: list[str]) -> list[Exposed]:
-        """Return all variables, their value references in order.  Raises ExportError."""
-        options = [n for n in asked if "." not in n]
-        of_parts = [self.of_part(e) for n in asked if "." in n for e in self.elements(n)]
-        if unknown := [n for n in options if n not in self.system.options]:
-            raise ExportError(f"--expose {unknown[0]}: neither 'slot.variable' nor an option of {self.system.name}")
-        found = {} if of_parts and not options else {n: self.option(n) for n in options or self.system.options}
-        if lost := [n for n in options if found[n] is None]:
-            raise ExportError(
-                f"--expose {lost[0]}: the option does more than set values of parts, so it is built in; "
-                f"set it with --set {lost[0]}=..."
-            )
-        chosen = [e for e in found.values() if e is not None] + of_parts
-        for name, (slot, bound) in recorded(self.assembly).items():
-            if bound.gain != 1.0 or bound.offset != 0.0:
-                raise ExportError(f"fmu: {name} is mapped with a factor or offset, which its outputs do not apply")
-            chosen.append(self.exposed(name, "output", [(slot, self.scalars[f"{slot}.{bound.variable}"])]))
-        named = {e.scalar.name: e for e in chosen}
-        order = [
-            e for section in ("parameter", "input", "output") for e in named.values() if e.scalar.section == section
-        ]
-        return [dataclasses.replace(e, scalar=dataclasses.replace(e.scalar, reference=i)) for i, e in enumerate(order)]
-
-    def elements(self, name: str) -> list[str]:
-        """Return the scalars of a variable: itself, or the elements of an array."""
-        found = [n for n in self.scalars if n == name or n.startswith(f"{name}[")]
-        if not found:
-            slot = name.partition(".")[0]
-            have = [n for n in self.scalars if n.startswith(f"{slot}.")]
-            what = (
-                f"{slot} has no such variable" if have else f"no slot '{slot}'; slots: {', '.join(self.assembly.paths)}"
-            )
-            raise ExportError(f"--expose {name}: {what}")
-        return found
-
-    def of_part(self, name: str) -> Exposed:
-        """Return a variable of a part.  Raises ExportError for one that cannot be exposed."""
-        scalar, slot = self.scalars[name], name.partition(".")[0]
-        if name in self.wired:
-            raise ExportError(f"--expose {name}: this input is wired: {self.wired[name]}")
-        if scalar.section not in ("parameter", "input", "output"):
-            raise ExportError(f"--expose {name}: it is internal; parameters, inputs and outputs can be exposed")
-        return self.exposed(name, scalar.section, [(slot, scalar)])
-
-    def exposed(self, name: str, section: str, ends: list[tuple[str, Scalar]]) -> Exposed:
+def _exposed(
+    system: System,
+    assembly: Assembly,
+    starts: Starts,
+    classes: Mapping[str, tuple[str, type[Component]]],
+    choices: Iterable[Choice],
+) -> list[Exposed]:
+    """Return the variables of the FMU, numbered in the order parameters, inputs, outputs.  Raises ExportError."""
+    scalars = {f"{slot}.{s.name}": s for slot, (_, cls) in classes.items() for s in cls.layout}
+    given = {(slot, b.reference): v for slot, set_here in starts.items() for b, v in set_here}
+    chosen = list(choices)
+    for name, (slot, bound) in recorded(assembly).items():
+        if bound.gain != 1.0 or bound.offset != 0.0:
+            raise ExportError(f"fmu: {name} is mapped with a factor or offset, which its outputs do not apply")
+        chosen.append(Choice(name, "output", ((slot, bound.variable),)))
+    named: dict[str, Exposed] = {}
+    for choice in chosen:
+        ends = [(slot, scalars[f"{slot}.{variable}"]) for slot, variable in choice.ends]
         slot, scalar = ends[0]
-        start = float(self.given.get((slot, scalar.reference), scalar.start))
-        new = dataclasses.replace(scalar, name=name, section=section, start=start)
-        return Exposed(new, tuple((slot, s.reference) for slot, s in ends))
-
-    def option(self, name: str) -> Exposed | None:
-        """Return an option whose only effect is that parameters or inputs of parts take its value, else None."""
-        value, kind = self.system[name], self.system.options[name].kind
-        if kind is float and isinstance(value, float | int):
-            probes: list[Any] = [value * p if value else p - 1.0 for p in PROBES]
-        elif kind is int and isinstance(value, int):
-            probes = [value + 1, value - 1]
-        elif kind is bool:
-            probes = [not value]
-        else:
-            return None
-        before = self.settings(self.system)
-        ends: set[tuple[str, str]] | None = None
-        for probe in probes:
-            try:
-                after = self.settings(self.system.with_values({name: probe}))
-            except GyrobenchError:
-                continue  # outside its bounds
-            changed = {k for k in {**before, **after} if before.get(k) != after.get(k)}
-            if any(before.get(k) != value or after.get(k) != probe for k in changed):
-                return None
-            if ends is not None and changed != ends:
-                return None
-            ends = changed
-        if not ends or any(f"{slot}.{variable}" in self.wired for slot, variable in ends):
-            return None
-        return self.exposed(name, "parameter", [(s, self.scalars[f"{s}.{v}"]) for s, v in sorted(ends)])
-
-    def settings(self, system: System) -> dict[tuple[str, str], Any]:
-        """Return what is set in the parts, and the times of a system, by (slot, variable)."""
-        starts, _, _ = resolve(self.assembly, system, self.seed, defaults(self.assembly))
-        found: dict[tuple[str, str], Any] = {(s, b.variable): v for s, given in starts.items() for b, v in given}
-        found[("", "step")], found[("", "stop")] = system.step, system.stop
-        return found
+        start = float(given.get((slot, scalar.reference), scalar.start))
+        new = dataclasses.replace(scalar, name=choice.name, section=choice.section, start=start)
+        named[choice.name] = Exposed(new, tuple((slot, s.reference) for slot, s in ends))
+    order = [e for section in SECTIONS for e in named.values() if e.scalar.section == section]
+    return [dataclasses.replace(e, scalar=dataclasses.replace(e.scalar, reference=i)) for i, e in enumerate(order)]
 
 
 class _Face:

@@ -133,6 +133,11 @@ class PlatformAlignment(System):
             vars(self)["noises"] = own.noises if moving else own.noises[:-2]
 
     @property
+    def stop(self) -> float:  # type: ignore[override]
+        """Past the end by ``time``, which the controller says, s."""
+        return float(self["time"]) + 1.0
+
+    @property
     def sensors(self) -> plans.Sensors:
         """What the controller is told of its sensors: the grade, and the options of type B."""
         grade = plans.GRADES.get(self["grade"], plans.GRADES["navigation"])

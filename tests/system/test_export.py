@@ -15,7 +15,7 @@ from fmpy import read_model_description
 from gyrobench.engine.session import Session, run
 from gyrobench.exchange.container import export_container
 from gyrobench.exchange.external_record import record_from_series
-from gyrobench.exchange.ssp_export import ExportError, export_ssp
+from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.record.record import Record
 from gyrobench.system.system import InvalidConfigurationError, System
@@ -155,18 +155,6 @@ def test_container_is_bit_equal(small: System, tmp_path: Path) -> None:
     assert record.windows.keys() == run(small, values=noisy, seed=9).windows.keys()
     for name, column in run(small, values=noisy, seed=9).windows.items():
         np.testing.assert_array_equal(record.windows[name], column, err_msg=name)
-
-
-def test_factors_are_transformations_or_refused(small: System, make: Make, tmp_path: Path) -> None:
-    parts = {"gyro": make("vendor_gyro")}
-    notes = export_ssp(small, tmp_path / "v.ssp", parts=parts, maps=MAPPED)
-    assert any("LinearTransformations, which FMPy's simulate_ssp ignores" in n for n in notes)
-    text = zipfile.ZipFile(tmp_path / "v.ssp").read("SystemStructure.ssd").decode()
-    # table.f -> ACC_IA: load in g = -f / g0
-    assert f'LinearTransformation factor="{1.0 / -9.80665!r}"' in text
-    assert text.count('suppressUnitConversion="true"') == 3 + 3 + 1 + 1  # omega, f, i, u
-    with pytest.raises(ExportError, match=r"cannot apply the factors and offsets of .*table\.f -> gyro\.f"):
-        export_container(small, tmp_path / "v.fmu", parts=parts, maps=MAPPED)
 
 
 def test_series_that_are_missing(small: System) -> None:

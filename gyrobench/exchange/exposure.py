@@ -1,0 +1,114 @@
+"""What a system that is one FMU offers to set and to read: variables of its parts, and options that stand for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from gyrobench.errors import GyrobenchError
+from gyrobench.exchange.ssp_export import ExportError
+from gyrobench.system.parameters import defaults, resolve
+from gyrobench.system.system import System
+from gyrobench.system.wiring import Assembly
+
+PROBES = (1.0 + 2.0**-10, 1.0 - 2.0**-10)  # an option times these
+SECTIONS = ("parameter", "input", "output")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A variable to expose.  section: its causality.  ends: (slot, variable) of what it stands for."""
+
+    name: str
+    section: str
+    ends: tuple[tuple[str, str], ...]
+
+
+class _Chooser:
+    def __init__(self, system: System, assembly: Assembly, seed: int) -> None:
+        self.system, self.assembly, self.seed = system, assembly, seed
+        self.causality = {
+            f"{slot}.{v.name}": v.causality for slot, d in assembly.descriptions.items() for v in d.modelVariables
+        }
+        self.wired = {f"{c.target}.{c.input.variable}": c.wire for c in assembly.connections}
+
+    def elements(self, name: str) -> list[str]:
+        """Return a variable of a part, or the elements of an array.  Raises ExportError."""
+        found = [n for n in self.causality if n == name or n.startswith(f"{name}[")]
+        if not found:
+            slot = name.partition(".")[0]
+            slots = ", ".join(self.assembly.paths)
+            what = (
+                f"{slot} has no such variable" if slot in self.assembly.paths else f"no slot '{slot}'; slots: {slots}"
+            )
+            raise ExportError(f"--expose {name}: {what}")
+        return found
+
+    def of_part(self, name: str) -> Choice:
+        """Return a variable of a part.  Raises ExportError for one that cannot be exposed."""
+        slot, _, variable = name.partition(".")
+        if name in self.wired:
+            raise ExportError(f"--expose {name}: this input is wired: {self.wired[name]}")
+        if self.causality[name] not in SECTIONS:
+            raise ExportError(f"--expose {name}: it is internal; parameters, inputs and outputs can be exposed")
+        return Choice(name, self.causality[name], ((slot, variable),))
+
+    def option(self, name: str) -> Choice | None:
+        """Return an option whose only effect is that parameters or inputs of parts take its value, else None."""
+        value, kind = self.system[name], self.system.options[name].kind
+        if kind is float and isinstance(value, float | int):
+            probes: list[Any] = [value * p if value else p - 1.0 for p in PROBES]
+        elif kind is int and isinstance(value, int):
+            probes = [value + 1, value - 1]
+        elif kind is bool:
+            probes = [not value]
+        else:
+            return None
+        before = self.settings(self.system)
+        ends: set[tuple[str, str]] | None = None
+        for probe in probes:
+            try:
+                after = self.settings(self.system.with_values({name: probe}))
+            except GyrobenchError:
+                continue  # outside its bounds
+            changed = {k for k in {**before, **after} if before.get(k) != after.get(k)}
+            if any(before.get(k) != value or after.get(k) != probe for k in changed):
+                return None
+            if ends is not None and changed != ends:
+                return None
+            ends = changed
+        if not ends or any(f"{slot}.{variable}" in self.wired for slot, variable in ends):
+            return None
+        return Choice(name, "parameter", tuple(sorted(ends)))
+
+    def settings(self, system: System) -> dict[tuple[str, str], Any]:
+        """Return what is set in the parts, the factors of wires and the times of a system, by (slot, variable)."""
+        connections = self.assembly.connections[:]
+        starts, _, _ = resolve(self.assembly, system, self.seed, defaults(self.assembly))
+        found: dict[tuple[str, str], Any] = {(s, b.variable): v for s, given in starts.items() for b, v in given}
+        found |= {("", c.wire): (c.gain, c.offset) for c in self.assembly.connections}
+        self.assembly.connections[:] = connections
+        found[("", "step")], found[("", "stop")] = system.step, system.stop
+        return found
+
+
+def choose(system: System, assembly: Assembly, seed: int, asked: Iterable[str]) -> list[Choice]:
+    """Return the variables to expose.
+
+    asked: "slot.variable" (a parameter, an input without a wire, an output; all elements of an array) and names of
+    options; none: the options that set values of parts and do nothing else, which small changes of them show.
+    Raises ExportError.
+    """
+    chooser, names = _Chooser(system, assembly, seed), list(asked)
+    options = [n for n in names if "." not in n]
+    of_parts = [chooser.of_part(e) for n in names if "." in n for e in chooser.elements(n)]
+    if unknown := [n for n in options if n not in system.options]:
+        raise ExportError(f"--expose {unknown[0]}: neither 'slot.variable' nor an option of {system.name}")
+    found = {} if of_parts and not options else {n: chooser.option(n) for n in options or system.options}
+    if lost := [n for n in options if found[n] is None]:
+        raise ExportError(
+            f"--expose {lost[0]}: the option does more than set values of parts, so it is built in; "
+            f"set it with --set {lost[0]}=..."
+        )
+    return [c for c in found.values() if c is not None] + of_parts

@@ -1,0 +1,1 @@
+"""The part that stands for the factor and the offset of a wire in exported systems."""

@@ -1,0 +1,91 @@
+"""The archive of every system as importers read it: valid, units equal or left out, no factor that is not applied."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import fmpy.ssp
+import pytest
+from fmpy import read_model_description
+from lxml import etree
+
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.exchange.gains import gains_of
+from gyrobench.exchange.ssp_export import export_ssp, prepare, stop_time, structure
+from gyrobench.exchange.ssp_values import NS
+from gyrobench.packaging import build
+from gyrobench.system.suite import Suite, load_test
+from gyrobench.system.system import load_system
+
+SYSTEMS = [n for n in sorted(Bench(standard_folder()).systems()) if n != "drift_test_suite"]
+
+
+@cache
+def schema() -> etree.XMLSchema:
+    """Return the schema of SSP 1.0."""
+    folder = Path(fmpy.ssp.__file__).parent / "schema"
+    return etree.XMLSchema(etree.parse(folder / "SystemStructureDescription.xsd"))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_structure(name: str) -> None:
+    system = load_test(name)
+    assert not isinstance(system, Suite)
+    assembly, starts, _ = prepare(system, None, None, None, 1, None)
+    system = assembly.system
+    gains = gains_of(assembly)
+    root = structure(assembly, gains, {**starts, **gains.starts()})
+    schema().assertValid(etree.fromstring(ET.tostring(root)))
+    units = {
+        (c.get("name"), x.get("name")): x[0].get("unit")
+        for c in root.iterfind(".//ssd:Component", NS)
+        for x in c.iterfind("ssd:Connectors/ssd:Connector", NS)
+    }
+    fed = set()
+    for c in root.iterfind(".//ssd:Connection", NS):
+        a, b = (c.get("startElement"), c.get("startConnector")), (c.get("endElement"), c.get("endConnector"))
+        assert units[a] == units[b] or None in (units[a], units[b]), f"{a} -> {b}: {units[a]} into {units[b]}"
+        assert b not in fed and len(c) == 0  # no transformation
+        fed.add(b)
+    factors = {c.wire for c in assembly.connections if c.gain != 1.0 or c.offset}
+    assert {c.wire for c in gains.parts.values()} == factors | set(system.factors)
+    experiment = root.find("ssd:DefaultExperiment", NS)
+    assert experiment is not None and float(experiment.get("stopTime", "0")) == stop_time(system) > 0.0
+    assert f'stepSize="{system.step!r}"' in ET.tostring(root, encoding="unicode")
+
+
+def test_every_file_of_an_archive(tmp_path: Path) -> None:
+    """Step and end of the system in all FMUs, one name of all sets, a start value for each input that is connected."""
+    system = load_system("stabilizer_sdf").with_values({"time": 10.0, "command": 1e-4})
+    export_ssp(system, tmp_path / "s.ssp")
+    with zipfile.ZipFile(tmp_path / "s.ssp") as z:
+        files = {n: z.read(n) for n in z.namelist()}
+    names = set()
+    for n in (n for n in files if n.endswith(".fmu")):
+        experiment = read_model_description(io.BytesIO(files[n])).defaultExperiment
+        assert (float(experiment.stepSize), float(experiment.stopTime)) == (1e-3, stop_time(system)), n
+        names.add(Path(n).stem)
+    assert names == {*system.slots, "gain_01"}
+    sets = {n: ET.fromstring(d) for n, d in files.items() if n.endswith(".ssv")}
+    assert {s.get("name") for s in sets.values()} == {"stabilizer_sdf"}
+    given = {p.get("name") for p in sets["resources/parameters.ssv"].iterfind(".//ssv:Parameter", NS)}
+    root = ET.fromstring(files["SystemStructure.ssd"])
+    fed = {f"{c.get('endElement')}.{c.get('endConnector')}" for c in root.iterfind(".//ssd:Connection", NS)}
+    assert fed and fed <= given
+
+
+def test_initial_unknowns_and_the_time_of_fmi_3(tmp_path: Path) -> None:
+    """Where dependencies are left out an importer takes all; OMSimulator takes 0 among them for the first variable."""
+    gyro = read_model_description(str(build("floated_gyro", out=tmp_path)))
+    assert gyro.initialUnknowns and all(u.dependencies is not None for u in (*gyro.initialUnknowns, *gyro.outputs))
+    u = next(x for x in gyro.initialUnknowns if x.variable.name == "u")
+    assert {d.name for d in u.dependencies} == {"K_sg", "u_max", "pickoff", "seed", "float_angle"}
+    of_3 = read_model_description(str(build("floated_gyro", fmi=3, out=tmp_path)))
+    at_0 = [v for v in of_3.modelVariables if v.valueReference == 0]
+    assert [(v.name, v.causality) for v in at_0] == [("time", "independent")]
+    unknowns = (*of_3.initialUnknowns, *of_3.outputs)
+    assert all(x.dependencies is not None and at_0[0] not in x.dependencies for x in unknowns)
