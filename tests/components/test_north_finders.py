@@ -97,6 +97,41 @@ def test_sigma(part: str, gain: float) -> None:
     assert float(np.sqrt(np.mean(errors**2))) == pytest.approx(expected, rel=3.0 / math.sqrt(2 * 60))
 
 
+@pytest.mark.parametrize(
+    ("part", "heading", "arcmin"),
+    [
+        ("two_position", 90.0, 5.1),
+        ("two_position", 60.0, 6.0),
+        ("two_position", 30.001, 10.4),
+        ("four_position", 17.0, 7.3),
+        ("continuous", -140.0, 7.1),
+        ("strapdown", 75.0, 5.1),
+    ],
+)
+def test_sigma_of_the_table(part: str, heading: float, arcmin: float) -> None:
+    """0.005 deg/sqrt(h), 300 s, 40 deg: the figures of the method within 3 %, by sigma ~ 1/sqrt(T) from a shorter plan.
+
+    Strapdown: both axes for 300 s.
+    """
+    N = 0.3 * DPH  # rad/s/sqrt(Hz)
+    found = find(part, math.radians(heading), math.radians(40.0), density=N)
+    T = (360 if part == "continuous" else 20 * len(PLANS[part])) * 0.1
+    assert found["status"] == 1.0
+    assert math.degrees(found["sigma"] * math.sqrt(T / 300.0)) * 60.0 == pytest.approx(arcmin, rel=0.03)
+
+
+def test_two_positions_near_north() -> None:
+    """5 deg from north the errors are 66', of 100 000 headings by arccos, and 0.6 % of the cosines exceed 1; the finder
+    states its heading as ill-conditioned.
+    """
+    psi, spread = math.radians(5.0), 0.3 * DPH / math.sqrt(300.0) / (W * math.cos(math.radians(40.0)))
+    c = math.cos(psi) + spread * np.random.default_rng(6).normal(size=100_000)
+    off = np.arccos(np.clip(c, -1.0, 1.0)) - psi
+    assert math.degrees(float(np.sqrt(np.mean(off**2)))) * 60.0 == pytest.approx(66.0, rel=0.03)
+    assert float(np.mean(c > 1.0)) == pytest.approx(0.006, abs=1e-3)
+    assert find("two_position", psi, math.radians(40.0))["status"] == 2.0
+
+
 def test_sigma_of_a_tilted_strapdown_head() -> None:
     """Pitch 0.5, roll -0.4: the errors of 60 runs have the sigma that is stated, larger than that of a level head."""
     N, latitude, heading = 0.01 * DPH, 0.7, 1.2
@@ -153,12 +188,19 @@ def test_biases_of_a_strapdown_head() -> None:
 
 
 def test_status() -> None:
-    """Too few positions, a wrong latitude, a base that accelerates, two positions near north."""
+    """Too few positions, a wrong latitude, a base that accelerates, two positions near north; a difference of two
+    positions that no latitude gives, a head on end.
+    """
     assert find("multi_position", 1.0, 0.7, angles=[0.0, -1.0])["status"] == 2.0
     assert find("four_position", 1.0, 0.7, angles=[0.0, -math.pi / 2])["status"] == 2.0
     assert find("two_position", 0.2, 0.7)["status"] == 2.0
     assert find("four_position", 1.0, 0.7, earth_rate=W * 1.3)["status"] == 3.0
     assert find("four_position", 1.0, 0.7, gravity=G * 1.01)["status"] == 4.0
+    assert find("two_position", 0.2, 0.7, earth_rate=W * 0.8)["status"] == 3.0
+    assert find("strapdown", 1.0, 0.7, pitch=math.radians(86.0))["status"] == 2.0
+    assert find("strapdown", 1.0, 0.7, roll=math.radians(-86.0))["status"] == 2.0
+    with pytest.raises(InstanceError, match="stands upright"):
+        find("tilt", 1.0, 0.7, pitch=math.pi / 2.0, gravity=0.999 * G)
 
 
 def test_done_follows_the_last_estimate() -> None:

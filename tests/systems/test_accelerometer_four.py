@@ -106,6 +106,15 @@ def test_unknown_first_harmonic() -> None:
     assert any("biased by K_I D1" in w for w in found.warnings)
 
 
+def test_a_23rd_harmonic_of_the_head_passes_for_a_first_one() -> None:
+    """On 24 positions cos 23 a = cos a: 5 arcsec of it shift F and II of sensor 1 by K_I 5 arcsec, as D1 does."""
+    rng, size = np.random.default_rng(17), 5 * ARCSEC
+    D = head(rng, 2 * ARCSEC)
+    plain, alias = (reduced(voltages(rng, d, 0.0), D1=(0.0, 0.0)) for d in (D, D + size * np.cos(23.0 * ALPHA)))
+    shift = (alias - plain)[0]
+    assert shift == pytest.approx([TRUE[0, 1] * size, 0.0, 0.0, 0.0, -TRUE[0, 1] * size], abs=1e-8)
+
+
 def test_misalignment_and_zero_stand_in_the_output_axis() -> None:
     """eta = 1 mrad of sensor 2: K_O gets K_I eta, K_I loses K_I eta2/2; eta times the head's errors is 5e-8 V."""
     values = {f"accelerometer_{i}.white": 0.0 for i in (1, 2, 3, 4)} | {"accelerometer_2.eta": 1e-3, "dwell": 1.0}
