@@ -211,7 +211,8 @@ class AlignmentController(Component):
         gains = vector([k[0], k[1]])
         self.model.law(omega, gains, vector([k[2], k[3]]), k[4], k[5], lag, kept, weight, self.asked[2])
         lean = self.errors.force / self.gravity
-        self.model.carry(self.period, self.errors.white, lean, self.errors.markov, self.errors.tau)
+        shake = self.errors.vibration / self.gravity
+        self.model.carry(self.period, self.errors.white, lean, self.errors.markov, self.errors.tau, shake)
 
     def measure(self) -> None:
         self.t_x = atan2(self.sum[1], self.sum[2])

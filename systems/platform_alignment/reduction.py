@@ -68,7 +68,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         coefficients=rows,
         responses=shown.figures(run, fine) if fine is not None else [],
         tables=shown.tables(record, run, settings, sensors, h),
-        budget=shown.budget(h, run, at, settings, sensors) if h is not None else [],
+        budget=shown.budget(h, run, at, settings, sensors, shaken(record)) if h is not None else [],
         warnings=[text[:1].upper() + text[1:] + "." * (text[-1] != ".") for text, _ in reasons] + _limits(record),
         decision_rule=uncertainty.DECISION_RULE,
         verdict=uncertainty.worst_verdict(c.verdict for c in rows),
@@ -102,6 +102,11 @@ def told(record: Record) -> tuple[plans.Settings, plans.Sensors]:
         of("errors_latitude", 0.0), of("errors_scale", 0.0),
     )  # fmt: skip
     return settings, sensors
+
+
+def shaken(record: Record) -> float:
+    """Return the rms velocity of the base that the controller is told of, m/s."""
+    return float(record.run.parameters.get("controller.errors_vibration", 0.0))
 
 
 def _final(run: Run) -> int | None:
@@ -198,7 +203,7 @@ def problems(record: Record, run: Run, settings: plans.Settings, sensors: plans.
         if share > AT_LIMIT:
             slot = name.partition(".")[0]
             found.append((f"unsettled: {slot} is at its limit for {100.0 * share:.0f} % of the gyrocompass", "void"))
-    ratio = _restless(run, settings, sensors, late)
+    ratio = _restless(run, settings, sensors, shaken(record), late)
     if ratio > RESTLESS:
         text = (
             f"The specific force moves the gyrocompass {ratio:.2g} times as much as the stated noise of gyros and "
@@ -225,7 +230,7 @@ def problems(record: Record, run: Run, settings: plans.Settings, sensors: plans.
     return found
 
 
-def _restless(run: Run, settings: plans.Settings, sensors: plans.Sensors, late: slice) -> float:
+def _restless(run: Run, settings: plans.Settings, sensors: plans.Sensors, velocity: float, late: slice) -> float:
     """Return the rms of the tilt as measured, in the gyrocompass's band, over the one that the stated noise gives.
 
     Means over blocks of 0.5/w, of which neighbours are subtracted: what is slower than the loop is its own motion.
@@ -237,7 +242,8 @@ def _restless(run: Run, settings: plans.Settings, sensors: plans.Sensors, late: 
     n = tilt.shape[0] // size
     time = size * period
     lean = sensors.force / settings.gravity / math.sqrt(time)
-    expected = math.sqrt(2.0) * math.hypot(lean, sensors.white * math.sqrt(time), sensors.markov * time)
+    moved = math.sqrt(3.0) * velocity / (settings.gravity * time)  # difference of the velocities at the ends of blocks
+    expected = math.sqrt(2.0) * math.hypot(lean, sensors.white * math.sqrt(time), sensors.markov * time, moved)
     if n < 6 or expected == 0.0:
         return 0.0
     means = tilt[: n * size].reshape(n, size, 2).mean(axis=1)

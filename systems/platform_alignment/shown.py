@@ -128,8 +128,13 @@ def _pole(p: complex) -> str:
     return text.replace("-", "−")
 
 
-def budget(h: plans.History, run: Run, at: int, settings: plans.Settings, sensors: plans.Sensors) -> list[BudgetLine]:
-    """Sources of the heading's uncertainty at the instant it is stated for, by the error model."""
+def budget(
+    h: plans.History, run: Run, at: int, settings: plans.Settings, sensors: plans.Sensors, velocity: float
+) -> list[BudgetLine]:
+    """Sources of the heading's uncertainty at the instant it is stated for, by the error model.
+
+    velocity: rms of a base that vibrates, m/s; its line is what the controller's variance has beyond the others.
+    """
     lines = []
     for source, (size, unit, response) in h.sources(settings, sensors).items():
         effect = float(np.interp(run.t[at], h.t, response[:, 2])) / DEG
@@ -142,4 +147,10 @@ def budget(h: plans.History, run: Run, at: int, settings: plans.Settings, sensor
             lines.append(line)
         elif effect > 0.0:
             lines.append(BudgetLine(source, effect, "°", 1.0, "1", effect, "°", "ψ"))
+    rest = run.sigma[at] ** 2 - sum((x.contribution * DEG) ** 2 for x in lines)
+    if velocity > 0.0 and rest > 0.0:
+        effect, size = float(np.sqrt(rest)) / DEG, 1e3 * velocity
+        note = "by the controller: its variance less that of the other sources"
+        lines.append(BudgetLine("vibration of the base", size, "mm/s", effect / size, "°/(mm/s)", effect, "°", "ψ",
+                                note=note))  # fmt: skip
     return sorted(lines, key=lambda x: -x.contribution)

@@ -12,7 +12,7 @@ from gyrobench import drift, frames
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import AXES, data_sheet, three
-from gyrobench.system.families.moving_bases import BASES
+from gyrobench.system.families.moving_bases import BASES, velocity
 from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
@@ -192,6 +192,9 @@ class PlatformAlignment(System):
             "errors_accelerometer": s.accelerometer, "errors_force": s.force, "errors_latitude": s.latitude,
             "errors_scale": s.scale,
         }  # fmt: skip
+        if self["base"] in BASES and self["base"] != "rest":
+            period = float(parts.get("controller.period", 0.2))
+            values["errors_vibration"] = velocity(self["base"], parts, period)
         known = {f"controller.drift[{k}]?": x for k, x in enumerate(_level_drift(parts, c.gravity), 1)}
         return {f"controller.{n}?": x for n, x in values.items()} | known
 

@@ -8,7 +8,8 @@ the weight w.  Omega: rate of the computed axes (Earth and turning), t: tilt as 
     u_x = J_x - k t_x     u_y = J_y - k t_y     u_z = I + k_z y,  y' = (t_x - y)/lag
     J' = -(k_Jx t_x, k_Jy t_y)     I' = k_I t_x     V' = w ((J in the first window) - k t)
 
-d, a, kappa: constant drift, tilt by accelerometer bias, error of the azimuth torquer; m: Gauss-Markov drift.
+d, a, kappa: constant drift, tilt by accelerometer bias, error of the azimuth torquer; m: Gauss-Markov drift.  A base
+that vibrates with the velocity v adds (v_n - v_n-1)/(g h) to t, the mean over a period h; its steps cancel one another.
 [ALIGN-GYRO]
 """
 
@@ -36,6 +37,7 @@ class SensorErrors(Block):
     force = Parameter(10.0 * UG, "m/s2/sqrt(Hz)", "white noise density of an accelerometer (10 ug/sqrt(Hz))", min=0.0)
     latitude = Parameter(0.0, "rad", "standard uncertainty of the latitude", min=0.0)
     scale = Parameter(0.0, "1", "relative standard uncertainty of the azimuth torquer's scale factor", min=0.0)
+    vibration = Parameter(0.0, "m/s", "rms horizontal velocity of a base that vibrates, at the periods", min=0.0)
 
 
 class AlignmentCovariance(Block):
@@ -46,11 +48,14 @@ class AlignmentCovariance(Block):
     F = Discrete([EMPTY] * N, "1", "their linear model")
     T = Discrete([EMPTY] * N, "1", "their transition over a period, or what a window makes of them")
     c = Discrete(EMPTY, "1", "what white noise at one place does")
+    shaken = Discrete([EMPTY, EMPTY], "1", "what the last velocity of the base has done, along x and y, over s v/g")
     TP = Discrete([EMPTY] * N, "1", "T P")
 
     def begin(self, tilt: Number, north: Number, drift: Vector, markov: Number, lean: Number, scale: Number) -> None:
         """Set P: rms of the first tilt, of the missing Earth rate (over each axis), and of what is constant."""
         for i in range(N):
+            self.shaken[0][i] = 0.0
+            self.shaken[1][i] = 0.0
             for j in range(N):
                 self.P[i][j] = 0.0
         for i in range(2):
@@ -109,8 +114,8 @@ class AlignmentCovariance(Block):
         self.F[INTEGRAL][0] = k_i
         self.F[INTEGRAL][A] = k_i
 
-    def carry(self, h: Number, white: Number, lean: Number, markov: Number, tau: Number) -> None:
-        """Carry P over the time h.  white: gyro density; lean: density of the tilt as measured."""
+    def carry(self, h: Number, white: Number, lean: Number, markov: Number, tau: Number, shake: Number) -> None:
+        """Carry P over the time h.  white: gyro density; lean: density of the tilt as measured; shake: rms v/g."""
         e = exp(-h / tau)
         for i in range(N):
             for j in range(N):
@@ -127,6 +132,17 @@ class AlignmentCovariance(Block):
             self.P[M + i][M + i] = self.P[M + i][M + i] + (1.0 - e * e) * markov * markov
         for i in range(2):
             self.disturb(h, A + i, lean)
+            self.vibrate(i, shake)
+
+    def vibrate(self, axis: Number, shake: Number) -> None:
+        """Add to P what the velocity of the base at the end of the period does less that at its beginning."""
+        square = shake * shake
+        for i in range(N):
+            for j in range(N):
+                crossed = self.shaken[index(axis)][i] * self.c[j] + self.c[i] * self.shaken[index(axis)][j]
+                self.P[i][j] = self.P[i][j] + square * (2.0 * self.c[i] * self.c[j] - crossed)
+        for i in range(N):
+            self.shaken[index(axis)][i] = self.c[i]
 
     def disturb(self, h: Number, place: Number, density: Number) -> None:
         """Add to P what white noise does over the time h that enters as the error at ``place`` does."""
@@ -141,6 +157,13 @@ class AlignmentCovariance(Block):
 
     def update(self) -> None:
         """Make P the covariance of T errors."""
+        for axis in range(2):
+            for i in range(N):
+                self.c[i] = 0.0
+                for k in range(N):
+                    self.c[i] = self.c[i] + self.T[i][k] * self.shaken[axis][k]
+            for i in range(N):
+                self.shaken[axis][i] = self.c[i]
         for i in range(N):
             for j in range(N):
                 self.TP[i][j] = 0.0
@@ -183,6 +206,8 @@ class AlignmentCovariance(Block):
 
     def forget(self) -> None:
         """Let J along x be 0, not what the window gave."""
+        self.shaken[0][JX] = 0.0
+        self.shaken[1][JX] = 0.0
         for i in range(N):
             self.P[i][JX] = 0.0
             self.P[JX][i] = 0.0
