@@ -158,9 +158,8 @@ def test_sigma_of_a_window_is_that_of_a_slope() -> None:
 
 
 def test_sigma_of_a_window_on_a_base_that_vibrates() -> None:
-    """Each velocity v_n of the base by itself through the levelling loop, period by period: t = phi + (v_n - v_n-1)/(g h).
-
-    The mean command is a sum over all of them; to 6 % (the loop reads the tilt a period late, k h = 0.07).
+    """Each velocity v_n of the base alone through the levelling loop, period by period, of which the mean command is
+    a sum: t = phi + (v_n - v_n-1)/(g h).  To 6 %: the loop reads the tilt a period late, k h = 0.07.
     """
     v, T, w, z = 3e-4, 60.0, 0.1, math.sqrt(0.5)
     both: dict[str, Any] = {"time": 420.0, "coarse_time": T, "level_frequency": w, **EXACT}

@@ -27,8 +27,8 @@ def velocity(base: str, parts: PartValues, period: float) -> float:
     """Return the rms velocity, m/s, of independent velocities at a period (s) that do what the noise of the ground of a
     base does; of east and north the mean.
 
-    The velocity of a peak has the autocorrelation (rms/w)2 exp(-d w t)(cos q t + d w/q sin q t), q = w sqrt(1 - d2); what
-    is slow against the period sees the sum of its samples.
+    The velocity of a peak has the autocorrelation (rms/w)2 exp(-d w t)(cos q t + d w/q sin q t), q = w sqrt(1 - d2);
+    what is slow against the period sees the sum of its samples.
     """
 
     def value(name: str) -> float:
