@@ -112,6 +112,16 @@ def test_base_motion_adds_little_to_a_platform_that_holds_still(session: Any, cl
     assert abs(np.ptp(record.channels["controller.tilt[1]"][-100:])) > 5.0 * np.ptp(
         clean[0].channels["controller.tilt[1]"][-100:]
     )
+    # place of the oscillator of 5 Hz: 0.01/(10 pi) m/s, correlated by 0.15 from one period of 0.2 s to the next
+    fall, q = 3.0 * math.pi, 10.0 * math.pi * math.sqrt(1.0 - 0.3**2)
+    later = sum(math.exp(-fall * t) * (math.cos(q * t) + fall / q * math.sin(q * t)) for t in (0.2, 0.4, 0.6, 0.8))
+    told = record.run.parameters["controller.errors_vibration"]
+    assert told == pytest.approx(0.01 / (10.0 * math.pi) * math.sqrt(1.0 + 2.0 * later), rel=1e-3)
+    coarse = int(np.argmax(np.asarray(record.channels["controller.mode"]) == 5.0))
+    of_base = [np.asarray(r.channels["controller.sigma"])[coarse] for r in (record, clean[0])]
+    assert math.sqrt(of_base[0] ** 2 - of_base[1] ** 2) > 2.0 * ARCMIN  # window of 40 s
+    (line,) = (b for b in SYSTEM.reduce(record).budget if b.source == "vibration of the base")
+    assert line.size == pytest.approx(1e3 * told) and line.contribution * 60.0 < 2.0
 
 
 def test_two_positions_leave_the_drift_out(session: Any, clean: Any) -> None:
