@@ -18,7 +18,20 @@ DOCS = ROOT / "docs"
 TEXT = {".py", ".md", ".csv", ".toml", ".json", ".c", ".h", ".html", ".typ", ".css", ".js", ".cfg", ".yml", ""}
 
 #: A-B that are no ids of methods
-WORDS = {"UTF-8", "UTF-16", "SHA-256", "BSD-3", "NO-BREAK", "SIM-1", "RIG-7", "TGP-3", "Z0-9", "TEST-", "TEST-A", "TEST-B"}
+WORDS = {
+    "UTF-8",
+    "UTF-16",
+    "SHA-256",
+    "BSD-3",
+    "NO-BREAK",
+    "SIM-1",
+    "RIG-7",
+    "TGP-3",
+    "Z0-9",
+    "TEST-",
+    "TEST-A",
+    "TEST-B",
+}
 ID = r"[A-Z][A-Z0-9]+(?:-[A-Z0-9]+(?:\+[A-Z]+|g(?![a-z]))?)+"
 ERRATUM = r"E[RTXAG]?\d{1,2}"
 

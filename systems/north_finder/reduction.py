@@ -43,7 +43,8 @@ Array = NDArray[np.float64]
 DPH, DEG, ARCMIN = units.factor("deg/h"), units.factor("deg"), units.factor("arcmin")
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
-MANY = 3.0  # standard deviations of the heading from a singular one, at least
+MANY = 3.0  # standard deviations of the horizontal rate, at least
+APART = 4.0  # of two positions: of the heading from north or south.  psi2 = 2 (1 - cos): the cosine is then 2 u from 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,8 +89,8 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     if not _determined(found, p):
         raise ReductionError(
             "the rates do not determine the heading: their horizontal part is below three times its uncertainty, or, "
-            "with two positions, the heading is within three standard uncertainties of north or south; take four, or a "
-            "longer time"
+            "with two positions, the heading is within four standard uncertainties of north or south; take four "
+            "positions, or a longer time"
         )
     psi, A = p.heading(found.est.beta[: p.X.shape[1]])
     if abs(A / place.north - 1.0) > NEAR:
@@ -167,7 +168,7 @@ def _determined(found: Findings, p: Problem) -> bool:
     psi, A = p.heading(found.est.beta[: p.X.shape[1]])
     if math.isnan(A):
         north = abs(float(found.est.beta[0])) / max(abs(math.cos(psi)), 1e-9)
-        return abs(math.sin(psi)) > MANY * float(u[0]) / max(north, 1e-12) / max(abs(math.sin(psi)), 1e-9)
+        return abs(math.sin(psi)) > APART * float(u[0]) / max(north, 1e-12) / max(abs(math.sin(psi)), 1e-9)
     return MANY * float(np.max(u[:2])) < A
 
 

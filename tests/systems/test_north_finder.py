@@ -21,7 +21,7 @@ from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
 from systems.north_finder import plans
-from systems.north_finder.reduction import Setup, from_record, reduce
+from systems.north_finder.reduction import ReductionError, Setup, from_record, reduce
 
 Command = Callable[..., tuple[int, str, str]]
 NAME = "north_finder"
@@ -227,6 +227,29 @@ def test_the_reduction_is_right_at_any_tilt(method: str) -> None:
         assert math.remainder(math.radians(found["ψ"].estimate) - heading, 2.0 * math.pi) == pytest.approx(
             0.0, abs=1e-9
         )
+
+
+def test_two_positions_near_north_are_refused_or_held() -> None:
+    """Cosines 0, 1, 2 and 4 standard deviations from 1, 40 records each: of all at most 5 % are stated and wrong.
+
+    At north itself the cosine is as often above 1; what is stated lies 2 u below (2.5 %).
+    """
+    latitude, spread, n = 0.7, 1.5e-3, 32
+    rng, missed, stated = np.random.default_rng(8), 0, []
+    for apart in (0.0, 1.0, 2.0, 4.0):
+        heading, seen = math.acos(1.0 - apart * spread), 0
+        quiet = windows("two", heading, latitude)
+        for _ in range(40):
+            noise = 7.2921159e-5 * math.cos(latitude) * spread * math.sqrt(n) * rng.normal(size=n)
+            try:
+                psi = heading_of("two", quiet | {"mean": quiet["mean"] + noise}, latitude)["ψ"]
+            except ReductionError as refused:
+                assert "four standard uncertainties of north or south" in str(refused)
+                continue
+            seen += 1
+            missed += not psi.interval[0] <= math.degrees(heading) <= psi.interval[1]
+        stated.append(seen)
+    assert missed <= 8 and stated[0] <= 4 and stated == sorted(stated) and stated[-1] >= 30
 
 
 def test_error_of_the_finder_of_a_tilted_head(sessions: Callable[[str], Session]) -> None:
