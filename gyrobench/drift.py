@@ -166,6 +166,14 @@ def drift(xyz: ArrayLike, coefficients: Mapping[str, float]) -> NDArray[np.float
     return out
 
 
+def quadratic_form(coefficients: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return Q (4, 4) with omega_d = v @ Q @ v, v = (X, Y, Z, 1): :func:`drift` of one point, quickly."""
+    Q = np.zeros((4, 4))
+    for first, second, value in zip(*_factors(tuple(coefficients)), coefficients.values(), strict=True):
+        Q[first, second] += value
+    return Q
+
+
 # --------------------------------------------------------------------------------------------- signs
 #: convention -> (sign of the rate against omega_d, sign of the force axis against X, Y, Z)
 CONVENTIONS = {

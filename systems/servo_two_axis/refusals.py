@@ -197,11 +197,11 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
     names = {c: drift.NAMES_2DOF[c] for c in "xy"}
     if found or not all(f"gyro.{n}" in parameters for c in "xy" for n in names[c]):
         return found
-    beta = {c: np.array([parameters[f"gyro.{n}"] for n in names[c]]) for c in "xy"}
+    Qx, Qy = (drift.quadratic_form({n: parameters[f"gyro.{n}"] for n in names[c]}) for c in "xy")
 
     def rates(at: Array) -> tuple[float, float]:
-        wx, wy = (float(drift.regressors(at, names[c]) @ beta[c]) for c in "xy")
-        return wx, wy
+        v = np.append(at, 1.0)
+        return float(v @ Qx @ v), float(v @ Qy @ v)
 
     earth_rate = parameters.get("site.earth_rate", frames.EARTH_RATE)
     for m in dict.fromkeys(mounts):

@@ -2,8 +2,8 @@
 
 tests/benchmarks/coverage.py counts on co-simulations with noise.  Here each system runs without noise for three random
 instruments; then noise of the population, drawn with its exact covariance, is added to what the windows read, and the
-same reducer reduces that, some hundred times.  counting.check demands that 0.95 is among the possible coverages and
-that intervals for 90 % or 99 % would have been found out.
+same reducer reduces that.  In a quarter of the runs of tests/benchmarks/coverage_of_reducers.py, which are enough to
+find out intervals for 90 % or 99 %, 0.95 must be among the possible coverages: what is grossly wrong fails.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def voltage(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n:
     return {"mean": w["mean"] + gain * (way + n.error(SIZE) * rng.standard_normal(t.size))}
 
 
-READ: dict[str, tuple[Any, int]] = {  # what is read, runs
+READ: dict[str, tuple[Any, int]] = {  # what is read, runs of the benchmark
     "tumble_single_axis": (current, 75),
     "tumble_two_channel, nine": (currents, 56),
     "tumble_two_channel, simple": (currents, 80),
@@ -123,9 +123,9 @@ def test_every_case_is_here() -> None:
     assert set(READ) == set(benchmark.CASES)
 
 
-@pytest.mark.parametrize("name", list(READ))
-def test_intervals_cover(name: str) -> None:
-    case, (read, runs) = benchmark.CASES[name], READ[name]
+def ratios(name: str, runs: int) -> Array:
+    """Errors over half widths (runs, coefficients)."""
+    case, read = benchmark.CASES[name], READ[name][0]
     system, rng = load_system(case.system), np.random.default_rng(7)
     records = []
     with Session(case.system) as session, benchmark.seen_windows() as seen:
@@ -146,4 +146,10 @@ def test_intervals_cover(name: str) -> None:
             [2.0 * (c.estimate - c.truth) / (c.interval[1] - c.interval[0]) for c in result.coefficients if c.truth]
         )
     most = max(len(r) for r in ratio)  # a curved torquer has no K_LS
-    counting.check(np.array([r + [np.nan] * (most - len(r)) for r in ratio]))
+    return np.array([r + [np.nan] * (most - len(r)) for r in ratio])
+
+
+@pytest.mark.parametrize("name", list(READ))
+def test_intervals_cover(name: str) -> None:
+    low, high = counting.bounds(ratios(name, READ[name][1] // 4))
+    assert low <= 0.95 <= high, f"coverage {low:.3f} .. {high:.3f}"

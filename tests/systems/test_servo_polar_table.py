@@ -4,8 +4,9 @@ sign, by what the formula says and the report's error budget has said before.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,16 +38,24 @@ def estimates(session: Session, system: System, **values: Any) -> tuple[dict[str
     return {c.name: c.estimate for c in result.coefficients}, result
 
 
+@pytest.fixture(scope="module")
+def smooth(polar: Session) -> Callable[[float], dict[str, float]]:
+    """Estimates without ripple on a servo of a stiffness."""
+    return functools.cache(lambda stiffness: estimates(polar, load_system(NAME), table__stiffness=stiffness)[0])
+
+
 @pytest.mark.parametrize("softer", [1.0, 2.0])
 @pytest.mark.parametrize(("phase", "name", "sign"), [(0.0, "D_S", 1.0), (math.pi / 2.0, "D_O", -1.0)])
-def test_ripple_over_stiffness(polar: Session, softer: float, phase: float, name: str, sign: float) -> None:
+def test_ripple_over_stiffness(
+    polar: Session, smooth: Callable[[float], dict[str, float]], softer: float, phase: float, name: str, sign: float
+) -> None:
     """A torque M sin(theta + p) turns the table by M/K_T sin(theta + p): a servo stiff as K_T answers as an encoder
     wrong by a = M/K_T, with +-a W cos(theta + p) in mounts S and N: a W/(g c) in D_S for p = 0, minus that in D_O for p
     = 90 degrees.  A servo half as stiff doubles it.  [SERVO-TF: a torque changing by dM over T is a rate dM/(K_T T)]
     """
     stiffness, torque = STIFFNESS / softer, 5.0
     a = torque / stiffness
-    plain, _ = estimates(polar, load_system(NAME), table__stiffness=stiffness)
+    plain = smooth(stiffness)
     ripple = {"table.ripple": torque, "table.ripple_cycles": 1, "table.ripple_phase": phase}
     found, result = estimates(polar, load_system(NAME), table__stiffness=stiffness, u_angle1=a, **ripple)
     shift = {n: found[n] - plain[n] for n in found}

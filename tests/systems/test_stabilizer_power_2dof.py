@@ -226,10 +226,11 @@ def covered(runs: int) -> dict[str, int]:
 
 
 def test_intervals_cover() -> None:
-    """Of 20 runs the binomial law of 95 % leaves less than 16 three times in a thousand; tests/benchmarks/loops.py
-    counts 200."""
-    inside = covered(20)
-    assert all(n >= 16 for n in inside.values()), inside
+    """Of 10 runs the binomial law of 95 % leaves less than 7 once in a thousand; tests/benchmarks/loops.py counts
+    200.
+    """
+    inside = covered(10)
+    assert all(n >= 7 for n in inside.values()), inside
 
 
 def test_isolation_by_hand(whole: Any) -> None:
