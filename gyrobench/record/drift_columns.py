@@ -268,7 +268,7 @@ def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list
     columns = [Column(TIME, "s", "time of the sample")] if TIME in there else []
     columns += [Column(s.name, _si(s.unit), "signal") for s in signals]
     columns += [Column(FLAG, "1", "suspect", required=False)] if FLAG in there else []
-    names = [n for n in there if n.startswith("temperature")]
+    names = [n for n, unit in there.items() if n.startswith("temperature") or (unit and _is_temperature(unit))]
     asked = [n for n in regressors.replace(",", " ").split() if n]
     problems = [f"regressor '{n}': no such column; columns of the file: {', '.join(there)}"
                 for n in asked if n not in there]  # fmt: skip
@@ -281,6 +281,13 @@ def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list
     if problems:
         raise DataError(table.source, problems)
     return columns
+
+
+def _is_temperature(unit: str) -> bool:
+    try:
+        return _si(unit) == "K"
+    except units.UnitError:
+        return False
 
 
 def _si(unit: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -78,22 +79,27 @@ def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]],
 
 
 def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
-    """Return what sampling did to the rate."""
+    """Return what sampling did to the rate, and what of the file was left out."""
     if run.series is None:
         return ["A sample is the mean of the current over a window, as an integrating meter reads it."]
-    if run.series["columns"][p.name]["kind"] == "rate":
-        if run.series["samples"] or run.options.get("bandwidth") or not _flat(p, run):
-            return []
-        return [
+    unused = run.series.get("unused", [])
+    out = [
+        f"Columns of the file that were not used: {shorten(', '.join(unused), 200)}. One that the rate may follow is "
+        "taken out by '# regressors = NAME'."
+    ] if unused else []  # fmt: skip
+    if run.series["columns"][p.name]["kind"] != "rate":
+        out.append(
+            "The rate is the difference of two angles over the step, which is its mean over the step: a sine of "
+            "frequency f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise "
+            "coefficients and the model curves allow for it."
+        )
+    elif not run.series["samples"] and not run.options.get("bandwidth") and _flat(p, run):
+        out.append(
             f"The spectrum is flat to half the sampling rate of {1.0 / run.series['acquisition']['step']:.3g} Hz. That "
             "of point samples of a faster signal is too: if they are points, N holds what is folded. To say what they "
             "are: '# samples = means', or '# bandwidth = ...Hz'."
-        ]
-    return [
-        "The rate is the difference of two angles over the step, which is its mean over the step: a sine of frequency "
-        "f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise coefficients and the "
-        "model curves allow for it."
-    ]
+        )
+    return out
 
 
 def regression(p: Prepared) -> list[Json]:

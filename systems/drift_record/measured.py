@@ -17,6 +17,7 @@ from gyrobench.record.drift_columns import (
     Signal,
     find_signals,
     harmonic_names,
+    named,
     open_table,
     with_harmonics,
 )
@@ -91,6 +92,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
             s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name])} for s in signals
         },
         "others": reader.others,
+        "unused": [n for n in named(table.head) if n not in si] if data.is_file() else [],
         "factor": reader.held.factor,
         "samples": kind,
         "acquisition": as_dict(about),

@@ -190,13 +190,18 @@ def test_a_coarse_counter(tmp_path: Path) -> None:
     """
     n = 4000
     angle = np.cumsum(15.36 + 0.3 * np.random.default_rng(6).normal(size=n))  # counts
-    file = write(tmp_path / "r.csv", {"n": np.floor(angle) % 65536}, "# scale = 0.5arcsec\n# sampling = 2Hz")
+    columns = {"n": np.floor(angle) % 65536, "u [V]": np.ones(n), "case [degC]": 20.0 + np.arange(n) / n}
+    file = write(tmp_path / "r.csv", columns, "# scale = 0.5arcsec\n# sampling = 2Hz")
     result = reduce(file, type_b="none")
     facts = {row[0]: row[1] for row in result.columns[0].tables["acquisition"][0]["rows"]}
     assert facts["resets of the angle or counter"] == 0 and facts["turns or overflows unwrapped"] == 0
     assert facts["resolution of the values"] == pytest.approx(0.5) and facts["gaps"] == 0
     assert result["Q"].interval[0] < 0.5 / math.sqrt(12.0) < result["Q"].interval[1]
     assert not [w for w in result.warnings if "standard deviations from the median" in w]
+    said = result.columns[0].texts["acquisition"]
+    assert said[0].startswith("Columns of the file that were not used: u. ") and "sin(π f T)" in said[1]
+    (temperature,) = result.columns[0].tables["regression"][0]["rows"]
+    assert temperature[0] == "case"  # by its unit
 
 
 def test_what_is_just_determined_is_said_with_the_figure() -> None:
