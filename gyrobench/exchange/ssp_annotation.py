@@ -22,7 +22,7 @@ from gyrobench.exchange.ssp_values import NS, SSC, SSD
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.wiring import Assembly
 
-TYPE = "org.gyrobench"
+TYPE, GAINS = "org.gyrobench", "org.gyrobench.gains"
 NAMESPACE = "urn:gyrobench:run"
 FORMAT = 1
 
@@ -64,7 +64,7 @@ def annotate(
         "maps": {slot: Path(file).read_text("utf-8") for slot, file in maps.items()},
         "digest": digest(root, files),
     }
-    ET.SubElement(_own(root), f"{{{NAMESPACE}}}Run", content=json.dumps(content, sort_keys=True))
+    ET.SubElement(_annotation(root, TYPE), f"{{{NAMESPACE}}}Run", content=json.dumps(content, sort_keys=True))
 
 
 def annotate_gains(root: ET.Element, names: Iterable[str]) -> None:
@@ -72,23 +72,23 @@ def annotate_gains(root: ET.Element, names: Iterable[str]) -> None:
 
     This is said of the whole: OMSimulator refuses a component with an annotation of its own.
     """
-    for name in names:
-        ET.SubElement(_own(root), f"{{{NAMESPACE}}}Gain", component=name)
+    if joined := " ".join(names):
+        ET.SubElement(_annotation(root, GAINS), f"{{{NAMESPACE}}}Gains", components=joined)
 
 
 def read_gains(root: ET.Element) -> set[str]:
     """Return the components that stand for factors of connections."""
-    ours = (one for one in root.findall("ssd:Annotations/ssc:Annotation", NS) if one.get("type") == TYPE)
-    return {g.get("component", "") for one in ours for g in one.findall(f"{{{NAMESPACE}}}Gain")}
+    ours = (one for one in root.findall("ssd:Annotations/ssc:Annotation", NS) if one.get("type") == GAINS)
+    return {n for one in ours for g in one.findall(f"{{{NAMESPACE}}}Gains") for n in g.get("components", "").split()}
 
 
-def _own(root: ET.Element) -> ET.Element:
-    """Return the annotation of this type, made where there is none."""
+def _annotation(root: ET.Element, kind: str) -> ET.Element:
+    """Return a new annotation, which has one element by the schema, among those of the root."""
     ET.register_namespace("gyrobench", NAMESPACE)
-    found = root.find(f"ssd:Annotations/ssc:Annotation[@type='{TYPE}']", NS)
-    if found is not None:
-        return found
-    return ET.SubElement(ET.SubElement(root, f"{{{SSD}}}Annotations"), f"{{{SSC}}}Annotation", type=TYPE)
+    every = root.find("ssd:Annotations", NS)
+    if every is None:
+        every = ET.SubElement(root, f"{{{SSD}}}Annotations")
+    return ET.SubElement(every, f"{{{SSC}}}Annotation", type=kind)
 
 
 def read_annotation(root: ET.Element) -> dict[str, Any] | None:

@@ -15,6 +15,7 @@ from lxml import etree
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.exchange.gains import gains_of
+from gyrobench.exchange.ssp_annotation import read_gains
 from gyrobench.exchange.ssp_export import export_ssp, prepare, stop_time, structure
 from gyrobench.exchange.ssp_values import NS
 from gyrobench.packaging import build
@@ -60,22 +61,24 @@ def test_structure(name: str) -> None:
 
 def test_every_file_of_an_archive(tmp_path: Path) -> None:
     """Step and end of the system in all FMUs, one name of all sets, a start value for each input that is connected."""
-    system = load_system("stabilizer_sdf").with_values({"time": 10.0, "command": 1e-4})
+    system = load_system("stabilizer_floated_2dof")  # two gains
     export_ssp(system, tmp_path / "s.ssp")
     with zipfile.ZipFile(tmp_path / "s.ssp") as z:
         files = {n: z.read(n) for n in z.namelist()}
+    schema().assertValid(etree.fromstring(files["SystemStructure.ssd"]))
     names = set()
     for n in (n for n in files if n.endswith(".fmu")):
         experiment = read_model_description(io.BytesIO(files[n])).defaultExperiment
-        assert (float(experiment.stepSize), float(experiment.stopTime)) == (1e-3, stop_time(system)), n
+        assert (float(experiment.stepSize), float(experiment.stopTime)) == (1e-4, stop_time(system)), n
         names.add(Path(n).stem)
-    assert names == {*system.slots, "gain_01"}
+    assert names == {*system.slots, "gain_01", "gain_02"}
     sets = {n: ET.fromstring(d) for n, d in files.items() if n.endswith(".ssv")}
-    assert {s.get("name") for s in sets.values()} == {"stabilizer_sdf"}
+    assert {s.get("name") for s in sets.values()} == {system.name}
     given = {p.get("name") for p in sets["resources/parameters.ssv"].iterfind(".//ssv:Parameter", NS)}
     root = ET.fromstring(files["SystemStructure.ssd"])
     fed = {f"{c.get('endElement')}.{c.get('endConnector')}" for c in root.iterfind(".//ssd:Connection", NS)}
     assert fed and fed <= given
+    assert read_gains(root) == {"gain_01", "gain_02"}
 
 
 def test_initial_unknowns_and_the_time_of_fmi_3(tmp_path: Path) -> None:

@@ -106,7 +106,7 @@ def test_gains_become_factors_again(archive: Path, parts: dict[str, Path], tmp_p
 
     other = changed("resources/gain_01.ssv", r'(name="factor">\s*<ssv:Real value=")[^"]*', r"\g<1>7.0")
     assert (other.factors, other.offsets) == ({WIRE: 7.0}, {WIRE: -3.0})  # the archive's own values count
-    plain = changed("SystemStructure.ssd", r"<gyrobench:Gain [^>]*>", "")  # another tool has dropped the annotation
+    plain = changed("SystemStructure.ssd", r"<gyrobench:Gains [^>]*>", "")  # another tool has dropped the annotation
     assert list(plain.slots) == ["a", "gain_01", "b"] and not plain.factors
     for s in (system, plain):
         type(s).channels, type(s).channel_period, s.stop = ("a.y", "b.y"), 0.02, 1.0
