@@ -58,7 +58,7 @@ def json_object(text: str, name: object, error: Raise) -> dict[str, Any]:
 
 def xml(data: bytes, name: object, error: Raise) -> ET.Element:
     """Return the root of an XML document."""
-    if b"\0" in data:  # of UTF-16, in which a document type would not be seen
+    if b"\0" in data:  # text of two bytes a letter, in which a document type would not be seen
         raise error(f"{name}: not UTF-8 text (a byte of 0)")
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data, re.I):
         raise error(f"{name}: XML with a document type (<!DOCTYPE>), which is not read; remove it")

@@ -86,7 +86,7 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
 
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
-    every = (_csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp)
+    every = (_csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp, _other)
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
 
@@ -304,6 +304,61 @@ def _result(folder: Path) -> Callable[[random.Random], object]:
 
     def one(rng: random.Random) -> None:
         result_json.load(changed(text, rng).decode("utf-8", "replace"))
+
+    return one
+
+
+def _other(folder: Path) -> Callable[[random.Random], object]:
+    """Result files of other tools, of each format."""
+    import numpy as np
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from scipy.io import savemat
+
+    from gyrobench.exchange.external_record import ResultReader, find_series
+    from gyrobench.exchange.result_files import open_result
+    from gyrobench.record.run_document import PlanRow, RunDocument
+    from gyrobench.system.binding import Bound
+    from gyrobench.system.system import load_system
+
+    system = load_system("fixed_position")
+    assert system.windows is not None
+    time = np.arange(60) * 0.5
+    names = ["sampler.count", *system.windows.columns.values()]
+    columns = {n: np.floor(time / 5.0) + 0.1 * k * (n != names[0]) for k, n in enumerate(names)}
+    windows = columns["sampler.count"]
+    columns |= {
+        "sampler.window_phase": np.ones(60),
+        "sampler.t_start": 5.0 * windows - 5.0,
+        "sampler.t_end": 5.0 * windows,
+    }
+    table = np.column_stack([time, *columns.values()])
+    rows = [",".join(["time", *names]), *(",".join(map(repr, row)) for row in table.tolist()), ""]
+    (folder / "a.csv").write_text("\n".join(rows))
+    np.save(folder / "b.npy", np.rec.fromarrays([time, *columns.values()], names=["time", *names]))
+    pq.write_table(pa.table({"time": time, **columns}), folder / "c.parquet")
+    savemat(folder / "d.mat", {"time": time, "sampler": {n.partition(".")[2]: v for n, v in columns.items()}})
+    texts = ["time", *names]
+    width = max(map(len, texts))
+    trajectory = {
+        "Aclass": np.array(["Atrajectory", "1.1        ", "           ", "binTrans   "]),
+        "name": np.array(["".join(c) for c in zip(*(n.ljust(width) for n in texts), strict=True)]),
+        "description": np.array([" " * len(texts)]),
+        "dataInfo": np.array([[2, k + 1, 0, -1] for k in range(len(texts))], dtype=np.int32).T,
+        "data_1": np.zeros((1, 2)),
+        "data_2": table.T,
+    }
+    savemat(folder / "e.mat", trajectory, format="4")
+    files = {f.name: f.read_bytes() for f in sorted(folder.iterdir()) if f.is_file()}
+    outputs = {n: ("sampler", Bound(n, n.partition(".")[2], 0, "Real")) for n in names}
+
+    def one(rng: random.Random) -> None:
+        name = rng.choice(list(files))
+        (folder / name).write_bytes(changed(files[name], rng))
+        result = open_result(folder / name)
+        reader = ResultReader(system, result, find_series(result, outputs, set(names), {"sampler"})[0], 0.5)
+        reader.read()
+        reader.record(RunDocument(step=0.5, plan=[PlanRow(phase=1, window=5.0)]))
 
     return one
 

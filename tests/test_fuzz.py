@@ -9,7 +9,7 @@ from fuzzing import attacks
 
 INPUTS = {
     "csv": 400, "numbers": 20, "series": 200, "set": 300, "settings": 200, "units": 800, "mapping": 150, "spec": 100,
-    "record": 100, "result": 150, "fmu": 75, "ssp": 10,
+    "record": 100, "result": 150, "fmu": 75, "ssp": 10, "other": 150,
 }  # fmt: skip
 
 

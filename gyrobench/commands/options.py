@@ -60,6 +60,15 @@ Strict = Annotated[
 Data = Annotated[
     list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; for a suite, its runs.  Repeatable.")
 ]
+From = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        metavar="FILE|FOLDER",
+        help="A run of the exported system in another tool: CSV, .npy (FMPy), .mat, Parquet, or the folder of "
+        "libcosim's CSV files; values by --set, --part and --map as at the export.",
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in the folder --out.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue this run from where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]

@@ -84,6 +84,20 @@ def reduce(
     return verdict
 
 
+def reduce_result(
+    request: RunRequest, test: System | Suite, source: Path, values: Mapping[str, str], as_json: bool = False
+) -> str:
+    """Reduce a run that another tool has made; print the result and return the verdict."""
+    from gyrobench.workflow.external_run import reduce_result
+
+    if isinstance(test, Suite):
+        raise UsageError(
+            f"--from: {test.name} is a suite; reduce the run of each of its tests, then give it their folders"
+        )
+    apply_values(test, values)
+    return _print_outcome(reduce_result(request, test, source, FEEDBACK), as_json)
+
+
 def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:
     """Write and print the comparison of several runs; the first is the baseline.  Raises UsageError."""
     from gyrobench.workflow.run_comparison import compare_folders, comparison_folder

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import display_path
+from gyrobench.bench import UsageError, display_path
 from gyrobench.commands.app import app, echo, exit_on_fail
 from gyrobench.commands.options import (
     Data,
     Engine,
     Force,
+    From,
     Json,
     Map,
     NoReport,
@@ -98,7 +99,10 @@ def run(
 def reduce(
     system: System,
     data: Data = None,
+    source: From = None,
     values: Set = None,
+    part: Part = None,
+    mapping: Map = None,
     template: Annotated[
         bool, typer.Option("--template", help="Print an empty record: its columns, their units, the values to state.")
     ] = False,
@@ -118,18 +122,21 @@ def reduce(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Reduce measured data and write the same report.
+    """Reduce measured data, or a run that another tool has made, and write the same report.
 
     \b
     Examples:
       gyrobench reduce tumble_single_axis --template > record.csv
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
+      gyrobench reduce tumble_single_axis --from fmpy.csv --set latitude=45.75deg
+      gyrobench reduce tumble_single_axis.ssp --from libcosim_output
     """
     from gyrobench.commands import print_runs
-    from gyrobench.commands.arguments import parse_settings
+    from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.report import FORMATS
     from gyrobench.workflow.inputs import load_test
+    from gyrobench.workflow.run_execution import RunRequest
 
     test = load_test(system)
     if template:
@@ -138,6 +145,17 @@ def reduce(
         echo(empty_record(test).rstrip("\n"))
         return
     formats = ("json",) if no_report else FORMATS
+    parts, maps = parse_swaps(part, mapping)
+    if source is not None:
+        if data or fit_to:
+            raise UsageError(
+                "--from: a run of another tool; --data and --fit-to are of measured data, name one of them"
+            )
+        request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
+        exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
+        return
+    if parts or maps:
+        raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
     verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats, fit_to)
     exit_on_fail(verdict, strict)
 

@@ -27,7 +27,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
-from gyrobench.system.parameters import defaults, resolve
+from gyrobench.system.parameters import Starts, defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.recorded_units import recorded_units
 from gyrobench.system.setup_errors import setup_errors
@@ -202,16 +202,13 @@ class Session:
         self.instances = {}
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def run(
-        self,
-        values: Mapping[str, Any] | None = None,
-        seed: int = 1,
-        step: float | None = None,
-        out: Path | None = None,
-        progress: Callable[[ProgressReport], None] | None = None,
-        checkpoints: CheckpointManager | None = None,
-    ) -> Record:
-        """Run from t = 0, or from where ``checkpoints`` resumes, to the end; return the record.  See :func:`run`."""
+    def prepare(
+        self, values: Mapping[str, Any] | None = None, seed: int = 1, step: float | None = None
+    ) -> tuple[System, Starts, RunDocument]:
+        """Return the system with further values, the start values of its parts and what is known before the run.
+
+        Raises InvalidConfigurationError and InvalidValueError; warnings are logged.
+        """
         system = self.system.with_values(values or {})
         if step is not None:
             system.step = float(step)
@@ -233,6 +230,19 @@ class Session:
             document.setup_errors = errors
         if linear is not None:
             document.linear = linear
+        return system, starts, document
+
+    def run(
+        self,
+        values: Mapping[str, Any] | None = None,
+        seed: int = 1,
+        step: float | None = None,
+        out: Path | None = None,
+        progress: Callable[[ProgressReport], None] | None = None,
+        checkpoints: CheckpointManager | None = None,
+    ) -> Record:
+        """Run from t = 0, or from where ``checkpoints`` resumes, to the end; return the record.  See :func:`run`."""
+        system, starts, document = self.prepare(values, seed, step)
         schedule = Schedule.of(system)
         if checkpoints is not None:
             job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}

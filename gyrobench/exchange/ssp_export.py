@@ -21,6 +21,7 @@ What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 from __future__ import annotations
 
 import io
+import math
 import re
 import zipfile
 from collections.abc import Iterable, Mapping
@@ -82,9 +83,11 @@ def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
 
 
 def stop_time(system: System) -> float:
-    """Return a time by which the plan has ended: its duration plus 5 % plus a minute for each phase."""
+    """Return a time by which the plan has ended: its duration plus 5 % plus a minute for each phase, in whole steps."""
     plan = system.plan()
-    return system.stop if system.stop is not None else 1.05 * plan.duration() + 60.0 * len(plan.phases)
+    if system.stop is not None:
+        return system.stop
+    return math.ceil(math.ceil(1.05 * plan.duration() + 60.0 * len(plan.phases)) / system.step - 1e-6) * system.step
 
 
 def export_ssp(

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
+
 from gyrobench.bench import UsageError
 from gyrobench.notebook import html
 from gyrobench.record.record import Record
@@ -20,6 +22,7 @@ from gyrobench.result import Result
 from gyrobench.system.system import System
 from gyrobench.system.values import parse
 from gyrobench.units import format_quantity
+from gyrobench.workflow.external_run import reduce_result
 from gyrobench.workflow.feedback import Feedback
 from gyrobench.workflow.inputs import require_run
 from gyrobench.workflow.measured_run import reduce_measured
@@ -201,6 +204,26 @@ class Experiment:
             path_of(out), force, out is None, KEPT,
         )  # fmt: skip
         return finished(outcome)
+
+    def reduce_result(
+        self,
+        result: File | np.ndarray[Any, Any],
+        *,
+        spec: File | None = None,
+        out: File | None = None,
+        force: bool = False,
+    ) -> Run:
+        """Reduce a run of this system, exported with these values and parts, that another tool has made.
+
+        result: the structured array of FMPy, or a file: CSV, .npy, .mat, Parquet, a folder of libcosim's CSV files.
+        spec, out, force: as of :meth:`run`.  Raises errors of type GyrobenchError.
+        """
+        request = RunRequest(
+            parts=self.parts, maps=self.maps, engine="reference", out=path_of(out), force=force, spec=spec,
+            in_memory=out is None, formats=KEPT,
+        )  # fmt: skip
+        source = result if isinstance(result, np.ndarray) else Path(result)
+        return finished(reduce_result(request, self.system.with_values({}), source))
 
     def _shown(self, option: str) -> str:
         unit = self.system.options[option].unit

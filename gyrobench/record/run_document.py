@@ -164,7 +164,7 @@ class LinearModels(Entry):
 
 
 class DataFile(Entry):
-    """The file of measured data that was reduced."""
+    """The file of measured data, or of a run by another tool, that was reduced."""
 
     file: str = ""
     sha256: str = ""
@@ -213,7 +213,9 @@ class RunDocument(Document):
     spec: list[str] = Field(default_factory=list, description="identifiers of the methods")
     measured: bool = Field(default=False, description="true: the data come from a laboratory")
     step: float = Field(default=0.0, description="communication step, s")
-    engine: str = Field(default="", description="native, linked (native, in any case in the linked form) or reference")
+    engine: str = Field(
+        default="", description="native, linked (native, in any case in the linked form), reference; another tool"
+    )
     order: list[str] = Field(default_factory=list, description="slots in the order of execution")
     cuts: list[str] = Field(default_factory=list, description="connections that carry the value of the step before")
     delays: dict[str, float] = Field(default_factory=dict, description="connection -> delay, s")
@@ -234,6 +236,7 @@ class RunDocument(Document):
     problem: str = Field(default="", description="why the run is not complete")
     tables: dict[str, str] = Field(default_factory=dict, description="file of the record -> SHA-256")
     data: DataFile | None = None
+    external: list[str] = Field(default_factory=list, description="of a run by another tool: what is not known of it")
     series: dict[str, Any] | None = Field(default=None, description="of a drift record: columns and acquisition, SI")
     days: list[Day] = Field(default_factory=list, description="of a record of several days")
     polarity: str = Field(default="", description="sign convention of measured data")

@@ -139,7 +139,8 @@ def record_html(record: Record) -> str:
     from gyrobench.report.style import styled
 
     run = record.run
-    origin = "measured" if run.measured else f"seed {run.seed}, step {run.step:g} s"
+    seed = "another tool" if run.seed is None else f"seed {run.seed}"
+    origin = "measured" if run.measured else f"{seed}, step {run.step:g} s"
     state = "" if record.complete else f" Not complete: {run.problem or 'the run did not end'}."
     blocks = [paragraph(f"Record of {run.system}", strong=True), paragraph(f"{run.title}; {origin}.{state}")]
     blocks += [table_html(t) for t in (_first_windows(record), _channel_ranges(record)) if t.rows]

@@ -51,6 +51,7 @@ def reduce_run(
     if step_check and step_check.get("rows"):
         apply_step(result, step_check)
     renew(result)
+    result.warnings[:0] = record.run.external
     check_truth(result, set_values(record.run))
     return result
 
@@ -89,21 +90,27 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
         except GyrobenchError:
             if record.complete:
                 raise
-            missing = _missing_windows(record)
+            missing = missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
         return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
 
 
-def _missing_windows(record: Record) -> str:
+def missing_windows(record: Record) -> str:
     """Return how far an incomplete record goes, phase by phase of its plan."""
     run = record.run
-    done = [int(p) for p in record.windows.get("phase", [])]
     lines = [run.problem or "the run did not end"]
     lines += [f"recorded until t = {run.stopped_at:,.9g} s"] if run.stopped_at is not None else []
-    for row in run.plan:
+    return "\n".join(f"  - {line}" for line in [*lines, *lacking_phases(record)])
+
+
+def lacking_phases(record: Record, spare: int = 0) -> list[str]:
+    """Return the phases of the plan that lack more than ``spare`` of their windows, as sentences."""
+    done = [int(p) for p in record.windows.get("phase", [])]
+    lines = []
+    for row in record.run.plan:
         length = row.travel if row.mode == "rate" else row.dwell
         expected = round(length / row.window) if row.window else 0
         have = done.count(row.phase)
-        if have < expected:
+        if have < expected - spare:
             lines.append(f"phase {row.phase} ({row.label}): {have} of {expected} windows")
-    return "\n".join(f"  - {line}" for line in lines)
+    return lines

@@ -83,6 +83,8 @@ def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Pa
     assert float(variables["height"].start) == 120.0
     assert not {"latitude", "terms", "turns"} & variables.keys()
     assert {n for n, v in variables.items() if v.causality == "parameter"} == {"height", "gravity", "settle"}
+    times = read_model_description(str(file)).defaultExperiment
+    assert float(times.stopTime).is_integer() and float(times.stepSize) == 1e-3  # a whole number of steps
     names = zipfile.ZipFile(file).namelist()
     assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md"} <= set(names)
 
