@@ -190,18 +190,38 @@ class _Planner:
     def _slots(self) -> set[str]:
         if isinstance(self.test, System):
             return set(self.test.all_slots())
-        given = {n: v for n, v in self.definition.set.items() if n in self.test.options}
-        return {slot for system in self._systems(given).values() for slot in system.all_slots()}
+        return {slot for _, members in self._suites() for system in members.values() for slot in system.all_slots()}
 
     def _require_names(self) -> None:
         """Raise UsageError for a name that is neither an option nor of a slot."""
         for name in self.names:
             if name in self.test.options:
                 continue
-            try:
+            problems = [self._problem_of(name, *suite) for suite in self._suites()] or [self._problem_of(name)]
+            if all(problems):
+                raise UsageError(problems[0])
+
+    def _problem_of(self, name: str, suite: Suite | None = None, members: Mapping[str, System] | None = None) -> str:
+        """Return why nothing takes a value of this name, "" where something does."""
+        try:
+            if suite is None or members is None:
                 self._systems({name: "1"})
-            except InvalidValueError as error:
-                raise UsageError(str(error)) from None
+            else:
+                suite.passed = {name: "1"}
+                suite.given_to(members)
+        except InvalidValueError as error:
+            return str(error)
+        return ""
+
+    def _suites(self) -> list[tuple[Suite, dict[str, System]]]:
+        """Return the suite with each choice of tests that the campaign makes, and these tests; [] of a system."""
+        if isinstance(self.test, System):
+            return []
+        given = {n: v for n, v in self.definition.set.items() if n in self.test.options}
+        tests = self.definition.over.get("tests")
+        chosen = [{}] if tests is None else [{"tests": t} for t in ([tests] if isinstance(tests, str) else tests)]
+        suites = [self.test.with_values({**given, **c}) for c in chosen]
+        return [(s, s.members(self.bench.folder)) for s in suites]
 
     # ------------------------------------------------------------------------------------------ a run
     def _run(

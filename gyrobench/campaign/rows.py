@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.result import NO_VERDICT, Result
 
 
-def result_columns(result: Result) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the columns of a result, and their units."""
+def result_columns(result: Result, tests: Mapping[str, Result]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the columns of a result, and their units; tests: of a suite, each with its name before its quantities."""
     row: dict[str, Any] = {}
     units: dict[str, str] = {}
-    for c in result.coefficients:
-        name = c.name
+    each = [("", c) for c in result.coefficients]
+    each += [(f"{test}.", c) for test, own in tests.items() for c in own.coefficients]
+    for before, c in each:
+        name = before + c.name
         while f"{name}.estimate" in row:  # two quantities of one name
             name += "'"
         low, high = c.interval

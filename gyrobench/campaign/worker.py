@@ -52,11 +52,11 @@ class MachineError(GyrobenchError):
 
 
 class PartialSuiteError(RunError):
-    """Some tests of a suite have no result; what the others say is in ``result``."""
+    """Some tests of a suite have no result; what the others say is in ``result`` and, each by itself, in ``tests``."""
 
-    def __init__(self, message: str, result: Result) -> None:
+    def __init__(self, message: str, result: Result, tests: Mapping[str, Result]) -> None:
         super().__init__(message)
-        self.result = result
+        self.result, self.tests = result, tests
 
 
 @dataclass(frozen=True)
@@ -196,9 +196,10 @@ class _Desk:
         row: dict[str, Any] = run.columns(self.order.system)
         record: Record | None = None
         result: Result | None = None
+        tests: Mapping[str, Result] = {}
         detail = ""
         try:
-            record, result = self._execute(run, chunk)
+            record, result, tests = self._execute(run, chunk)
             row["state"] = "done"
         except MemoryError:
             row |= {"state": "memory", "reason": "not enough memory"}
@@ -208,9 +209,10 @@ class _Desk:
             if run.data is not None:  # the same path wherever the file was read
                 row["reason"] = row["reason"].replace(f"{self.inbox}/", f"{Path(run.data).parent}/")
             record, result = getattr(error, "record", None), getattr(error, "result", None)
+            tests = getattr(error, "tests", {})
             self._drop(run.setup)  # whatever state its FMUs are in
         if result is not None:
-            columns, units = result_columns(result)
+            columns, units = result_columns(result, tests)
             row |= columns
             done.units |= units
         if record is not None and record.run.measured:
@@ -233,22 +235,23 @@ class _Desk:
         failed = row["state"] != "done" or row.get("verdict") in ("fail", "void")
         return keep == "all" or (keep == "failures" and failed)
 
-    def _execute(self, run: PlannedRun, chunk: Chunk) -> tuple[Record | None, Result | None]:
+    def _execute(self, run: PlannedRun, chunk: Chunk) -> tuple[Record | None, Result | None, Mapping[str, Result]]:
+        """Return record and result, and the results of the tests of a suite."""
         if run.setup == MEASURED:
-            return self._reduce(run, chunk)
+            return *self._reduce(run, chunk), {}
         assert run.seed is not None
         spec = self.root / self.order.spec if self.order.spec else None
         request = RunRequest(
             seed=run.seed, step=self.order.step, spec=spec, check_step=self.order.check_step, in_memory=True
         )
         if isinstance(self.test, Suite):
-            return self._suite(run, request)
+            return None, *self._suite(run, request)
         system = self.test.with_values(run.values)
         session = self._session(run.setup, "", system)
         outcome = execute_run(request, system, prepared=session)
         if outcome.stopped is not None:
             raise outcome.stopped
-        return outcome.record, outcome.result
+        return outcome.record, outcome.result, {}
 
     def _session(self, setup: int, member: str, system: System) -> Session:
         """Return the loaded session for a system of this structure, with the values of this one."""
@@ -293,14 +296,15 @@ class _Desk:
                 file.unlink()
         return outcome.record, outcome.result
 
-    def _suite(self, run: PlannedRun, request: RunRequest) -> tuple[Record | None, Result | None]:
-        """Run the tests of a suite and what it says of them, as gyrobench run does."""
+    def _suite(self, run: PlannedRun, request: RunRequest) -> tuple[Result, dict[str, Result]]:
+        """Run the tests of a suite; return what it says of them, as gyrobench run does, and the result of each."""
         from gyrobench.record.run_document import SuiteTestRun
         from gyrobench.workflow.suite_report import suite_document, write_suite_report
 
         assert isinstance(self.test, Suite) and run.seed is not None
         suite = self.test.with_values(run.values)
         failed: dict[str, str] = {}
+        results: dict[str, Result] = {}
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             members = suite.members(self.bench)
@@ -310,7 +314,9 @@ class _Desk:
                     request, seed=suite.seed_of(run.seed, test), out=out, in_memory=False, formats=("json",), spec=None
                 )
                 try:
-                    execute_run(own, system, prepared=self._session(run.setup, test, system))
+                    outcome = execute_run(own, system, prepared=self._session(run.setup, test, system))
+                    if outcome.result is not None:
+                        results[test] = outcome.result
                 except Exception as error:
                     _raise_of_machine(error, self.name)
                     failed[test] = self._failure(error)[1].replace(f"{folder}/", "")
@@ -321,10 +327,10 @@ class _Desk:
             if not document.tests:
                 raise RunError(problem)
             spec = self.root / self.order.spec if self.order.spec else None
-            outcome = write_suite_report(suite, folder, document, spec, ("json",))
+            said = write_suite_report(suite, folder, document, spec, ("json",)).result
             if failed:
-                raise PartialSuiteError(problem, outcome.result)
-            return None, outcome.result
+                raise PartialSuiteError(problem, said, results)
+            return said, results
 
     def _files(self, record: Record | None, result: Result | None) -> dict[str, bytes]:
         """Return the files of a run that is kept."""
