@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib
 import shlex
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gyrobench as gb
 from gyrobench.bench import UsageError
 from gyrobench.campaign.design import choice_search, plan_search, shortest_test
 from gyrobench.campaign.design.approximate_design import approximate_design, evaluate
@@ -239,3 +241,36 @@ def test_visits_as_text() -> None:
     for text, problem in (("a", "write 'NAME ANGLEdeg'"), ("a 30 0s", "must be above 0"), ("a 3A", "visit 1 'a 3A'")):
         with pytest.raises(InvalidValueError, match=problem):
             parse_visits("visits", text, ("", "rad"), 10.0)
+
+
+def test_noise_of_a_run_takes_the_place_of_that_of_the_parts(tmp_path: Path) -> None:
+    """A run with three times the white noise: its estimate, of 40 degrees of freedom, is within three of its standard
+    errors, and what is predicted of the same plan goes with it.
+    """
+    name, values = "accelerometer_multipoint", {"dwell": "3s", "settle": "0.5s", "table.repeat": 0.0}
+    noisy, quiet, other = (tmp_path / n for n in ("noisy", "quiet", "other"))
+    white = 3.0 * 5.0e-6 * 9.80665
+    gb.load(name, {**values, "accelerometer.white": white}).run(seed=5, out=noisy)
+    system = load_system(name).with_values(values)
+    gb.load(name, {**values, **dict.fromkeys(system.noises, 0.0)}).run(out=quiet)
+    gb.load("fixed_position", dwell="60s").run(out=other)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shortest_test, "_searched", lambda bench, protocol, own, *rest: (protocol, own))
+        (_, own), (protocol, trial) = (
+            design_test(system, {"k0": "1ug"}, **more)  # type: ignore[misc,arg-type]
+            for more in ({}, {"noise_of": noisy})
+        )
+    three = pytest.approx(3.0, rel=3.0 / np.sqrt(80.0))
+    assert trial.values["k0"].least / own.values["k0"].least == three
+    assert trial.values["k0"].error / own.values["k0"].error == three
+    assert any(f"the likeliest one of {noisy}" in u for u in protocol.unseen)
+    for folder, text in (
+        (quiet, "a run without noise"),
+        (other, "a run of fixed_position; a run of accelerometer_mul"),
+    ):
+        with pytest.raises(UsageError, match=text):
+            design_test(system, {"k0": "1ug"}, noise_of=folder)
+    with pytest.raises(UsageError, match="runs have the noise of the parts"):
+        design_test(system, {"k0": "1ug"}, noise_of=noisy, count=10)
+    with pytest.raises(gb.GyrobenchError, match="No such file"):
+        design_test(system, {"k0": "1ug"}, noise_of=tmp_path / "nothing")

@@ -98,6 +98,8 @@ def design_test(
             own = trial_of(record, fits, protocol.covariances, ROUGH)
             return search_choices(bench, protocol, own, wants, time, criterion, count)
         if noise_of is not None:
+            if count:
+                raise UsageError("--noise and --count: runs have the noise of the parts; give it to them with --set")
             protocol = _with_noise_of(protocol, noise_of, system)
         own = trial_of(record, fits, _covariances(protocol, [j for j, _ in protocol.book]), ROUGH)
         places = {n: (k, j) for k, c in enumerate(protocol.channels) for j, n in enumerate(c.names)}
@@ -257,15 +259,26 @@ def _population(nominal: Sequence[Noise], count: int) -> list[tuple[Noise, ...]]
 
 
 def _with_noise_of(protocol: VisitProtocol, folder: Path, system: System) -> VisitProtocol:
-    """Return the protocol with the most likely noise of a run of the same system.  Raises UsageError."""
+    """Return the protocol with the most likely noise of a run of the same system.  Raises UsageError.
+
+    A short run shows no slow drift: what it cannot exclude is named in ``unseen``.
+    """
     record = Record.load(folder)
     if record.run.system != system.name:
         raise UsageError(f"--noise {folder}: a run of {record.run.system}; a run of {system.name} is expected")
     with observed_fits() as fits:
         system.reduce(record)
-    found = [Noise(f.est.density[0], f.est.sigma[0], max(f.est.tau[0], 1e-3)) for f, _ in fits]
+    if any(f.ideal for f, _ in fits):
+        raise UsageError(f"--noise {folder}: a run without noise; a run of the instrument, or simulated with its noise")
+    estimates = [f.est for f, _ in fits]
+    found = [Noise(e.density[0], e.sigma[0], max(e.tau[0], 1e-3)) for e in estimates]
     channels = [replace(c, noise=n) for c, n in zip(protocol.channels, found, strict=True)]
-    return replace(protocol, channels=tuple(channels))
+    slow = max(e.sigma[2] / e.density[0] * math.sqrt(WINDOW) if e.density[0] > 0.0 else 0.0 for e in estimates)
+    said = (
+        f"the noise is the likeliest one of {folder}; slow drift of up to {slow:.2g} times the white noise of a minute "
+        "(95 %) is as well possible there, and would ask for more or shorter visits"
+    )
+    return replace(protocol, channels=tuple(channels), unseen=(*protocol.unseen, said))
 
 
 def _different(plans: Sequence[ExactPlan]) -> list[ExactPlan]:
