@@ -29,6 +29,7 @@ from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, correc
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
@@ -98,7 +99,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
     rate = C[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate)
     y = rate - s.k * current
     X = _design(s, C)
-    weighed = [*nuisances.common(windows), *nuisances.torquer(nuisances.fitted(rate, X, y))] if s.nuisances else []
+    weighed = _candidates(s, windows, C, rate, X, y) if s.nuisances else []
     theta, book, harmonics, ties, why = _harmonic_route(s, w["phase"], w["t_end"] - w["t_start"], outer, inner, y)
     if s.harmonic and why:
         raise ReductionError(why)
@@ -184,6 +185,29 @@ def _position_problems(w: Mapping[str, Array]) -> list[str]:
 def _design(s: TwoAxisSetup, C: Array) -> Array:
     """Regressors (k, 9) in attitudes (k, 3, 3)."""
     return drift.regressors(-C @ frames.U * (s.gravity / frames.G0), geometry.NAMES)
+
+
+def _candidates(
+    s: TwoAxisSetup, windows: Mapping[str, Array], C: Array, rate: Array, X: Array, y: Array
+) -> list[Candidate]:
+    """Set-up effects: misalignments of the input axis, trend, temperature, torquer.  Turned about the inner axis, output
+    and spin axis see the Earth rate by the cosine and the sine of its angle; the drift that the axis sees with them is
+    that of least squares.
+    """
+    earth, start = frames.earth_rate_local(s.latitude, s.earth_rate), np.linalg.lstsq(X, y, rcond=None)[0]
+
+    def misalignment(k: int) -> Array:
+        other = frames.rotation(np.eye(3)[k], SMALL) @ C
+        out: Array = (other[:, 0] @ earth - rate - (_design(s, other) - X) @ start) / SMALL
+        return out
+
+    text = "misalignment of the input axis towards the"
+    return [
+        Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2)),
+        Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1)),
+        *nuisances.common(windows),
+        *nuisances.torquer(nuisances.fitted(rate, X, y)),
+    ]
 
 
 def _quantity(s: TwoAxisSetup, name: str, book: Mapping[str, float]) -> Quantity:

@@ -1,11 +1,11 @@
 """How often 95 % intervals hold the truth where the set-up is not ideal, with and without nuisance model.
 
-    python tests/benchmarks/setup_effects.py [CASE ...] --runs 500 [--seed 1] [--white]
+    python tests/benchmarks/setup_effects.py [CASE ...] --runs 500 [--seed 1] [--white] [--how auto,stated | --last]
 
 No co-simulation: windows of the single-axis tumble are written from its equations (tests/reduction/coverage.py), with
 noise of the population (--white: white noise), a misalignment of the input axis, a ramp, constants from mount to mount,
-an encoder that is wrong once a turn, outliers.  The same of the servo tests, of the eight positions (their x
-current) and of tests in one attitude: default plans, setup_plans.py.
+an encoder that is wrong once a turn, outliers.  The same of the other drift tests (of two channels: the x channel), with
+the regressors of their default plans: setup_plans.py.
 Standard deviation of a window 0.0022 deg/h; 72 windows a turn of 2.4 h, 10 in a dwell, as the default plan has them.
 Prints the coverage of each coefficient, how wide the intervals are over those of clean records without candidates, and
 in which share of the records each candidate is reported with the coefficients: of clean records, falsely.
@@ -17,6 +17,7 @@ import argparse
 import math
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,8 +29,9 @@ import setup_plans
 from coverage import plan
 
 from gyrobench import drift, frames
-from gyrobench.reduction.estimation import noise, noise_mixture_fit, nuisances, outliers, uncertainty
-from gyrobench.reduction.estimation.effects import Remount, remounts, standard_changes
+from gyrobench.reduction.estimation import noise, nuisances, outliers, uncertainty
+from gyrobench.reduction.estimation.effects import Effect, Remount, remounts, standard_changes
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 
 SIGMA = 0.0022  # deg/h, of a window
@@ -42,41 +44,40 @@ ALONG = {3: 0.7163, 4: -0.7163, 1: -9.0, 2: 9.0}
 
 @dataclass(frozen=True)
 class Case:
-    tilt: float = 0.0  # arcsec
+    tilt: float = 0.0  # arcsec, of the input axis: where the plan shows it
     ramp: float = 0.0  # deg/h from the start of the record to its end
     remount: float = 0.0  # deg/h, standard deviation from mount to mount
     slow: float = 0.0  # share of the variance of a window in drift with a correlation time of a quarter of the record
     order: tuple[int, ...] = ONCE
-    encoder: float = 0.0  # arcsec, times the sine of the table angle
+    encoder: float = 0.0  # arcsec, standard deviation of each part of an error once a turn
+    mounted: float = 0.0  # arcsec, of the mount of the gyro about each of its axes
     outliers: float = 0.0  # share of the windows that are off by thirty standard deviations, either way
     plan: str = "tumble"
 
+    @property
+    def table(self) -> bool:
+        """True for an error that is stated as type B, whatever the plan."""
+        return bool(self.encoder or self.mounted)
 
-CASES = {
+
+OF_ALL = {
     "clean": Case(),
     "tilt of 20 arcsec": Case(tilt=20.0),
-    "tilt of 2 arcsec": Case(tilt=2.0),
     "ramp of 0.02 deg/h": Case(ramp=0.02),
+    "remount": Case(remount=SIGMA),
+    "encoder 30 arcsec": Case(encoder=30.0),
+    "mounted to 20 arcsec": Case(mounted=20.0),
+    "outlier 1 in 100": Case(outliers=0.01),
+}
+CASES = {
+    **OF_ALL,
+    "tilt of 2 arcsec": Case(tilt=2.0),
     "ramp of 0.006 deg/h": Case(ramp=0.006),
     "tilt and ramp": Case(tilt=20.0, ramp=0.02),
     "slow drift": Case(slow=0.5),
     "remount, mounts repeated": Case(remount=SIGMA, order=ONCE * 3),
-    "remount, mounts once": Case(remount=SIGMA),
     "clean, mounts repeated": Case(order=ONCE * 3),
-    "encoder 30 arcsec": Case(encoder=30.0),
-    "outlier 1 in 100": Case(outliers=0.01),
-    **{
-        f"{plan}, {name}": replace(case, plan=plan)
-        for plan in setup_plans.PLANS
-        for name, case in {
-            "clean": Case(),
-            "tilt of 20 arcsec": Case(tilt=20.0),
-            "tilt of 100 arcsec": Case(tilt=100.0),
-            "ramp of 0.02 deg/h": Case(ramp=0.02),
-            "remount": Case(remount=SIGMA),
-        }.items()
-        if not (case.remount and not plan.startswith("servo")) and not (case.tilt and plan in setup_plans.STILL)
-    },
+    **{f"{p}, {name}": replace(case, plan=p) for p in setup_plans.PLANS for name, case in OF_ALL.items()},
 }
 
 
@@ -84,99 +85,110 @@ class Bench:
     """Records of one plan and their reduction."""
 
     def __init__(self, order: tuple[int, ...] = ONCE, turn: int = 72, dwell: int = 10, of: str = "tumble") -> None:
-        self.readings, self.names = False, NAMES
-        if of in setup_plans.PLANS:
-            p = setup_plans.PLANS[of]()
-            self.t0, self.t1, self.X, self.names, self.readings = p.t0, p.t1, p.X, p.names, p.readings
-            self.turned = None
-            self._finish(p.tilt, p.mount, p.candidates)
-            return
-        self.t0, self.t1, self.X = plan(turn, dwell, order=order)
-        self.turned = plan(turn, dwell, order=order, encoder=ARCSEC)[2] - self.X  # for 1 arcsec
-        counts = [turn if p < 3 else dwell for p in order]
-        role, mount = np.repeat(order, counts), np.repeat(np.arange(len(order)), counts)
-        along = np.array([ALONG[int(r)] for r in role]) * frames.EARTH_RATE * np.degrees(1.0) * 3600.0
-        tilt = -along * ARCSEC  # deg/h per arcsec
-        found = [
-            nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, tilt),
-            nuisances.trend(self.t0, self.t1),
-            nuisances.scatter("mount", nuisances.MOUNTS, mount.tolist()),
-        ]
-        self._finish(tilt, mount, found)
+        self.plan = p = setup_plans.PLANS[of]() if of in setup_plans.PLANS else tumble(order, turn, dwell)
+        self.names = p.names
+        length, middle = p.t1 - p.t0, (p.t0 + p.t1) / 2.0
+        self.time = (middle - np.average(middle, weights=length)) / (p.t1[-1] - p.t0[0])
+        _, hidden = nuisances.observable(p.X, p.names, p.candidates)
+        self.mounts_once = any(h.candidate.meaning == nuisances.MOUNTS for h in hidden)
 
-    def _finish(self, tilt: np.ndarray, mount: np.ndarray, candidates: list[nuisances.Candidate]) -> None:
-        self.tilt, self.mount = tilt, mount
-        self.time = ((self.t0 + self.t1) / 2.0 - self.t0[0]) / (self.t1[-1] - self.t0[0])
-        self.truth = np.linspace(-1.0, 1.0, len(self.names))
-        self.seen, self.hidden = nuisances.observable(self.X, self.names, candidates)
+    def has(self, case: Case) -> bool:
+        """False where the plan has no such error, or none that it shows."""
+        p = self.plan
+        lacks = (case.tilt and not p.tilt.any()) or (case.remount and not p.mount.any())
+        return not (lacks or (case.encoder and not p.encoder.any()) or (case.mounted and not p.mounted.any()))
 
     def record(self, case: Case, rng: np.random.Generator, white: bool = False) -> np.ndarray:
+        p = self.plan
         tau, share, reading = 1.0, 0.0, 0.0
         if not white:
-            tau, share, reading = noise.sample_instrument(rng, self.t0, self.t1, self.readings)
+            tau, share, reading = noise.sample_instrument(rng, p.t0, p.t1, p.readings)
         if case.slow:
-            tau, share = 0.25 * (self.t1[-1] - self.t0[0]), case.slow
-        unit = noise.process_covariance(self.t0, self.t1, tau)
-        C = np.eye(self.t0.size) * (1.0 - share) + share * unit / unit[0, 0]
-        e = np.linalg.cholesky(C + 1e-12 * np.eye(self.t0.size)) @ rng.standard_normal(self.t0.size)
+            tau, share = 0.25 * (p.t1[-1] - p.t0[0]), case.slow
+        unit = noise.process_covariance(p.t0, p.t1, tau)
+        C = np.eye(p.t0.size) * (1.0 - share) + share * unit / unit[0, 0]
+        e = np.linalg.cholesky(C + 1e-12 * np.eye(p.t0.size)) @ rng.standard_normal(p.t0.size)
         if reading:
             e = math.sqrt(1.0 - reading) * e + math.sqrt(reading / 2.0) * self._between_readings(rng)
         if case.outliers:
             e += 30.0 * (rng.random(e.size) < case.outliers) * rng.choice([-1.0, 1.0], e.size)
-        offsets = case.remount * rng.standard_normal(self.mount.max() + 1)
-        y = self.X @ self.truth + case.tilt * self.tilt + case.ramp * self.time + offsets[self.mount] + SIGMA * e
-        return y if self.turned is None else y + case.encoder * self.turned @ self.truth
+        offsets = case.remount * rng.standard_normal(p.mount.max() + 1)
+        y = p.X @ p.truth + case.tilt * p.tilt + case.ramp * self.time + offsets[p.mount] + SIGMA * e
+        for rows, size in ((p.encoder, case.encoder), (p.mounted, case.mounted)):
+            y = y + size * rng.standard_normal(len(rows)) @ rows if size else y
+        return np.asarray(y)
 
     def _between_readings(self, rng: np.random.Generator) -> np.ndarray:
         """Differences of readings with errors of unit variance, which neighbouring windows share."""
-        first, last = rng.standard_normal((2, self.t0.size))
-        joint = np.flatnonzero(np.abs(self.t0[1:] - self.t1[:-1]) < 1e-6 * (self.t1 - self.t0)[1:])
+        t0, t1 = self.plan.t0, self.plan.t1
+        first, last = rng.standard_normal((2, t0.size))
+        joint = np.flatnonzero(np.abs(t0[1:] - t1[:-1]) < 1e-6 * (t1 - t0)[1:])
         first[joint + 1] = last[joint]
         return last - first
 
-    def reduce(self, y: np.ndarray, how: bool | str = True, remount: float = 0.0) -> tuple[np.ndarray, ...]:
+    def reduce(self, y: np.ndarray, how: str, case: Case) -> tuple[np.ndarray, np.ndarray, list[str]]:
         """Errors and half widths of the coefficients, and which candidates joined; D_F is that of the middle of a ramp.
 
-        how: with the nuisance model, or not; "named": with it, without the rows that are named as outliers; "stated":
-        with it, the scatter from mount to mount stated as u_remount and in u (effects.remounts).
+        how: HOW.
         """
-        p = len(self.names)
-        if how == "named":
-            fitted = fit(self.names, self.X, y, self.t0, self.t1, [], "rate", "", 1.0, candidates=self.seen)
-            odd = outliers.find(fitted)
-            best = (odd.without if odd else fitted).est
-            return best.beta[:p] - self.truth, best.half_width[:p], np.array([e.joined for e in best.evidence])
-        blocks = [c.block for c in self.seen] if how else []
-        if how == "stated":
-            fitted = fit(
-                self.names, self.X, y, self.t0, self.t1, [], "rate", "", 1.0,
-                noise="readings" if self.readings else "estimated",
-                candidates=[*self.seen, *(h.candidate for h in self.hidden)],
-            )  # fmt: skip
-            parts = [np.sum(standard_changes(fitted, e) ** 2, axis=0) for e in remounts(fitted, Remount(remount))]
-            part = np.sum([np.zeros(fitted.value.size), *parts], axis=0)
-            half = np.sqrt(fitted.reported.half_width**2 + (uncertainty.NORMAL**2) * part)[:p]
-            return fitted.est.beta[:p] - self.truth, half, np.array([e.joined for e in fitted.est.evidence])
-        found = noise_mixture_fit.fit(self.X, y, self.names, self.t0, self.t1, 1e3, self.readings, blocks)
-        return found.beta[:p] - self.truth, found.half_width[:p], np.array([e.joined for e in found.evidence], bool)
+        p, k = self.plan, len(self.names)
+        fitted = fit(
+            self.names, p.X, y, p.t0, p.t1, [], "rate", "", 1.0, noise="readings" if p.readings else "estimated",
+            candidates=p.candidates if how != "none" else (), limit=1e6,
+        )  # fmt: skip
+        if how == "named" and (odd := outliers.find(fitted)):
+            fitted = odd.without
+        parts = [np.sum(standard_changes(fitted, e) ** 2, axis=0) for e in self._stated(fitted, how, case)]
+        part = np.sum([np.zeros(fitted.value.size), *parts], axis=0)
+        half = np.sqrt(fitted.reported.half_width**2 + uncertainty.NORMAL**2 * part)[:k]
+        return fitted.est.beta[:k] - p.truth, half, [c.name for c, _ in fitted.joined]
+
+    def _stated(self, fitted: Findings, how: str, case: Case) -> list[Effect]:
+        if how != "stated":
+            return []
+        p = self.plan
+        table = [
+            Effect(n, size, "arcsec", rows) for n, size, rows in
+            (("encoder", case.encoder, p.encoder), ("mount", case.mounted, p.mounted)) if size
+        ]  # fmt: skip
+        return [*table, *remounts(fitted, Remount(case.remount))]
+
+
+def tumble(order: tuple[int, ...], turn: int, dwell: int) -> setup_plans.Plan:
+    """The single-axis tumble from its equations; the encoder is off by the sine of the table angle."""
+    t0, t1, X = plan(turn, dwell, order=order)
+    truth = np.linspace(-1.0, 1.0, len(NAMES))
+    turned = (plan(turn, dwell, order=order, encoder=ARCSEC)[2] - X) @ truth
+    counts = [turn if p < 3 else dwell for p in order]
+    role, mount = np.repeat(order, counts), np.repeat(np.arange(len(order)), counts)
+    along = np.array([ALONG[int(r)] for r in role]) * frames.EARTH_RATE * np.degrees(1.0) * 3600.0
+    tilt = -along * ARCSEC  # deg/h per arcsec
+    found = [
+        nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, tilt),
+        nuisances.trend(t0, t1),
+        nuisances.scatter("mount", nuisances.MOUNTS, mount.tolist()),
+    ]
+    return setup_plans.Plan(t0, t1, X, NAMES, truth, mount, found, tilt, np.zeros((0, t0.size)), turned[None])
+
+
+#: without candidates; with them; with them, and without the rows that are named as outliers; with them, and with what
+#: the case is made with stated as type B: u_remount, u_angle1, u_mount
+HOW = ("none", "auto", "named", "stated")
 
 
 def count(
-    bench: Bench, case: Case, runs: int, seed: int, white: bool = False, candidates: bool | str = True
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coverage of the coefficients, mean half widths, share of the records in which each candidate joined and, last,
-    any of them; candidates: see Bench.reduce.
-    """
+    bench: Bench, case: Case, runs: int, seed: int, white: bool = False, how: str = "auto"
+) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+    """Coverage of the coefficients, mean half widths, share of the records in which each candidate joined, and any."""
     rng = np.random.default_rng(seed)
-    middle = case.ramp * np.mean(bench.time)
     hits, width = np.zeros((2, len(bench.names)))
-    joined = np.zeros((len(bench.seen) if candidates else 0) + 1)
+    joined = Counter({"any": 0})
     for _ in range(runs):
-        error, half, there = bench.reduce(bench.record(case, rng, white) - middle, candidates, case.remount)
+        error, half, there = bench.reduce(bench.record(case, rng, white), how, case)
         hits += np.abs(error) <= half
         width += half
-        joined += np.append(there, there.any())
-    return hits / runs, width / runs, joined / runs
+        joined.update([*there, *(["any"] if there else [])])
+    return hits / runs, width / runs, {n: v / runs for n, v in joined.items()}
 
 
 def main() -> int:
@@ -185,26 +197,30 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--white", action="store_true")
+    parser.add_argument("--how", help=f"of {', '.join(HOW)}, with commas; default: those that the case has")
+    parser.add_argument("--last", action="store_true", help="the last of these alone")
     given = parser.parse_args()
     benches: dict[tuple[str, tuple[int, ...]], tuple[Bench, np.ndarray]] = {}
     for name in given.case or CASES:
-        case, began = CASES[name], time.monotonic()
+        case = CASES[name]
         key = case.plan, case.order
         if key not in benches:
             bench = Bench(case.order, of=case.plan)
-            benches[key] = bench, count(bench, Case(), given.runs // 2, 99, given.white, False)[1]
+            benches[key] = bench, count(bench, Case(), max(given.runs // 4, 50), 99, given.white, "none")[1]
             print(f"{'case':<40}{'nuisances':<10}" + " ".join(f"{n[-5:]:>5}" for n in bench.names) + "   width / clean")
         bench, plain = benches[key]
-        more = (["named"] if case.outliers else []) + (["stated"] if case.remount and bench.hidden else [])
-        for candidates in (False, True, *more):
-            held, width, joined = count(bench, case, given.runs, given.seed, given.white, candidates)
+        if not bench.has(case):
+            continue
+        more = ["named"] * bool(case.outliers) + ["stated"] * bool(case.table or (case.remount and bench.mounts_once))
+        ways = given.how.split(",") if given.how else ["none", "auto", *more]
+        for how in ways if not given.last else ways[-1:]:
+            began = time.process_time()
+            held, width, joined = count(bench, case, given.runs, given.seed, given.white, how)
             row = " ".join(f"{v:.3f}" for v in held)
             wide = " ".join(f"{v:.2f}" for v in width / plain)
-            took = f"{time.monotonic() - began:.0f} s"
-            shown = candidates if isinstance(candidates, str) else "auto" if candidates else "none"
-            names = [c.name for c in bench.seen] + ["any"]
-            said = ", ".join(f"{n} {v:.3f}" for n, v in zip(names, joined, strict=False)) if candidates else ""
-            print(f"{name:<40}{shown:<10}{row}   {wide}  {took}  {said}", flush=True)
+            took = f"{time.process_time() - began:.0f} s"
+            said = ", ".join(f"{n} {v:.3f}" for n, v in joined.items())
+            print(f"{name:<40}{how:<10}{row}   {wide}  {took}  {said}", flush=True)
     return 0
 
 

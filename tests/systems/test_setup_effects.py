@@ -13,18 +13,21 @@ from servoing_two_axes import day
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
-from gyrobench.result import DriftTestResult
+from gyrobench.reduction.estimation.effects import REMOUNT
+from gyrobench.result import DriftTestResult, Specification
 from gyrobench.system.system import load_system
 
 ARCSEC = math.pi / 648000.0
 HOUR = 3600.0
 
 
-def reduced(record: Record, **options: Any) -> DriftTestResult:
-    run = record.run.replace(options={**record.run.options, **options})
+def reduced(
+    record: Record, limits: Specification | None = None, measured: bool = False, **options: Any
+) -> DriftTestResult:
+    run = record.run.replace(options={**record.run.options, **options}, measured=measured)
     reduction = importlib.import_module(".reduction", type(load_system(record.run.system)).__module__)
     examined = getattr(reduction, "_examined", reduction.from_record)
-    result = examined.__wrapped__(Record(record.windows, {}, run))  # without diagnosis of handling errors
+    result = examined.__wrapped__(Record(record.windows, {}, run), limits)  # without diagnosis of handling errors
     assert isinstance(result, DriftTestResult)
     return result
 
@@ -52,6 +55,22 @@ def candidates(result: DriftTestResult) -> dict[str, str]:
     return {r[0]: r[6] for t in result.tables if t["title"].startswith("Nuisance model") for r in t["rows"]}
 
 
+def passes_when_remounts_are_stated(record: Record, *at_rest: str) -> None:
+    """As a measured record with a source stated and limits that every coefficient keeps: where each mount is taken once
+    the record passes with u_remount alone; without it those coefficients (at_rest) pass that no constant of a mount
+    moves.
+    """
+    wide = {c.name: (-1e3, 1e3) for c in reduced(record).coefficients}
+    said = {"u_axis": 1e-6}
+    bare = reduced(record, wide, measured=True, **said)
+    words = " ".join(w for w in bare.warnings if "each mount is taken once" in w)
+    assert bare.verdict == "inconclusive"
+    assert {c.name for c in bare.coefficients if c.verdict == "pass"} == set(at_rest)
+    assert all(f" {c.name}" in words for c in bare.coefficients if c.verdict != "pass")
+    stated = reduced(record, wide, measured=True, **said, u_remount=1e-3 * DPH)
+    assert stated.verdict == "pass" and any(b.source == REMOUNT for b in stated.budget)
+
+
 def ramped(record: Record, rate: float) -> Record:
     """The record of a servo table whose drift changes by ``rate`` (rad/s2), 0 in the middle of the time held."""
     w = record.windows
@@ -72,6 +91,7 @@ def test_polar_servo() -> None:
     clean = reduced(record)
     holds(clean)
     assert candidates(clean)["σ_mount"].startswith("not observable")
+    passes_when_remounts_are_stated(record, "D_O", "D_S", "D_SS", "D_IO", "D_OS", "D_IS")
     assert candidates(clean)["ε_IS"] == "not observable: aliased with ε_IO"
     ramp = ramped(record, 0.5 * DPH / HOUR)
     holds(reduced(ramp), trend=0.5)
@@ -121,6 +141,7 @@ def test_two_axis_servo() -> None:
         values = {**day(500.0), "gyro.Dy_0": 0.5 * DPH}
         clean, record = (session.run({**values, "gyro.Dy_p0": p}, seed=1) for p in (0.0, 0.01))
     assert all(c.truth is not None for c in reduced(clean).coefficients)
+    passes_when_remounts_are_stated(clean, "Dx_xz", "Dy_xz")
     ageing = reduced(record)
     assert [c.name for c in ageing.coefficients if c.truth is None] == ["trend,y"]
     trend = ageing["trend,y"]
@@ -132,6 +153,34 @@ def test_two_axis_servo() -> None:
     assert all(abs(c.z or 0.0) < 4.0 for c in ageing.coefficients if c.name != "Dy_0")
     plain = reduced(record, nuisances="none")
     assert plain["Dy_0"].u > 3.0 * ageing["Dy_0"].u
+
+
+# ------------------------------------------------------------------------------------------ tumbles
+def test_two_axis_tumble() -> None:
+    """25 positions of a gyro turned by 1500 arcsec about its spin axis, x' = x + 1500 arcsec y, and about its output
+    axis, x' = x + 1500 arcsec z: the Earth rate across is seen by the cosine and the sine of the inner angle, and D_O
+    and D_S take 0.9 of it where nothing else may.
+    """
+    values = {
+        "positions": 25, "dwell": 4.0, "settle": 3.0, "inner_rate": 0.05, "rebalance.i_max": 1.0,
+        "table.index_rate[1]": 1.0, "table.acceleration": [1.0, 1.0],
+    }  # fmt: skip
+    with Session("tumble_two_axis") as session:
+        clean = reduced(session.run(values, seed=2))
+        for axis, name, sign in (([0.0, 0.0, 1.0], "ε_IO", 1.0), ([0.0, 1.0, 0.0], "ε_IS", -1.0)):
+            mount = frames.rotation(axis, sign * 1500.0 * ARCSEC).T.tolist()
+            tilted = session.run({**values, "gyro.mount": mount}, seed=2)
+            holds(reduced(tilted), **{name: 1500.0})
+            assert worst(reduced(tilted, nuisances="none"), clean) > 3.0
+    holds(clean)
+
+
+def test_two_channel_tumble() -> None:
+    with Session("tumble_two_channel") as session:
+        values = {"rate": 0.15, "windows": 24, "dwell": 17.5, "settle": 2.0, "table.acceleration": 20.0}
+        record = session.run({**values, "latitude": math.radians(45.75)}, seed=4)
+    squares = ("Dx_xx", "Dx_xy", "Dx_yz", "Dx_xz", "Dy_yy", "Dy_xy", "Dy_xz", "Dy_yz")
+    passes_when_remounts_are_stated(record, "Dx_x", "Dy_x", "Dy_y", *squares)
 
 
 # ------------------------------------------------------------------------------------------ others

@@ -146,7 +146,7 @@ def fit(
     cov_each = T @ np.concatenate(covariances) @ T.T
     best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
     dof = n - p - each[best].flat
-    slow_drift = (grid.share > 0.0) & (grid.tau > SLOW * (t1[-1] - t0[0]))
+    slow_drift = _slow(grid, t0, t1)
     slow_drift = np.tile(slow_drift, len(each))[counts]
     mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof, slow_drift)
     evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
@@ -196,6 +196,17 @@ def fit(
         _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
         Zk[:, index], _listed(grid, models, int(k)),
     )  # fmt: skip
+
+
+def _slow(grid: noise.NoiseGrid, t0: Array, t1: Array) -> NDArray[np.bool_]:
+    """Return which models (G,) have drift slower than SLOW that moves the mean of the record more than the rest of the
+    noise does: share v(T/tau)/v(w/tau) > (1 - share)/n.  Fainter drift is as good as white noise; with it, what is
+    asked for if the drift is slow would mostly be the intervals of white noise.
+    """
+    record, window = float(t1[-1] - t0[0]), float(np.median(t1 - t0))
+    mean = grid.share * noise.mean_variance(record / grid.tau) / noise.mean_variance(window / grid.tau)
+    out: NDArray[np.bool_] = (grid.tau > SLOW * record) & (mean > (1.0 - grid.share) / t0.size)
+    return out
 
 
 def _listed(grid: noise.NoiseGrid, weight: Array, k: int) -> Array:

@@ -7,7 +7,13 @@ If it is there:
   standard uncertainty with which the record determines it (S = Z' (R^-1 - R^-1 X (X' R^-1 X)^-1 X' R^-1) Z):
       log weight = 1/2 log det S - k log SIZE;
 * a scatter (one constant a mount, say): c ~ N(0, s^2 I), s in :data:`SCATTERS` times the standard uncertainty of one
-  constant with all else known; which of them, the data say.
+  constant with all else known, each with the weight OCTAVE.  Even steps of ln s: of m contrasts that the rest leaves
+  the estimates then are t of m degrees of freedom where s is well above that uncertainty, as of the means of the groups
+  alone.  The weight is that with which a single contrast of two standard uncertainties, z = 2, is as likely a scatter
+  as a single effect,
+      sum over SCATTERS of OCTAVE (1 + s^2)^(-1/2) exp(z^2/2 s^2/(1 + s^2)) = exp(z^2/2)/SIZE,     OCTAVE = 0.66.
+  Sizes with weights that add up to one (OCTAVE = 1/7) take a scatter of few groups for absent, or for drift as long as
+  a mount, where it happens to be small, and the intervals hold what it moves too rarely (0.92 of twelve mounts).
 
 No threshold chooses between models: estimates are mixtures over the combinations (noise_mixture_fit), so the
 intervals allow for effects too small to be seen.  With SIZE = 1.5 an effect of two standard uncertainties comes in
@@ -29,6 +35,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 SIZE = 1.5
 SCATTERS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+OCTAVE = 0.66
 MOST = 64  # combinations; beyond, effects are weighed one at a time and in pairs
 
 
@@ -94,7 +101,7 @@ def states(blocks: Sequence[Block], scale: Array, M: Array, p: int, likely: Arra
             if b.scatter:
                 scatter[j] = np.full(M.shape[0], size * alone[j])
                 precision.append(1.0 / np.square(np.outer(scatter[j], scale[[o - p for o in own]])))
-                weight += 0.5 * np.sum(np.log(precision[-1]), axis=1) - math.log(len(SCATTERS))
+                weight += 0.5 * np.sum(np.log(precision[-1]), axis=1) + math.log(OCTAVE)
             else:
                 weight += alone[j]
                 precision.append(np.zeros((M.shape[0], len(own))))
