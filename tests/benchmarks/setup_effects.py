@@ -4,7 +4,7 @@
 
 No co-simulation: windows of the single-axis tumble are written from its equations (tests/reduction/coverage.py), with
 noise of the population (--white: white noise), a misalignment of the input axis, a ramp, constants from mount to mount,
-an encoder that is wrong once a turn, outliers.  The same of the other drift tests (of two channels: the x channel), with
+an encoder that is wrong once a turn, outliers.  The same of the other drift tests (of two channels: x), with
 the regressors of their default plans: setup_plans.py.
 Standard deviation of a window 0.0022 deg/h; 72 windows a turn of 2.4 h, 10 in a dwell, as the default plan has them.
 Prints the coverage of each coefficient, how wide the intervals are over those of clean records without candidates, and
