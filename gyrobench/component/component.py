@@ -372,10 +372,36 @@ class Component:
 
     def jacobian(self) -> list[list[float]]:
         """Return df/dx at the present point, by forward-mode differentiation of ``flow``."""
-        return [list(r) for r in zip(*(self.tangent({s.name: 1.0})[0] for s in self.states), strict=True)]
+        columns = self.tangents([{s.name: 1.0} for s in self.states], outputs=False)
+        return [list(r) for r in zip(*(der for der, _ in columns), strict=True)]
 
     def tangent(self, seeds: dict[str, float]) -> tuple[list[float], list[float]]:
         """Return the derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
+        return self.tangents([seeds])[0]
+
+    def tangents(
+        self, directions: Iterable[dict[str, float]], outputs: bool = True
+    ) -> list[tuple[list[float], list[float]]]:
+        """Return :meth:`tangent` along each of these directions; outputs: False leaves those out."""
+        twin, found = self._twin(), []
+        shown = [s for s in self.layout if s.section == "output"] if outputs else []
+        for seeds in directions:  # one twin for all: ``flow`` and ``outputs`` write ``der`` and outputs only
+            seeded = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in map(self._find, seeds)]
+            for x, weight in zip(seeded, seeds.values(), strict=True):
+                x.d = weight
+            twin._equations("flow")
+            if outputs:
+                twin._equations("outputs")
+            der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
+            found.append((der, [lift(_dig(getattr(twin, s.path[0]), s.path[1:])).d for s in shown]))
+            for x in seeded:
+                x.d = 0.0
+            for name in {s.decl.name for s in shown}:
+                setattr(twin, name, _dual(getattr(self, name)))
+        return found
+
+    def _twin(self) -> Component:
+        """Return a copy of this part whose values are dual numbers, with derivatives 0."""
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__dict__)
         twin.der = Derivatives()
@@ -384,14 +410,7 @@ class Component:
             if isinstance(d, State):
                 setattr(twin.der, name, _dual(getattr(self.der, name)))
         twin.noise = SimpleNamespace(**{k: _dual(v) for k, v in vars(self.noise).items()})
-        for name, weight in seeds.items():
-            s = self._find(name)
-            _dig(getattr(twin, s.path[0]), s.path[1:]).d = weight
-        twin._equations("flow")
-        twin._equations("outputs")
-        der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
-        out = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in self.layout if s.section == "output"]
-        return der, [lift(y).d for y in out]
+        return twin
 
     def _advance(self, h: float) -> None:
         if self.integrator == "rk4":

@@ -22,7 +22,7 @@ def jacobians(part: Component, inputs: Sequence[str], outputs: Sequence[str]) ->
     rows = [all_outputs.index(n) for n in outputs]
 
     def columns(names: Sequence[str]) -> tuple[Any, Any]:
-        both = [part.tangent({n: 1.0}) for n in names]
+        both = part.tangents({n: 1.0} for n in names)
         d = np.array([b[0] for b in both], dtype=float).reshape(len(names), len(states)).T
         y = np.array([[b[1][r] for r in rows] for b in both], dtype=float).reshape(len(names), len(rows)).T
         return d, y

@@ -210,7 +210,7 @@ def warnings(source: Path, *how: str) -> str:
     """What the compiler says with all warnings on."""
     cc = compiler.command(compiler.this_platform())
     assert cc is not None
-    flags = ("-Wall", "-Wextra", "-Wpedantic", *how, "-c", f"-I{source.parent}", "-o", str(source.with_suffix(".o")))
+    flags = ("-Wall", "-Wextra", "-Wpedantic", *how, "-S", f"-I{source.parent}", "-o", str(source.with_suffix(".s")))
     return subprocess.run([*cc, *compiler.FLAGS, *flags, source], capture_output=True, text=True, check=True).stderr
 
 
