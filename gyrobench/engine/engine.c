@@ -280,7 +280,8 @@ static int loop(run *r, void *const instances[], int64_t k_end) {
         if (at->channel_rows == r->channel.capacity || at->window_rows == r->window.capacity) return FULL;
         const int timed = until_timed-- == 0;
         double began = timed ? seconds() : 0.0;
-        if (step_all(r, at, instances, r->t0 + (double)at->k * r->h, timed ? r->laps : NULL)) return FAILED;
+        const double t = r->t0 + (double)at->k * r->h;
+        if (timed ? step_all(r, at, instances, t, r->laps) : step_all(r, at, instances, t, NULL)) return FAILED;
         if (timed) {
             until_timed = TIMED_EVERY - 1;
             r->timed++;

@@ -5,6 +5,7 @@ The structures below mirror engine.c field by field.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 from collections.abc import Mapping
 from ctypes import POINTER, c_double, c_int32, c_int64, c_void_p
@@ -97,7 +98,7 @@ class NativeEngine:
 
     def __init__(self, program: Program, instances: Mapping[str, FmuInstance], board: RunBoard, library: Path) -> None:
         self.library = open_library(library)
-        linked = ctypes.c_int.in_dll(self.library, "gyrobench_linked").value
+        self.linked = bool(ctypes.c_int.in_dll(self.library, "gyrobench_linked").value)
         self.program, self.board = program, board
         self.instances = [instances[p.slot] for p in program.parts]
         self.keep: list[Any] = []
@@ -106,7 +107,7 @@ class NativeEngine:
         for part, p, instance in zip(parts, program.parts, self.instances, strict=True):
             part.component = instance.component
             part.step, part.fmi3 = instance.pointer("DoStep"), instance.fmi3
-            if linked and not checks_inputs(p):
+            if self.linked and not checks_inputs(p):
                 part.step = instance.address("gyrobench_step")
             for name in ("sets", "gets", "channel_gets", "window_gets"):
                 groups: list[VariableGroup] = getattr(p, name)
@@ -186,6 +187,10 @@ class NativeEngine:
             state.finished = True
         if code == FAILED:
             instance, when = self.instances[at.part], t0 + state.k * h
+            if self.linked:  # doStep tells why a step failed
+                with contextlib.suppress(FmuCallError):
+                    instance.do_step(when, h)
+                at.call = 0
             if r.failed_status == OUT_OF_RANGE:
                 kind = TYPES[call - (GET if call > STEP else SET)]
                 raise FmuCallError(instance.slot, CALLS[call], kind.refusal, when)

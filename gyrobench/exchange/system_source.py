@@ -9,7 +9,7 @@ from pathlib import Path
 from gyrobench import packaging
 from gyrobench.component.component import Component
 from gyrobench.component.declarations import Scalar
-from gyrobench.engine.linked_system import HELPER, READ, assignments, places
+from gyrobench.engine.linked_system import HELPER, READ, assignments, checks_inputs, places
 from gyrobench.engine.program import Program
 from gyrobench.packaging.linked_parts import c_name, linked_files
 from gyrobench.packaging.native_target import header_folder
@@ -69,7 +69,8 @@ def model_text(s: SystemSource, guid: str) -> str:
         refresh = [f"refresh_{part[p.slot]}(&parts->p{i});"] * bool(p.gets)
         wires += refresh
         reads += refresh
-        steps += [f"/* {p.slot} */", *sets, f"do_step_{part[p.slot]}(&parts->p{i}, t, h);"]
+        step = "do_step" if checks_inputs(p) else "linked_step"
+        steps += [f"/* {p.slot} */", *sets, f"{step}_{part[p.slot]}(&parts->p{i}, t, h);"]
         steps += [f"if (parts->p{i}.failed) return {i};"]
         inits += [f"initialize_{part[p.slot]}(&parts->p{i}, t0);", f"if (parts->p{i}.failed) return;"]
         begins += [f'begin_{part[p.slot]}(&parts->p{i}, "{p.slot}");', f"parts->p{i}.n.v.t = t0;"]

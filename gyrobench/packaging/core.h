@@ -118,14 +118,14 @@ static void draw_start(Part *p) { /* what is drawn once, and the first samples o
 static inline void draw(Part *p) { /* the samples of an internal step */
 #if N_PORTS > 0
     const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
-    const double *ahead;
+    const double *ahead, by[] = {1.0, p->kept.root};
     int i, n;
     if (!p->kept.keyed) prepare_noise(p);
     n = p->kept.n_drawn;
     if (count - p->kept.first >= AHEAD) make_noise(p, count); /* unsigned: before the first too */
     ahead = p->kept.ahead + (count - p->kept.first) * n;
     for (i = 0; i < n; i++)
-        value(p)[p->kept.drawn[i].sample] = p->kept.drawn[i].density ? ahead[i] / p->kept.root : ahead[i];
+        value(p)[p->kept.drawn[i].sample] = ahead[i] / by[p->kept.drawn[i].density];
 #else
     (void)p;
     (void)prepare_noise;
@@ -330,11 +330,23 @@ static void initialize(Part *p, double t0) {
     if (!p->failed && tell_finite(p)) p->n.running = 1.0;
 }
 
-static NEVER_INLINE void proceed(Part *p, double t, double step) { /* do_step after the checks of its arguments */
-    double largest, h;
+static int can_step(Part *p, double t, double step) {
+    if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
+        fail(p, "a step must be positive and finite, not %g s", plain(step));
+        return 0;
+    }
+    p->n.v.t = t;
+    return all_finite(value(p) + U0, N_U) || told_finite(p, U0, N_U, "input");
+}
+
+/* A step in the linked form of a system: its inputs are outputs of parts, which have checked them, but for the first,
+   before which outputs may follow inputs that came after the end of initialization.  Returns 0, or 3 as FMI does. */
+static NEVER_INLINE int linked_step(Part *p, double t, double step) {
+    double largest, h, sum[4] = {0.0, 0.0, 0.0, 0.0};
     int k, n;
     largest = LARGEST_STEP(p, step);
     if (step != p->kept.step || largest != p->kept.largest) {
+        if (!can_step(p, t, step)) return 3;
         n = (int)ceil(step / largest - 1e-9);
         p->kept.n = n < 1 ? 1 : n;
         p->kept.h = step / p->kept.n;
@@ -347,7 +359,8 @@ static NEVER_INLINE void proceed(Part *p, double t, double step) { /* do_step af
     p->n.v.h = h;
     p->n.v.step_start = t;
     p->n.v.step_end = t + n * h;
-    for (k = 0; k < n; k++) {
+    k = 0;
+    do { /* at least one */
         p->n.v.t = t + k * h;
         p->n.v.tick = p->n.v.tick + 1.0;
         draw(p);
@@ -356,25 +369,16 @@ static NEVER_INLINE void proceed(Part *p, double t, double step) { /* do_step af
 #endif
         p->n.v.t = t + (k + 1) * h;
         ticks(p);
-        if (p->failed) return;
-    }
+        if (p->failed) return 3;
+    } while (++k < n);
     const int anew = renew(p);
     p->n.dirty = 0.0;
-    if (p->failed) return;
-    if (anew && !all_finite(value(p) + Y0, DX0 - Y0)) tell_finite(p); /* outputs and states */
-    for (k = 0; k < N_STEPPED; k++)
-        if (!all_finite(value(p) + stepped[k].from, stepped[k].n)) tell_finite(p);
+    if (p->failed) return 3;
+    if (anew || N_X > 0) add_up(value(p) + Y0, DX0 - Y0, sum); /* outputs and states */
+    for (k = 0; k < N_STEPPED; k++) add_up(value(p) + stepped[k].from, stepped[k].n, sum);
+    return (finite_sum(sum) || tell_finite(p)) ? 0 : 3;
 }
 
-static int inputs_are_finite(Part *p) {
-    return all_finite(value(p) + U0, N_U) || told_finite(p, U0, N_U, "input");
-}
-
-static void do_step(Part *p, double t, double step) {
-    if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
-        fail(p, "a step must be positive and finite, not %g s", plain(step));
-        return;
-    }
-    p->n.v.t = t;
-    if (inputs_are_finite(p)) proceed(p, t, step);
+static inline void do_step(Part *p, double t, double step) {
+    if (can_step(p, t, step)) linked_step(p, t, step);
 }

@@ -175,19 +175,19 @@ def written(source: Source) -> set[str]:
 
 
 def followed(source: Source) -> list[str] | None:
-    """Return the inputs and changing discretes that ``outputs`` reads, discretes first.
+    """Return the inputs and changing discretes that ``outputs`` reads, discretes first; none: the outputs stay.
 
     None where it reads states, noise or time, with which it changes at every step, and where it is too short (no loop,
     no product of arrays) to be worth looking.
     """
-    codes = [c for _, code in source.equations["outputs"] for c in reached(code, source)]
-    if not any(isinstance(n, ast.For | ast.MatMult) for c in codes for n in c.nodes()):
-        return None
     read = set().union(*(read_names(code, source) for _, code in source.equations["outputs"]))
     declared = source.cls.declarations
     if any(n in TIMES or n.startswith(("der.", "noise.")) or isinstance(declared.get(n), State) for n in read):
         return None
     changing = written(source)
-    return [n for n in declared if n in read & changing] + [
+    found = [n for n in declared if n in read & changing] + [
         n for n in declared if n in read and isinstance(declared[n], Input)
     ]
+    codes = [c for _, code in source.equations["outputs"] for c in reached(code, source)]
+    long = any(isinstance(n, ast.For | ast.MatMult) for c in codes for n in c.nodes())
+    return found if long or not found else None

@@ -26,9 +26,8 @@ static double plain(double x) { return x != x ? (double)NAN : x; } /* prints "na
 /* An index that is known only when it runs. */
 static inline int whole(double x) { return x > -1e9 && x < 1e9 ? (int)x : -1; }
 
-/* 0 when one is not finite, or when large ones add up to more than a double holds: told_finite knows. */
-static inline int all_finite(const double *a, int n) {
-    double sum[4] = {0.0, 0.0, 0.0, 0.0}; /* four, for each addition waits for the one before it */
+/* Adds n numbers to sums, four, for each addition waits for the one before it. */
+static inline void add_up(const double *a, int n, double sum[4]) {
     int i;
     for (i = 0; i + 3 < n; i += 4) {
         sum[0] = sum[0] + a[i];
@@ -39,7 +38,15 @@ static inline int all_finite(const double *a, int n) {
     if (i < n) sum[0] = sum[0] + a[i];
     if (i + 1 < n) sum[1] = sum[1] + a[i + 1];
     if (i + 2 < n) sum[2] = sum[2] + a[i + 2];
-    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) * 0.0 == 0.0;
+}
+
+/* 0 when one was not finite, or when large ones add up to more than a double holds: told_finite knows. */
+static inline int finite_sum(const double sum[4]) { return ((sum[0] + sum[1]) + (sum[2] + sum[3])) * 0.0 == 0.0; }
+
+static inline int all_finite(const double *a, int n) {
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    add_up(a, n, sum);
+    return finite_sum(sum);
 }
 
 /* -------------------------------------------------------------------------------------- functions */

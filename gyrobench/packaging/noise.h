@@ -37,41 +37,30 @@ static inline void quantile_middle(lanes *at) { /* by address: a vector that is 
              + 4.2313330701600911252e+1) * r + 1.0);
 }
 
-static double quantile_tail(double p, double q) {
-    double r, x;
-    r = q <= 0.0 ? p : 1.0 - p;
-    r = sqrt(-log(r));
-    if (r <= 5.0) {
-        r = r - 1.6;
-        x = (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r + 2.41780725177450611770e-1) * r
+static inline void quantile_tail(lanes *at) { /* of r = sqrt(-log(min(p, 1 - p))) <= 5: its absolute value */
+    const lanes r = *at - 1.6;
+    *at = (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r + 2.41780725177450611770e-1) * r
                 + 1.27045825245236838258e+0) * r + 3.64784832476320460504e+0) * r + 5.76949722146069140550e+0) * r
              + 4.63033784615654529590e+0) * r + 1.42343711074968357734e+0)
-          / (((((((1.05075007164441684324e-9 * r + 5.47593808499534494600e-4) * r + 1.51986665636164571966e-2) * r
+         / (((((((1.05075007164441684324e-9 * r + 5.47593808499534494600e-4) * r + 1.51986665636164571966e-2) * r
                 + 1.48103976427480074590e-1) * r + 6.89767334985100004550e-1) * r + 1.67638483018380384940e+0) * r
              + 2.05319162663775882187e+0) * r + 1.0);
-    } else {
-        r = r - 5.0;
-        x = (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r + 1.24266094738807843860e-3) * r
-                + 2.65321895265761230930e-2) * r + 2.96560571828504891230e-1) * r + 1.78482653991729133580e+0) * r
-             + 5.46378491116411436990e+0) * r + 6.65790464350110377720e+0)
-          / (((((((2.04426310338993978564e-15 * r + 1.42151175831644588870e-7) * r + 1.84631831751005468180e-5) * r
-                + 7.86869131145613259100e-4) * r + 1.48753612908506148525e-2) * r + 1.36929880922735805310e-1) * r
-             + 5.99832206555887937690e-1) * r + 1.0);
-    }
-    return q < 0.0 ? -x : x;
 }
 
-static inline int in_middle(double q) { return fabs(q) <= 0.425; }
+static double quantile_end(double r) { /* the same beyond 5: once in 4e10 numbers */
+    r = r - 5.0;
+    return (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r + 1.24266094738807843860e-3) * r
+                + 2.65321895265761230930e-2) * r + 2.96560571828504891230e-1) * r + 1.78482653991729133580e+0) * r
+             + 5.46378491116411436990e+0) * r + 6.65790464350110377720e+0)
+         / (((((((2.04426310338993978564e-15 * r + 1.42151175831644588870e-7) * r + 1.84631831751005468180e-5) * r
+                + 7.86869131145613259100e-4) * r + 1.48753612908506148525e-2) * r + 1.36929880922735805310e-1) * r
+             + 5.99832206555887937690e-1) * r + 1.0);
+}
 
-BY_PROCESSOR static void normals(uint64_t key, uint64_t count, double out[AHEAD]) { /* of count, count + 1, ... */
-    double p[AHEAD];
+/* The normal quantiles of p[i]: those of the middle all at once, then the others again, none by a branch that half take. */
+static inline void quantiles(const double p[AHEAD], double out[AHEAD]) {
+    double root[AHEAD], tail[AHEAD];
     int rare[AHEAD], n = 0, i;
-    for (i = 0; i < AHEAD; i++) {
-        const uint64_t z = mix(key + (count + (uint64_t)i) * GAMMA);
-        p[i] = ((double)(int64_t)(z >> 11) + 0.5) * 0x1p-53;
-        rare[n] = i;
-        n += !in_middle(p[i] - 0.5);
-    }
     for (i = 0; i < AHEAD; i += LANES) {
         lanes q;
         memcpy(&q, p + i, sizeof q);
@@ -79,5 +68,32 @@ BY_PROCESSOR static void normals(uint64_t key, uint64_t count, double out[AHEAD]
         quantile_middle(&q);
         memcpy(out + i, &q, sizeof q);
     }
-    for (i = 0; i < n; i++) out[rare[i]] = quantile_tail(p[rare[i]], p[rare[i]] - 0.5);
+    for (i = 0; i < AHEAD; i++) {
+        rare[n] = i;
+        n += !(fabs(p[i] - 0.5) <= 0.425);
+    }
+    for (i = 0; i < n; i++) {
+        const double below = p[rare[i]], above = 1.0 - below;
+        root[i] = sqrt(-log(below < above ? below : above));
+    }
+    for (; i % LANES != 0; i++) root[i] = 2.0; /* no one reads these */
+    for (i = 0; i < n; i += LANES) {
+        lanes x;
+        memcpy(&x, root + i, sizeof x);
+        quantile_tail(&x);
+        memcpy(tail + i, &x, sizeof x);
+    }
+    for (i = 0; i < n; i++)
+        out[rare[i]] = copysign(root[i] <= 5.0 ? tail[i] : quantile_end(root[i]), p[rare[i]] - 0.5);
+}
+
+/* The normal numbers of count, count + 1, ... */
+BY_PROCESSOR static void normals(uint64_t key, uint64_t count, double out[AHEAD]) {
+    double p[AHEAD];
+    int i;
+    for (i = 0; i < AHEAD; i++) {
+        const uint64_t z = mix(key + (count + (uint64_t)i) * GAMMA);
+        p[i] = ((double)(int64_t)(z >> 11) + 0.5) * 0x1p-53;
+    }
+    quantiles(p, out);
 }

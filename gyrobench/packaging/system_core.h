@@ -120,6 +120,11 @@ static void do_step(Part *p, double t, double step) {
     if (inputs_are_finite(p)) proceed(p, t, step);
 }
 
+static int linked_step(Part *p, double t, double step) {
+    do_step(p, t, step);
+    return p->failed ? 3 : 0;
+}
+
 static void begin(Part *p, const char *name) { /* as instantiated */
     memset(p, 0, sizeof *p);
     snprintf(p->name, sizeof p->name, "%s", name ? name : "");

@@ -30,9 +30,10 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
         '#include "model.c"\n'
         '#define SEEN __attribute__((visibility("default")))\n'
         "SEEN double ask_quantile(double p) {\n"
-        "    lanes x = {p - 0.5};\n"
-        "    quantile_middle(&x);\n"
-        "    return in_middle(p - 0.5) ? ((const double *)&x)[0] : quantile_tail(p, p - 0.5);\n"
+        "    double at[AHEAD], x[AHEAD];\n"
+        "    for (int i = 0; i < AHEAD; i++) at[i] = i == 7 ? p : 0.01 * (i + 1);\n"
+        "    quantiles(at, x);\n"
+        "    return x[7];\n"
         "}\n"
         "SEEN double ask_normal(uint64_t s, int port, uint64_t k, int ahead) {\n"
         "    double out[AHEAD];\n"

@@ -19,6 +19,7 @@ OUT = ["f[1]", "f[2]", "f[3]"]
 def test_which_parts_keep_their_outputs() -> None:
     assert followed(Source(load_part("fixture"))) == ["mount", "omega_face", "alpha_face", "f_face"]
     assert followed(Source(load_part("sequencer"))) == ["now", "stage"]  # start-only discretes stay as they are
+    assert followed(Source(load_part("site"))) == []  # nothing changes its outputs while it runs
     for changing in ("floated_gyro", "table_servo", "rebalance_analog"):  # state, state, noise
         assert followed(Source(load_part(changing))) is None
 
@@ -37,6 +38,18 @@ def test_inputs_set_and_set_back(instance: Callable[..., Any], face: str) -> Non
     one.set({"f_face[1]": 0.0, **first})
     one.step(1e-3, 1e-3)
     assert one.get(OUT) == was
+
+
+@pytest.mark.parametrize("face", ["native", "native-fmi3"])
+def test_outputs_that_nothing_changes_follow_the_parameters(instance: Callable[..., Any], face: str) -> None:
+    one = instance("site", face)
+    for gravity in (9.8, 9.81):
+        one.set({"gravity": gravity})
+        one.initialize()
+        for k in range(3):
+            one.step(k * 1e-3, 1e-3)
+            assert one.get(OUT) == [0.0, 0.0, gravity]
+        one.reset()
 
 
 @pytest.mark.parametrize("face", ["native", "native-fmi3"])
