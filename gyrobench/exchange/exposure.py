@@ -78,8 +78,8 @@ class _Chooser:
             if ends is not None and changed != ends:
                 return None
             ends = changed
-        if not ends or any(f"{slot}.{variable}" in self.wired for slot, variable in ends):
-            return None
+        if not ends or any(not slot or f"{slot}.{variable}" in self.wired for slot, variable in ends):
+            return None  # it changes nothing, a time of the run, or an input with a wire
         return Choice(name, "parameter", tuple(sorted(ends)))
 
     def settings(self, system: System) -> dict[tuple[str, str], Any]:

@@ -89,6 +89,17 @@ def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Pa
     assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md"} <= set(names)
 
 
+def test_an_option_that_is_the_time_of_the_run_is_built_in(tmp_path: Path) -> None:
+    bench = Path(__file__).parents[1] / "benchmarks" / "bench"
+    export_fmu(load_system("loop", bench), tmp_path / "loop.fmu", values={"duration": 2.0}, bench=bench)
+    description = read_model_description(str(tmp_path / "loop.fmu"))
+    assert {v.name: v.causality for v in description.modelVariables if v.causality != "independent"} == {
+        "plant.position": "output",
+        "controller.u": "output",
+    }
+    assert float(description.defaultExperiment.stopTime) == 2.0
+
+
 class Instance:
     """The FMU by FMI calls."""
 
