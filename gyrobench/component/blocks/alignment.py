@@ -119,10 +119,13 @@ class AlignmentCovariance(Block):
         e = exp(-h / tau)
         for i in range(N):
             for j in range(N):
-                square = 0.0
-                for k in range(N):
-                    square = square + self.F[i][k] * self.F[k][j]
-                self.T[i][j] = h * self.F[i][j] + 0.5 * h * h * square
+                self.T[i][j] = 0.0
+            for k in range(N):
+                if self.F[i][k] != 0.0:  # as a tenth of them
+                    for j in range(N):
+                        self.T[i][j] = self.T[i][j] + self.F[i][k] * self.F[k][j]
+            for j in range(N):
+                self.T[i][j] = h * self.F[i][j] + 0.5 * h * h * self.T[i][j]
             self.T[i][i] = self.T[i][i] + 1.0
         for i in range(3):
             self.T[M + i][M + i] = e
@@ -149,7 +152,8 @@ class AlignmentCovariance(Block):
         for i in range(N):
             self.c[i] = 0.0
             for k in range(N):
-                self.c[i] = self.c[i] + 0.5 * h * self.F[i][k] * self.F[k][index(place)]
+                if self.F[i][k] != 0.0:
+                    self.c[i] = self.c[i] + 0.5 * h * self.F[i][k] * self.F[k][index(place)]
             self.c[i] = self.c[i] + self.F[i][index(place)]
         for i in range(N):
             for j in range(N):
@@ -167,13 +171,17 @@ class AlignmentCovariance(Block):
         for i in range(N):
             for j in range(N):
                 self.TP[i][j] = 0.0
-                for k in range(N):
-                    self.TP[i][j] = self.TP[i][j] + self.T[i][k] * self.P[k][j]
-        for i in range(N):
-            for j in range(N):
+            for k in range(N):
+                if self.T[i][k] != 0.0:
+                    for j in range(N):
+                        self.TP[i][j] = self.TP[i][j] + self.T[i][k] * self.P[k][j]
+        for j in range(N):
+            for i in range(N):
                 self.P[i][j] = 0.0
-                for k in range(N):
-                    self.P[i][j] = self.P[i][j] + self.TP[i][k] * self.T[j][k]
+            for k in range(N):
+                if self.T[j][k] != 0.0:
+                    for i in range(N):
+                        self.P[i][j] = self.P[i][j] + self.TP[i][k] * self.T[j][k]
 
     def sigma(self, place: Number) -> Number:
         """Return the standard deviation of the error at a place."""
