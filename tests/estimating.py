@@ -143,6 +143,38 @@ def padded(**matrices: Array) -> dict[str, Array]:
     return found
 
 
+#: model that estimator_aided is told, and that aided_series draws
+AIDED = {
+    "Ts": 0.01, "q": 3.0, "walk": 1e-4, "R": 4e-4, "k": 2.0, "drift": 0.3, "sigma_angle": 5e-3, "P0_slope": 0.5,
+}  # fmt: skip
+
+
+def aided_model() -> tuple[Array, Array]:
+    """exp(A T) and the covariance of the driving noise over T of (value, slope, drift, angle), by Van Loan."""
+    from scipy.linalg import expm
+
+    A = np.zeros((4, 4))
+    A[0, 1], A[3, 0] = 1.0, AIDED["k"]
+    big = np.zeros((8, 8))
+    big[:4, :4], big[4:, 4:], big[:4, 4:] = -A, A.T, np.diag([0.0, AIDED["q"], AIDED["walk"], 0.0])
+    e = expm(big * AIDED["Ts"])
+    F = e[4:, 4:].T
+    return F, F @ e[:4, 4:]
+
+
+def aided_series(rng: np.random.Generator, n: int, every: int) -> tuple[Array, Array, Array]:
+    """States of that model, (n, 4), readings (n,) and angles (n,), NaN but for one in ``every``."""
+    F, Q = aided_model()
+    root = np.linalg.cholesky(Q + 1e-18 * np.eye(4))
+    x = rng.normal(size=4) * [1.0, np.sqrt(AIDED["P0_slope"]), AIDED["drift"], 0.0]
+    X = np.empty((n, 4))
+    for k in range(n):
+        X[k] = x = F @ x + root @ rng.normal(size=4)
+    z = X[:, 0] + X[:, 2] + np.sqrt(AIDED["R"]) * rng.normal(size=n)
+    read = np.arange(1, n + 1) % every == 0
+    return X, z, np.where(read, X[:, 3] + AIDED["sigma_angle"] * rng.normal(size=n), np.nan)
+
+
 def riccati(F: Array, G: Array, R: float) -> tuple[float, float]:
     """Steady gain of the first state and variance of its estimate, from scipy's solve_discrete_are."""
     from scipy.linalg import solve_discrete_are

@@ -169,6 +169,8 @@ LOOPS: tuple[Socket, ...] = (
         (
             inp("z", "", "the measurement"),
             inp("valid", "1", "0 marks a measurement to be left out", optional=True, whole=True),
+            inp("angle", "rad", "angle of a reference that aids it", optional=True),
+            inp("angle_new", "1", "1 in the step in which that angle is read", optional=True, whole=True),
             out("estimate", "", "estimate of the signal"),
             out("variance", "", "its variance, square of the unit", optional=True),
             out("innovation", "", "measurement minus prediction", optional=True),

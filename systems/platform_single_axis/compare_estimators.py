@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 NAMES = (
     "none", "moving_average", "alpha_beta_gamma", "kalman_ar", "kalman_rate", "kalman_robust", "sage_husa", "wavelet",
+    "aided",
 )  # fmt: skip
 SYSTEM, FREQUENCY, LAG = "platform_single_axis", 10.0, 8.0  # Hz, degrees
 MARGIN, SEARCHED = 55.0, (5.0, 20.0)  # degrees; Hz
@@ -48,7 +49,7 @@ def kalman_gain(F: Array, Q: Array, R: float) -> Array:
 
 
 def rate_response(q: float, R: float, f: float, step: float) -> complex:
-    """Of estimator_kalman_rate, the same with a gate, and of estimator_sage_husa whose R is right: value and slope."""
+    """Of estimator_kalman_rate, the same with a gate or aided, and of estimator_sage_husa whose R is right."""
     T = step
     F = np.array([[1.0, T], [0.0, 1.0]])
     return response(F, kalman_gain(F, q * np.array([[T**3 / 3.0, T**2 / 2.0], [T**2 / 2.0, T]]), R), f, T)
@@ -83,7 +84,7 @@ def tuned(name: str, f: float, lag: float, step: float, variance: float) -> dict
 
     delay = lag / (360.0 * f) / step  # in readings
     follows = [math.log((2.0 * math.pi * f * x) ** 4 * variance * step) for x in (1.0, 30.0)]  # natural frequencies
-    if name in ("estimator_kalman_rate", "estimator_kalman_robust", "estimator_sage_husa"):
+    if name in ("estimator_kalman_rate", "estimator_kalman_robust", "estimator_sage_husa", "estimator_aided"):
         return {"q": math.exp(solved(lambda x: rate_response(math.exp(x), variance, f, step), *follows))}
     if name == "estimator_alpha_beta_gamma":
         theta = solved(lambda x: tracking_response(x, f, step), 0.5, 1.0 - 2.0 * math.pi * f * step)

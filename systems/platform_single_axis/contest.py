@@ -27,14 +27,30 @@ BRACKET = Socket(
         out("omega_gyro", "rad/s", "inertial rate of the gyro's mount, platform axes", 3),
     ),
 )
+REFERENCE = Socket(
+    "AngleReference",
+    "reads the angle of a platform now and then",
+    (
+        inp("theta", "rad", "angle of the platform"),
+        inp("phase", "1", "number of the running phase, from 1", whole=True),
+        out("angle", "rad", "last reading, from the angle with which its phase began"),
+        out("new", "1", "1 in the step in which the angle is read", whole=True),
+        out("off", "rad", "the same without noise, in every step"),
+    ),
+)
 TEST = 0.02  # V, of the sines: a filter that adapts must not take them for noise
 MODE = 120.0  # Hz, bending mode of the gyro's bracket
 LINE, LINE_SIZE = 87.0, 0.01  # Hz, A: a line that the gyro reads and the platform does not follow
 LOUDER = 3.0  # times the noise of the reading that the estimators are set for
 GAP_PERIOD, GAP = 0.73, 0.030  # s: not a multiple of the ride's period, so that gaps come at all its phases
 WILD_PERIOD, WILD = 0.37, 0.2  # s, A
+ANGLE_PERIOD, ANGLE_NOISE = 0.73, 2.0 * math.pi / 648000.0  # s, rad: an angle reference as slow as the gaps are
+TAKEN_BACK = 1.0  # s, in which an aided estimator takes the angle back: 60 times slower than the loop
 BENDING = "bending"
-RIDES = {"line": "ride, line", "noise": "ride, more noise", "gaps": "ride, gaps", "wild": "ride, wild readings"}
+RIDES = {
+    "line": "ride, line", "noise": "ride, more noise", "gaps": "ride, gaps", "wild": "ride, wild readings",
+    "aided": "ride, aided",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,7 +75,7 @@ class Contest:
         ]
 
     def parameters(self) -> dict[str, Any]:
-        """Return the parameters of channel and bracket; each disturbance is there in its ride."""
+        """Return the parameters of channel, bracket and reference; each is there in its ride."""
         labels = [p.label for p in self.phases()]
         number = {key: labels.index(label) + 1 for key, label in RIDES.items()}
         return {
@@ -75,4 +91,7 @@ class Contest:
             "channel.wild_period": WILD_PERIOD,
             "channel.wild_size": WILD,
             "channel.wild_phase": number["wild"],
+            "reference.period": ANGLE_PERIOD,
+            "reference.reading": ANGLE_NOISE,
+            "reference.phase_read": number["aided"],
         }

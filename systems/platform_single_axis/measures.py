@@ -25,6 +25,7 @@ PURPOSES = {
     "error, more noise": "Where the noise grows in the run",
     "error, gaps": "Where readings are missing",
     "peak voltage, wild readings": "Where readings are wild",
+    "error, aided": "Where an angle reference aids the platform",
 }
 
 
@@ -99,6 +100,10 @@ def disturbed(found: LoopFindings) -> None:
             (parts,) = segment_phasors(ride.t, LINE, ride[VOLTAGE])
             u = float(np.std(np.abs(parts), ddof=1)) / math.sqrt(parts.size)
             found.measure("line voltage", "amplitude of the line in the voltage of the motor", "V", size, u)
+        elif ride.label == RIDES["aided"]:
+            off = level(ride["reference.off"])
+            meaning = "angle from the direction of the reference in the ride with one, rms: the wander counts"
+            found.measure("error, aided", meaning, "″", off.value / ARCSEC, off.u / ARCSEC)
         elif ride.label in RIDES.values():
             what = ride.label.removeprefix("ride, ")
             error = level(jitter(ride[ANGLE], round(2.0 / ride.f / period(ride))))

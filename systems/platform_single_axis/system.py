@@ -10,7 +10,7 @@ from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option, Slot
 
-from .contest import BRACKET, CHANNEL, Contest
+from .contest import ANGLE_NOISE, BRACKET, CHANNEL, REFERENCE, TAKEN_BACK, Contest
 
 PICKOFF_NOISE = 5e-8  # V/sqrt(Hz)
 REBALANCE = 100.0  # Hz, bandwidth of the rebalance loop: the float follows with 2 pi this
@@ -63,6 +63,16 @@ class PlatformSingleAxisLoop(OneAxisTest):
             """,
             instead_of="platform -> gyro: omega f",
         ),
+        "reference": OnRequest(
+            {"reference": Slot(REFERENCE, "angle_reference")},
+            """
+            platform.attitude -> reference.theta
+            exciter.phase -> reference.phase
+            reference.angle -> estimator.angle
+            reference.new -> estimator.angle_new
+            """,
+            channels=("reference.off",),
+        ),
     }
     options = {
         "crossover": Option(10.0, "Hz", "crossover for which the gain of the stabilizer is set", 0.5, 20.0),
@@ -73,9 +83,9 @@ class PlatformSingleAxisLoop(OneAxisTest):
         "hold": Option(60.0, "s", "time of ride, and of the drift hold", 10.0, 3600.0),
         "reading_noise": Option(1e-5, "A/sqrt(Hz)", "noise density of the current that is read", 0.0),
         **PROFILE,
-        "contest": Option(False, bool, "the plan that compares estimators: bending, line, noise, gaps, wild readings"),
+        "contest": Option(False, bool, "the plan that compares estimators: bending, line, noise, gaps, wild, aiding"),
     }
-    noises = (*noises(), "rebalance.meter", "channel.white")
+    noises = (*noises(), "rebalance.meter", "channel.white", "reference.reading")
     step = 5e-4
     channels = (
         *OneAxisTest.channels, "platform.saturated", "rebalance.i_read", "rebalance.saturated", "estimator.estimate",
@@ -90,8 +100,8 @@ class PlatformSingleAxisLoop(OneAxisTest):
     def set(self, name: str, value: Any) -> None:
         super().set(name, value)
         if self["contest"]:
-            self.request("channel")
-            self.request("bracket")
+            for slot in self.on_request:
+                self.request(slot)
 
     def phases(self) -> list[LoopPhase]:
         """Step of torque, step of commanded rate, test sines for the loop, sines of the base, ride, drift."""
@@ -159,6 +169,9 @@ class PlatformSingleAxisLoop(OneAxisTest):
             "estimator.R0?": variance,
             "estimator.q?": wide * variance * self.step,
             "estimator.sigma?": math.sqrt(variance),
+            "estimator.k?": k,
+            "estimator.sigma_angle?": ANGLE_NOISE,
+            "estimator.T_c?": TAKEN_BACK,
             **{f"stabilizer.{name}?": x for name, x in stabilizer.items()},
             "stabilizer.K_u?": 1.0 / k,
             **(self.contest().parameters() if self["contest"] else {}),

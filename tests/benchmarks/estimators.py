@@ -1,16 +1,20 @@
 """NEES and NIS of every Kalman filter of the bench on series drawn from its own model, 1,000 runs of each.
 
-    python tests/benchmarks/estimators.py            # all; half a minute
+    python tests/benchmarks/estimators.py            # all; three minutes of CPU
     python tests/benchmarks/estimators.py --runs 200 lti coefficients
     python tests/benchmarks/estimators.py --days 40  # instead: the live estimate of servo_polar, shortened days
 
 NEES: mean of error' P^-1 error at the end of a run over its degrees of freedom; NIS: of all innovations of all runs.
+The attitude filters run in attitude_estimator, the drift compensator in drift_compensation: those of the others are
+drawn here.  Parts that state a standard deviation without being a Kalman filter are counted elsewhere: north finders
+and the alignment of a platform in north_finder.py and platform_alignment.py.
 Each should be 1; the bounds of 99 % are those of chi-square.  Rows "wrong: ..." are told a wrong model.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -23,10 +27,24 @@ from scipy import linalg, stats
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import polar_drift
-from estimating import AR3, SIGMA2, autoregressive, companion, kalman_of_many, padded, play, rate_model
+from estimating import (
+    AIDED,
+    AR3,
+    SIGMA2,
+    aided_model,
+    aided_series,
+    autoregressive,
+    companion,
+    kalman_of_many,
+    padded,
+    play,
+    rate_model,
+)
 from polar_drift import DPH, PRIOR, Day, Noise
 
+from gyrobench.engine.session import Session
 from gyrobench.packaging.instance import make
+from gyrobench.system.system import load_system
 
 Array = np.ndarray[Any, Any]
 #: NEES of each run, its degrees of freedom, sum of NIS of each run, their number
@@ -150,6 +168,102 @@ def at_the_stop(rng: np.random.Generator, runs: int) -> Count:
     return np.array(nees), 5, np.zeros(0), 0
 
 
+def aided(rng: np.random.Generator, runs: int) -> Count:
+    """80 readings, every eighth with an angle; rate and drift at the end, their covariance from the matrices."""
+    F, Q = aided_model()
+    P, R = np.diag([1.0, AIDED["P0_slope"], AIDED["drift"] ** 2, 0.0]), [AIDED["R"], AIDED["sigma_angle"] ** 2]
+    first, rows = True, np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    for k in range(1, 81):
+        P = F @ P @ F.T + Q
+        if first:  # the angle begins with its first reading, and nothing is known of the drift before
+            P[3], P[:, 3] = 0.0, 0.0
+        for j in range(1 + (k % 8 == 0)):
+            if j and first:
+                first, P[3, 3] = False, R[1]
+                continue
+            gain = P @ rows[j] / (rows[j] @ P @ rows[j] + R[j])
+            gain[2] *= not first
+            L = np.eye(4) - np.outer(gain, rows[j])
+            P = L @ P @ L.T + R[j] * np.outer(gain, gain)
+    P, one, nees, nis = P[np.ix_([0, 2], [0, 2])], make("estimator_aided", "native"), [], []
+    for _ in range(runs):
+        X, z, angle = aided_series(rng, 80, 8)
+        one.set({**AIDED, "T_c": 0.0})
+        one.initialize(0.0)
+        total = 0.0
+        for k, (reading, a) in enumerate(zip(z.tolist(), angle.tolist(), strict=True)):
+            new = math.isfinite(a)
+            one.set({"z": reading, "angle": a if new else 0.0, "angle_new": float(new)})
+            one.step(k * AIDED["Ts"], AIDED["Ts"])
+            total += one.get(["nis"])[0]
+        error = np.array(one.get(["estimate", "b"])) - X[-1, [0, 2]]
+        nees.append(error @ np.linalg.solve(P, error))
+        nis.append(total)
+        one.reset()
+    one.free()
+    return np.array(nees), 2, np.array(nis), 80
+
+
+def ended(channels: Any, name: str, row: int) -> Array:
+    """A vector of three at a sample of a record."""
+    return np.array([channels[f"{name}[{k}]"][row] for k in (1, 2, 3)])
+
+
+def attitude(part: str, rocking: str, rng: np.random.Generator, runs: int) -> Count:
+    """Attitude and biases after a minute of rest and one of rocking; NIS of the readings of one step a second."""
+    system = load_system("attitude_estimator")
+    reduction = importlib.import_module(".reduction", type(system).__module__)
+    short = {"phases": "rest rocking", "rest": 60.0, "cycles": 6, "rocking": rocking}
+    nees, nis, used = [], [], []
+    with Session(system.with_values(short), parts={"estimator": part}) as session:
+        for seed in rng.integers(1, 2**31, runs):
+            c = session.run({}, seed=int(seed)).channels
+            inside = np.flatnonzero(c["exciter.gate"] > 0.5)
+            last = int(inside[-1])
+            turned = reduction.attitude_errors(
+                ended(c, "estimator.angle", last)[None], ended(c, "motion.angle", last)[None]
+            )
+            error = np.append(turned[0], reduction.true_bias(c)[last] - ended(c, "estimator.bias", last))
+            pairs = [[f"estimator.covariance[{min(i, j)},{max(i, j)}]" for j in range(1, 7)] for i in range(1, 7)]
+            scale = np.array([1.0] * 3 + [1e-6] * 3)  # numbers near 1
+            P = np.array([[c[name][last] for name in row] for row in pairs]) / np.outer(scale, scale)
+            nees.append(error / scale @ np.linalg.solve(P, error / scale))
+            nis.append(c["estimator.nis"][inside].sum())
+            used.append(c["estimator.used"][inside].sum())
+    return np.array(nees), 6, np.array(nis), round(float(np.mean(used)))
+
+
+def compensated(rng: np.random.Generator, runs: int) -> Count:
+    """Records of 6 h: drift, commanded angle and table angle at the end of each; the filter compensates its drift."""
+    system = load_system("drift_compensation").with_values({"records": runs})
+    reduction = importlib.import_module(".reduction", type(system).__module__)
+    with Session(system) as session:
+        c = session.run({}, seed=int(rng.integers(1, 2**31))).channels
+    rows = reduction.whole_records(c, float(system["length"]), float(system["Ts"]))
+    last, scale = rows[:, -1], np.array([system["rms"], system["sigma"], system["sigma"]])
+    names = (("M", "estimate"), ("alpha", "alpha"), ("theta", "theta"))
+    error = np.column_stack([c[f"table.{x}"][last] - c[f"compensator.{y}"][last] for x, y in names]) / scale
+    pairs = [[f"compensator.covariance[{min(i, j)},{max(i, j)}]" for j in (1, 2, 3)] for i in (1, 2, 3)]
+    P = np.array([[c[name][last] for name in row] for row in pairs]).transpose(2, 0, 1)
+    nees = np.einsum("ni,ni->n", error, np.linalg.solve(P, error[..., None])[..., 0])
+    return nees, 3, np.asarray(c["compensator.nis"])[rows].sum(axis=1), rows.shape[1]
+
+
+def averaged(rng: np.random.Generator, runs: int) -> Count:
+    """Means of ten angle readings across zero; the part states no innovation."""
+    one, nees = make("angle_averager", "native"), []
+    one.set({"Ts": 0.1, "sigma": 1e-5})
+    one.initialize(0.0)
+    for k, e in enumerate(1e-5 * rng.normal(size=10 * runs)):
+        one.set({"z": float(e % (2.0 * math.pi))})
+        one.step(0.1 * k, 0.1)
+        if k % 10 == 9:
+            mean, sd = one.get(["estimate", "sd"])
+            nees.append((((mean + math.pi) % (2.0 * math.pi) - math.pi) / sd) ** 2)
+    one.free()
+    return np.array(nees), 1, np.zeros(0), 0
+
+
 def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Count]]]:
     level_model = {"q": 0.0, "P0_slope": 0.0, "walk": 1e-3 * SIGMA**2 / T, "R": SIGMA**2}
     F, G = companion(AR3, SIGMA2)
@@ -168,6 +282,12 @@ def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Coun
     yield "wrong: coloured as white", lambda rng: matrices("coloured", rng, runs, wrong=True)
     yield "coefficients", lambda rng: coefficients(rng, runs)
     yield "coefficients, at the stop", lambda rng: at_the_stop(rng, runs)
+    yield "aided", lambda rng: aided(rng, runs)
+    yield "drift_compensator", lambda rng: compensated(rng, runs)
+    yield "angle_averager", lambda rng: averaged(rng, runs)
+    yield "attitude_mekf, rocking 20 deg", lambda rng: attitude("attitude_mekf", "20deg", rng, runs)
+    yield "attitude_kalman, rocking 1 deg", lambda rng: attitude("attitude_kalman", "1deg", rng, runs)
+    yield "wrong: attitude_kalman, 20 deg", lambda rng: attitude("attitude_kalman", "20deg", rng, max(runs // 10, 1))
     yield "wrong: coefficients, w white", lambda rng: coefficients(rng, runs, rms=0.0, white=0.05 * DPH)
     yield "wrong: coefficients, tau / 2", lambda rng: coefficients(rng, runs, tau=900.0)
     yield "wrong: coefficients, tau x 2", lambda rng: coefficients(rng, runs, tau=3600.0)
@@ -177,9 +297,6 @@ def live_days(days: int, seed: int) -> None:
     """Count how often 95 % of the live estimate hold the truth, at the end and at the stop: days of 1723 s."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
     from servoing import DAY50, polar_harmonics
-
-    from gyrobench.engine.session import Session
-    from gyrobench.system.system import load_system
 
     names, held = ("A0", "A1", "B1", "A2", "B2"), {"end": [], "stop": []}  # type: ignore[var-annotated]
     values = {**DAY50, "route": "combination", "wanted": 0.002 * DPH, "coefficients.sigma": 9.5e-8}

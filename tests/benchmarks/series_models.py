@@ -27,6 +27,7 @@ MODELS = {
     "AR(2)": (1.2, -0.5),
     "AR(3) of Xia 2008": (-0.7466, -0.5044, -0.2538),
 }
+METHODS = ("burg", "yule-walker")
 
 
 def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
@@ -35,18 +36,18 @@ def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
     return signal.lfilter([1.0], np.r_[1.0, -np.array(phi)], rng.normal(size=n + settle))[settle:]
 
 
-def coefficients(runs: int, lengths: Sequence[int]) -> None:
+def coefficients(runs: int, lengths: Sequence[int], methods: Sequence[str] = METHODS) -> None:
     for n in lengths:
         for name, phi in MODELS.items():
             rng = np.random.default_rng(n)
-            held = {"burg": np.zeros(len(phi)), "yule-walker": np.zeros(len(phi))}
+            held = {method: np.zeros(len(phi)) for method in methods}
             for _ in range(runs):
                 x = record(phi, n, rng)
                 for method, count in held.items():
                     fit = fit_ar(x, 1.0, len(phi), method)  # type: ignore[arg-type]
                     count += (fit.low <= phi) & (phi <= fit.high)
-            each = {m: " ".join(f"{v / runs:.3f}" for v in c) for m, c in held.items()}
-            print(f"{name}, {n} samples: Burg {each['burg']}; Yule-Walker {each['yule-walker']}", flush=True)
+            each = [f"{m} " + " ".join(f"{v / runs:.3f}" for v in c) for m, c in held.items()]
+            print(f"{name}, {n} samples: {'; '.join(each)}", flush=True)
 
 
 def times(runs: int, lengths: Sequence[int]) -> None:
@@ -110,7 +111,9 @@ if __name__ == "__main__":
     parser.add_argument("--records", type=int, default=1000)
     parser.add_argument("--only", choices=COUNTS, nargs="+", default=list(COUNTS))
     parser.add_argument("--samples", type=int, nargs="+", help="lengths of the records; default: those of each count")
+    parser.add_argument("--methods", choices=METHODS, nargs="+", default=METHODS, help="of the coefficients")
     given = parser.parse_args()
     for name in given.only:
         count, lengths = COUNTS[name]
-        count(given.records, given.samples or lengths)
+        more = {"methods": given.methods} if name == "coefficients" else {}
+        count(given.records, given.samples or lengths, **more)

@@ -66,9 +66,14 @@ def ride(record: Any, label: str, channel: str) -> Any:
 # ------------------------------------------------------------------------------------ the system
 def test_without_the_contest_the_system_is_the_one_it_was() -> None:
     system = load_system(NAME)
-    assert not {"channel", "bracket"} & set(system.slots) and "rebalance.i_read -> estimator.z" in system.wires
+    assert (
+        not {"channel", "bracket", "reference"} & set(system.slots)
+        and "rebalance.i_read -> estimator.z" in system.wires
+    )
     system.set("contest", True)
-    assert {"channel", "bracket"} <= set(system.slots) and "rebalance.i_read -> estimator.z" not in system.wires
+    assert {"channel", "bracket", "reference"} <= set(
+        system.slots
+    ) and "rebalance.i_read -> estimator.z" not in system.wires
     assert "rebalance.i_read -> estimator.z" in load_system(NAME).wires
     system.set("profile", "pitch.csv")
     with pytest.raises(InvalidConfigurationError, match="contest and profile"):
@@ -229,6 +234,24 @@ def test_more_noise_is_three_times_the_noise(noisy: Any, quiet: Any) -> None:
     )
 
 
+def test_aiding_takes_the_drift_off(quiet: Any) -> None:
+    """A drift of 10 deg/h turns the platform by 10 arcsec/s, 76 arcsec rms from 2 to 12 s after the phase begins; with
+    the reference the estimator leaves what the base does, and the motor works no more for it.  Without a drift and an
+    estimator that is aided the measure is the angle since the phase began.
+    """
+    c = quiet.record.channels
+    (row,) = [r for r in quiet.record.run.plan if r.label == "ride, aided"]
+    inside = (c["exciter.phase"] == row.phase) & (c["exciter.gate"] > 0.5)
+    begin = float(c["platform.attitude"][np.argmax(c["exciter.phase"] == row.phase)])
+    off = (c["platform.attitude"] - begin)[inside]
+    assert quiet.result["error, aided"].estimate == pytest.approx(float(np.sqrt(np.mean(off**2))) / ARCSEC, rel=0.02)
+    aided = contest("estimator_aided", **{"gyro.D_F": 10.0 * ARCSEC})  # arcsec/s is deg/h
+    wander = 10.0 * math.sqrt((12.0**3 - 2.0**3) / 3.0 / 10.0)
+    assert wander == pytest.approx(75.7, abs=0.1)
+    assert aided.result["error, aided"].estimate < 0.1 * wander
+    assert aided.result["PM"].estimate == pytest.approx(quiet.result["PM"].estimate, abs=12.0)
+
+
 def test_peak_voltage_is_the_mean_over_the_periods() -> None:
     """Peaks 1, 2, 3 in three whole periods of 0.37 s from 0.37 s on; the pieces at the ends do not count."""
     module = load_system(NAME)
@@ -259,6 +282,7 @@ def script() -> ModuleType:
         ("kalman_ar", 8.0),
         ("kalman_rate", 8.0),
         ("kalman_robust", 8.0),
+        ("aided", 8.0),
         ("moving_average", 8.1),
         ("wavelet", 5.4),
     ],
@@ -314,7 +338,7 @@ def test_contest_of_two_over_two_seeds(script: ModuleType, monkeypatch: pytest.M
     doc = json.loads((tmp_path / "comparison.json").read_text())
     assert [(r["name"], r["seeds"]) for r in doc["runs"]] == [(n, [1, 2]) for n in names]
     by_name = {r["name"]: r["order"] for r in (doc["ranking"], *doc["purposes"])}
-    assert len(by_name) == 7
+    assert len(by_name) == 8
     for name in ("motor voltage", "line voltage", "bending gain"):
         assert [e["run"] for e in by_name[name]] == [1, 0]
     assert by_name["motor voltage"][1]["place"] == 2 and by_name["motor voltage"][1]["probability"] > 0.975
