@@ -77,6 +77,9 @@ def models(m: DriftModel) -> list[Json]:
         head = ["coefficient", "Burg", "u", "95 % from", "95 % to", "Yule-Walker", "a (arburg)"]
         tables.append(table(f"Autoregression of order {m.burg.phi.size}, by SBC", caption, head, rows))
     rows = []
+    if (a := m.ma) is not None:  # one difference too many has no interval
+        rows.append(["MA(1)", "θ₁", *(None if math.isnan(v) else float(v) for v in (a.theta[0], a.u[0], a.low[0],
+                                                                                  a.high[0]))])  # fmt: skip
     if (a := m.arma) is not None:
         rows += [["ARMA(1,1)", n, float(v), float(u), float(lo), float(hi)] for n, v, u, lo, hi in
                  zip(("φ₁", "θ₁"), [*a.phi, *a.theta], a.u, a.low, a.high, strict=True)]  # fmt: skip
@@ -85,7 +88,13 @@ def models(m: DriftModel) -> list[Json]:
     if rows:
         head = ["model", "coefficient", "estimate", "u", "95 % from", "95 % to"]
         tables.append(
-            table("Other models", "ARMA: x(t) = φ₁ x(t−1) + e(t) + θ₁ e(t−1); ARIMA: of differences", head, rows)
+            table(
+                "Other models",
+                "ARMA: x(t) = φ₁ x(t−1) + e(t) + θ₁ e(t−1), MA without φ₁ (θ in Hu 1981 has the other sign); ARIMA: of "
+                "differences",
+                head,
+                rows,
+            )
         )
     if m.whiteness:
         names = {"block means": "none: the means themselves", "burg": "AR, Burg", "arma": "ARMA(1,1)"}

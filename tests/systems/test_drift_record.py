@@ -181,6 +181,9 @@ def test_noise_that_the_terms_do_not_describe(tmp_path: Path) -> None:
     result = reduce(write(tmp_path / "r.csv", {"time [s]": np.arange(n, dtype=float), "rate [deg/h]": x}))
     assert any("The spectrum is not that of the five terms" in w for w in result.warnings), result.warnings
     assert any("correlation time" in s for s in result.columns[0].texts["model"])
+    (others,) = [t for t in result.columns[0].tables["model"] if t["title"] == "Other models"]
+    assert [row[0] for row in others["rows"]] == ["MA(1)", "ARMA(1,1)", "ARMA(1,1)"] + ["ARIMA(3,1,0)"] * 3
+    assert all(row[4] < row[2] < row[5] for row in others["rows"])
 
 
 def test_a_coarse_counter(tmp_path: Path) -> None:
