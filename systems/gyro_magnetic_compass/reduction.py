@@ -77,6 +77,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ranked_by="error after the turn",
         specification=specification,
     )
+    result.site = {"latitude / °": float(o["latitude"]) / DEG}
     result.summary = result.summary or told(
         found.coefficients,
         "At rest the heading is off by {error at rest}; noise {heading noise}.",
@@ -88,14 +89,16 @@ def from_record(record: Record, specification: Specification | None = None) -> L
 
 
 def _alignment(found: LoopFindings, gate: Gate, error: Array, k: float) -> None:
-    """Add the time constant of the last part of the alignment, where the rate is no longer limited."""
+    """Add the time constant of the last part of the alignment, where the rate is no longer limited.
+
+    e' = k (n - e) + w with white noises n of the magnetic heading and w of the gyro: what they leave in the heading
+    decays as the step does, an autoregression of first order, e_j+1 = a e_j + b + white, a = exp(-k dt).
+    """
     p = found.record.run.parameters
     end = float(np.mean(error[-error.size // 10 :]))
     left = np.abs(error - end)
     slow = float(p["slaving.limit"]) / k if "slaving.limit" in p else math.inf
-    first = int(np.argmax(left < 0.8 * slow))
-    noise = float(np.std(np.diff(error[-error.size // 10 :]))) / math.sqrt(2.0)
-    last = first + int(np.argmax(left[first:] < max(0.1 * left[first], 5.0 * noise)))
+    first = int(np.argmax(left < 0.5 * slow))  # the noise of the magnetic heading must not meet the limit either
     _figure(
         found,
         "alignment",
@@ -103,12 +106,20 @@ def _alignment(found: LoopFindings, gate: Gate, error: Array, k: float) -> None:
         gate,
         error,
     )
-    if last - first < 10:
+    if error.size - first < 20:
         return
-    t, y = gate.t[first:last], np.log(left[first:last])
-    (slope, _), covariance = np.polyfit(t, y, 1, cov=True)
-    found.measure("time constant", "of the slaving, from the alignment", "s", -1.0 / slope,
-                  math.sqrt(float(covariance[0, 0])) / slope**2, closed=1.0 / k)  # fmt: skip
+    dt, x, y = float(gate.t[1] - gate.t[0]), error[first:-1], error[first + 1 :]
+    far = x - x.mean()
+    a = float(far @ y) / float(far @ far)
+    rest = y - y.mean() - a * far
+    u_a = math.sqrt(float(rest @ rest) / (rest.size - 2) / float(far @ far))
+    if not 0.0 < a < 1.0:
+        found.measure("time constant", "of the slaving, from the alignment", "s", None,
+                      no_value="the heading does not decay to a rest in the alignment")  # fmt: skip
+        return
+    time = -dt / math.log(a)
+    found.measure("time constant", "of the slaving, from the alignment", "s", time, time**2 * u_a / (a * dt),
+                  closed=1.0 / k)  # fmt: skip
 
 
 def _field(found: LoopFindings) -> None:

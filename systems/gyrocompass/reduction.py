@@ -55,6 +55,8 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ranked_by="settling time",
         specification=specification,
     )
+    at = record.run.options
+    result.site = {"latitude / °": float(at["latitude"]) / DEG, "Earth rate / (rad/s)": float(at["earth_rate"])}
     if found.doubts:
         withhold(result, found.doubts)
     result.summary = result.summary or told(

@@ -62,6 +62,14 @@ def test_cut_off_is_k_over_two_pi_measured_and_computed(quiet: Any) -> None:
     assert quiet["time constant"].estimate == pytest.approx(60.0, rel=2e-3)  # half a step of 0.1 s
 
 
+def test_time_constant_under_noise() -> None:
+    """The noise of the heading decays as the step does, so that its samples are no independent ones: eight seeds."""
+    found = [reduced(("alignment",), seed=s)["time constant"] for s in range(1, 9)]
+    z = np.array([(c.estimate - 60.0) / c.u for c in found])
+    assert 0.4 < math.sqrt(np.mean(z**2)) < 1.75 and abs(np.mean(z)) < 1.2  # 3.3 standard deviations
+    assert all(0.3 < c.u < 4.0 for c in found)
+
+
 def test_drift_at_rest_leaves_the_drift_over_k(quiet: Any) -> None:
     """5 deg/h times 60 s: 0.0833 degrees; without correction 5 - 9.667 deg/h: -0.0778."""
     assert quiet["error at rest"].estimate == pytest.approx(5.0 / 60.0, rel=1e-4)
