@@ -127,6 +127,12 @@ def read_head(file: Path) -> Head:
                 _comment(line, comments)
             elif line.strip():
                 delimiter, names = _split_header(line)
+                if all(_is_number(n) for n in names):
+                    raise DataError(
+                        file,
+                        [f"row {number}: numbers, where names and units of the columns are expected, as 'time [s],rate "
+                         "[deg/h]': write that line above them"],
+                    )  # fmt: skip
                 below = (next(lines, b"").decode("ascii", "replace") for _ in range(SCANNED))
                 cells = (c.strip() for text in below for c in text.split(delimiter))
                 return Head(names, comments, number, delimiter, delimiter != "," and _decimal_comma(cells))
@@ -151,6 +157,14 @@ def cells_of(line: str, delimiter: str = ",") -> list[str]:
 def _split_header(line: str) -> tuple[str, list[str]]:
     delimiter = max(",;\t", key=line.count)
     return delimiter, cells_of(line, delimiter)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _decimal_comma(cells: Iterable[str]) -> bool:

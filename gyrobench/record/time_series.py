@@ -12,6 +12,7 @@ Memory: blocks of BLOCK bytes and the windows, whatever the length of the file.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -27,6 +28,7 @@ from gyrobench.record.sampling import Successive
 Array = NDArray[np.float64]
 Block = Mapping[str, Array]
 BLOCK = 1 << 20  # bytes of text read at a time
+DATE = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\s*\d{1,2}:\d{2}:")
 GAP = 1.5  # usual steps; a longer one is a gap
 NOTHING = ["", "nan", "NaN", "NAN", "NA", "n/a", "null", "-", "--", "#N/A"]  # cells without a value
 
@@ -110,10 +112,10 @@ def _not_numbers(file: Path, head: Head, taken: Mapping[str, str]) -> list[str]:
             count[name] += len(bad.drop_null())
             if len(bad.drop_null()):
                 first.setdefault(name, bad.drop_null()[0].as_py())
-    sign = "a comma" if head.decimal_comma else "a point"
+    sign = f"the decimal sign of this file is {'a comma' if head.decimal_comma else 'a point'}"
     return [
-        f"column '{n}': {k} cell{'s are' if k > 1 else ' is'} not a number, the first: '{first[n][:40]}' (the decimal "
-        f"sign of this file is {sign})"
+        f"column '{n}': {k} cell{'s are' if k > 1 else ' is'} not a number, the first: '{first[n][:40]}' "
+        f"({'a date: write seconds from the first sample on' if DATE.match(first[n]) else sign})"
         for n, k in count.items()
         if k
     ]

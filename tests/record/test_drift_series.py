@@ -176,6 +176,7 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, np.nan)}, "", "0 samples with a value; 1000 of 1000 rows have"),
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, 2.0)}, "", "all its values are"),
         ({"time [s]": TIME, "rate [deg/h]": ["0.1", "fast"] * 500}, "", "column 'rate': 500 cells are not a number"),
+        ({"time [s]": ["2026-05-01T00:00:00"] * N, "rate [deg/h]": RATE}, "", "00:00:00' (a date: write seconds from"),
         ({"time [s]": TIME, "temperature [degC]": RATE}, "", "no rate and no angle among the columns of the file"),
     ],
 )  # fmt: skip
@@ -189,11 +190,13 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "text.parquet").write_text("time [s],rate [deg/h]\n0,1\n")
     (tmp_path / "head.csv").write_text("time [s],rate [deg/h]\n")
+    (tmp_path / "bare.csv").write_text("# gyro 7\n0,1.5\n0.1,2\n")
     (tmp_path / "latin.csv").write_bytes("time [s],rate [deg/h]\n0,1\n0.1,2 °\n".encode("latin-1"))
     (tmp_path / "torn.csv").write_bytes(b"time [s],rate [deg/h]\n0,1\n0.1,2\xc3")
     pq.write_table(pa.table({"time [s]": ["a", "b"], "rate [deg/h]": [1.0, 2.0]}), tmp_path / "words.parquet")
     for name, words in {
         "empty.csv": "the file is empty", "latin.csv": "not UTF-8 text", "torn.csv": "not UTF-8 text",
+        "bare.csv": "row 2: numbers, where names and units of the columns are expected",
         "nothing.csv": "no such file", "text.parquet": "not a readable Parquet file",
         "head.csv": "no rows below the header",
         "words.parquet": "column 'time': holds string, numbers are expected",
