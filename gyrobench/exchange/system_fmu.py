@@ -29,7 +29,9 @@ from gyrobench.packaging.compiler import this_platform
 from gyrobench.packaging.description import add_variable, units
 from gyrobench.packaging.description3 import add_time, build_description, reference, xml_text
 from gyrobench.packaging.description3 import add_variable as add_variable3
+from gyrobench.packaging.documentation import LICENCE, index_page, is_standard, licences
 from gyrobench.packaging.fmu import content_hash, guid_of, native_entries, write_archive
+from gyrobench.packaging.loading import sources
 from gyrobench.system.parameters import Starts
 from gyrobench.system.system import System
 from gyrobench.system.wiring import Assembly
@@ -77,6 +79,8 @@ def export_fmu(
     if fmi == 3:
         entries["sources/buildDescription.xml"] = build_description(chosen.name).encode()
     entries["modelDescription.xml"] = (_description3 if fmi == 3 else _description2)(chosen, source, guid).encode()
+    entries |= index_page(chosen.name, chosen.title, _text(source), [e.scalar for e in source.exposed], whole=False)
+    entries |= licences()
     readme = chosen.folder / "README.md" if chosen.folder else None
     if readme is not None and readme.is_file():
         entries["documentation/README.md"] = readme.read_bytes()
@@ -110,6 +114,12 @@ def _exposed(
     return [dataclasses.replace(e, scalar=dataclasses.replace(e.scalar, reference=i)) for i, e in enumerate(order)]
 
 
+def _text(source: SystemSource) -> str:
+    parts = "\n".join(f"  {slot}: {name}" for slot, (name, _) in source.parts.items())
+    step = f"A communication step is a whole number of the system's own steps of {source.step:g} s."
+    return f"{step}\n\nParts, in the order of execution:\n{parts}"
+
+
 class _Face:
     """What the writers of descriptions take for a part."""
 
@@ -119,13 +129,15 @@ class _Face:
         self.layout = [e.scalar for e in source.exposed]
 
 
-def _attributes(system: System, fmi: int) -> dict[str, str]:
+def _attributes(system: System, source: SystemSource, fmi: int) -> dict[str, str]:
+    files = [f for _, cls in source.parts.values() for f in sources(cls).values()]
+    files += [system.folder] if system.folder is not None else []
     return {
+        **({"license": LICENCE} if is_standard(files) else {}),
         "fmiVersion": f"{fmi}.0",
         "modelName": system.name,
         "description": system.title,
         "version": version("gyrobench"),
-        "license": "BSD-3-Clause",
         "generationTool": "gyrobench",
         "variableNamingConvention": "structured",
     }
@@ -144,7 +156,7 @@ def _common(root: ET.Element, system: System, face: Any, extra: tuple[str, ...])
 def _description2(system: System, source: SystemSource, guid: str) -> str:
     """Return modelDescription.xml, FMI 2.0."""
     face: Any = _Face(source)
-    attributes = {**_attributes(system, 2), "guid": guid, "numberOfEventIndicators": "0"}
+    attributes = {**_attributes(system, source, 2), "guid": guid, "numberOfEventIndicators": "0"}
     root = ET.Element("fmiModelDescription", attributes)
     abilities = dict.fromkeys(
         (
@@ -172,9 +184,10 @@ def _description2(system: System, source: SystemSource, guid: str) -> str:
 def _description3(system: System, source: SystemSource, guid: str) -> str:
     """Return modelDescription.xml, FMI 3.0."""
     face: Any = _Face(source)
-    root = ET.Element("fmiModelDescription", {**_attributes(system, 3), "instantiationToken": guid})
+    root = ET.Element("fmiModelDescription", {**_attributes(system, source, 3), "instantiationToken": guid})
     abilities = ("canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize")
-    ET.SubElement(root, "CoSimulation", {"modelIdentifier": system.name, **dict.fromkeys(abilities, "true")})
+    own = {"modelIdentifier": system.name, "fixedInternalStepSize": repr(system.step)}
+    ET.SubElement(root, "CoSimulation", {**own, **dict.fromkeys(abilities, "true")})
     variables = _common(root, system, face, ("s",))
     add_time(variables, face)
     for s in face.layout:

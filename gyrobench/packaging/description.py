@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
+from gyrobench.packaging.documentation import LICENCE, is_standard
+from gyrobench.packaging.loading import sources
 from gyrobench.packaging.source import Source
 from gyrobench.units import base_unit
 
@@ -18,6 +21,7 @@ ATTRIBUTES = {
     "derivative": ("local", "continuous", "calculated"),
     "discrete": ("local", "discrete", "calculated"),
 }
+LONGEST = 1.0  # s; a longer "largest internal step" stands for any
 TYPES = {float: "Real", int: "Integer", bool: "Boolean"}
 
 
@@ -89,6 +93,22 @@ def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -
             ET.SubElement(u, "BaseUnit", attributes)
 
 
+def default_experiment(cls: type[Component]) -> dict[str, str]:
+    """Return the experiment that a part is made for: a thousand steps of the size that it declares.
+
+    A part that declares none, or one for each communication step (1e9 s), takes any step: then they have 1 ms.
+    """
+    declared = cls.declarations.get("step")
+    step = float(declared.start) if declared is not None else math.inf
+    step = step if step <= LONGEST else 1e-3
+    return {"startTime": "0.0", "stopTime": repr(float(f"{1000.0 * step:.12g}")), "stepSize": repr(step)}
+
+
+def licence(cls: type[Component]) -> dict[str, str]:
+    """Return the attribute of the licence, of a part of the standard bench; a user's own part has the user's."""
+    return {"license": LICENCE} if is_standard(sources(cls).values()) else {}
+
+
 def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
     """Return the XML text.  ``target`` is "native" or "python": what each can do differs."""
     source = Source(cls)
@@ -100,7 +120,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
             "guid": guid,
             "description": summary(cls),
             "version": cls.version,
-            "license": "BSD-3-Clause",
+            **licence(cls),
             "generationTool": "gyrobench",
             "variableNamingConvention": "structured",
             "numberOfEventIndicators": "0",
@@ -126,7 +146,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     units(root, cls)
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
-    ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})
+    ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     variables = ET.SubElement(root, "ModelVariables")
     for s in cls.layout:
         add_variable(variables, cls, s)

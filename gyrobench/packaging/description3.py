@@ -10,7 +10,16 @@ import xml.etree.ElementTree as ET
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
-from gyrobench.packaging.description import ATTRIBUTES, initial_references, number, summary, unit_name, units
+from gyrobench.packaging.description import (
+    ATTRIBUTES,
+    default_experiment,
+    initial_references,
+    licence,
+    number,
+    summary,
+    unit_name,
+    units,
+)
 from gyrobench.packaging.source import Source
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
@@ -89,7 +98,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
             "instantiationToken": guid,
             "description": summary(cls),
             "version": cls.version,
-            "license": "BSD-3-Clause",
+            **licence(cls),
             "generationTool": "gyrobench",
             "variableNamingConvention": "structured",
         },
@@ -108,7 +117,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     units(root, cls, extra=("s",))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
-    ET.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stopTime": "1.0", "stepSize": "0.001"})
+    ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     variables = ET.SubElement(root, "ModelVariables")
     add_time(variables, cls)
     for s in cls.layout:

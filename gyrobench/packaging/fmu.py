@@ -14,8 +14,9 @@ from pathlib import Path
 from gyrobench.bench import Bench
 from gyrobench.component import Component
 from gyrobench.packaging import compiler, native_target, python_target
-from gyrobench.packaging.description import model_description
+from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
+from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
 from gyrobench.packaging.loading import BuildError, load_part, sources
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
@@ -137,7 +138,7 @@ def build(
     guid = guid_of(what)
     home = Bench.find(bench)
     suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
-    cached = home.cache / f"{name}{suffix}-{content_hash(what, how, documentation)[:20]}.fmu"
+    cached = home.cache / f"{name}{suffix}-{content_hash(what, how, documentation, licence_text())[:20]}.fmu"
     if not cached.exists():
         if target == "native":
             files = native_target.source_files(cls, guid, fmi)
@@ -147,8 +148,10 @@ def build(
         if fmi == 3:
             entries["sources/buildDescription.xml"] = build_description(identifier).encode()
             entries["modelDescription.xml"] = model_description3(cls, guid, identifier).encode()
+            entries |= terminals(cls)
         else:
             entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()
+        entries |= index_page(name, summary(cls), cls.__doc__ or "", cls.layout) | licences(target == "python")
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
         write_archive(cached, entries)
