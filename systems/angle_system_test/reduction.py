@@ -145,7 +145,7 @@ def reduce(
     )  # fmt: skip
     found.t_start = found.t_end = rows.at.t
     # rounding leaves bounded residuals: that they are not normal says nothing of outliers
-    found.tests = [t for t in found.tests if not t.name.startswith("Shapiro")]
+    found.tests[:] = [t for t in found.tests if not t.name.startswith("Shapiro")]
     result = linear_result(
         found, system="angle_system_test", title="Test of an angle reading system",
         method="Weighted least squares over readings at rest and at constant rates; two readings of one scale separate "

@@ -105,7 +105,7 @@ def corrected(
     if len({c.source for c in taken}) < len(taken):
         raise ReductionError(f"corrections: a source stands twice in '{text}'")
     again = without(found, sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
-    return replace(again, corrections=tuple(taken), tests=list(again.tests))
+    return replace(again, corrections=tuple(taken), known_tests=again.made_tests)
 
 
 def _read(text: str, unit: dict[str, str]) -> Correction:

@@ -6,9 +6,10 @@ the one into the other with uncertainties to first order.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class Findings:
     y_scale: float
     white: bool  # assumed, not estimated
     weights: Array | None = None
-    tests: list[Test] = field(default_factory=list)
+    known_tests: list[Test] | None = None  # of the same fit, reported otherwise
     candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
     hidden: Sequence[Hidden] = ()
     linear: tuple[Quantity, ...] = ()  # those of the columns of X
@@ -85,8 +86,19 @@ class Findings:
         self.residual_std = math.sqrt(float(np.sum(self.est.residual**2)) / dof) / self.y_scale
         self.stretches = series.stretches(self.t_start, self.t_end, residual)
         self.ideal = self.residual_std * self.y_scale <= 1e-12 * float(np.max(np.abs(self.y)))
-        if not self.tests:
-            self.tests = self._residual_tests()
+
+    @functools.cached_property
+    def tests(self) -> list[Test]:
+        """Tests of the residuals, made when they are asked for (a fit without some rows is hardly ever); others may be
+        added.
+        """
+        return self._residual_tests() if self.known_tests is None else list(self.known_tests)
+
+    @property
+    def made_tests(self) -> list[Test] | None:
+        """A copy of the tests, if they have been made."""
+        made = self.__dict__.get("tests", self.known_tests)
+        return None if made is None else list(made)
 
     @property
     def dof(self) -> int:
@@ -139,7 +151,7 @@ class Findings:
         if after:
             reported = _behind(reported, self.reported, p)
         return replace(
-            self, quantities=(*quantities, *after), reported=reported, tests=list(self.tests), function=function
+            self, quantities=(*quantities, *after), reported=reported, known_tests=self.made_tests, function=function
         )
 
     def linearized(self, function: Callable[[Array], ArrayLike], beta: Array) -> tuple[Array, Array]:
