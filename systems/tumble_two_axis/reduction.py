@@ -190,9 +190,9 @@ def _design(s: TwoAxisSetup, C: Array) -> Array:
 def _candidates(
     s: TwoAxisSetup, windows: Mapping[str, Array], C: Array, rate: Array, X: Array, y: Array
 ) -> list[Candidate]:
-    """Set-up effects: misalignments of the input axis, trend, temperature, torquer.  Turned about the inner axis, output
-    and spin axis see the Earth rate by the cosine and the sine of its angle; the drift that the axis sees with them is
-    that of least squares.
+    """Set-up effects: misalignments of the input axis, trend, temperature, torquer.  Turned about the inner axis,
+    output and spin axis see the Earth rate by the cosine and the sine of its angle; the drift that the axis sees with
+    them is that of least squares.
     """
     earth, start = frames.earth_rate_local(s.latitude, s.earth_rate), np.linalg.lstsq(X, y, rcond=None)[0]
 
