@@ -55,8 +55,9 @@ from gyrobench.component.declarations import (
     make_layout,
     shape_of,
 )
-from gyrobench.component.math import Dual, lift
-from gyrobench.component.numerics import normal, phi1
+from gyrobench.component.integration import advance
+from gyrobench.component.numerics import normal
+from gyrobench.component.tangents import Tangent, dig, tangents
 from gyrobench.component.vectors import Vector, copied, is_finite
 
 PER = ("start", "step", "second")  # when noise is drawn
@@ -330,7 +331,7 @@ class Component:
             self._draw("step")
             self._draw("second")
             if self.states:
-                self._advance(h)
+                advance(self, h)
             self.t = t + (k + 1) * h
             for piece in self.pieces["sampled"]:
                 if self._tick % piece.every == 0:
@@ -364,11 +365,11 @@ class Component:
         x = size * normal(int(self.seed), stream, self._tick)
         return x / math.sqrt(self.h) if per == "second" else x
 
-    # ------------------------------------------------------------------ integration
+    # ------------------------------------------------------------------ derivatives
     def _flow(self) -> list[float]:
         self._equations("flow")
         d = self.der
-        return [float(_dig(getattr(d, s.path[0]), s.path[1:])) for s in self.states]
+        return [float(dig(getattr(d, s.path[0]), s.path[1:])) for s in self.states]
 
     def jacobian(self) -> list[list[float]]:
         """Return df/dx at the present point, by forward-mode differentiation of ``flow``."""
@@ -379,87 +380,9 @@ class Component:
         """Return the derivatives of (state derivatives, outputs) along the direction ``{FMI name: weight}``."""
         return self.tangents([seeds])[0]
 
-    def tangents(
-        self, directions: Iterable[dict[str, float]], outputs: bool = True
-    ) -> list[tuple[list[float], list[float]]]:
+    def tangents(self, directions: Iterable[dict[str, float]], outputs: bool = True) -> list[Tangent]:
         """Return :meth:`tangent` along each of these directions; outputs: False leaves those out."""
-        twin, found = self._twin(), []
-        shown = [s for s in self.layout if s.section == "output"] if outputs else []
-        for seeds in directions:  # one twin for all: ``flow`` and ``outputs`` write ``der`` and outputs only
-            seeded = [_dig(getattr(twin, s.path[0]), s.path[1:]) for s in map(self._find, seeds)]
-            for x, weight in zip(seeded, seeds.values(), strict=True):
-                x.d = weight
-            twin._equations("flow")
-            if outputs:
-                twin._equations("outputs")
-            der = [lift(_dig(getattr(twin.der, s.path[0]), s.path[1:])).d for s in self.states]
-            found.append((der, [lift(_dig(getattr(twin, s.path[0]), s.path[1:])).d for s in shown]))
-            for x in seeded:
-                x.d = 0.0
-            for name in {s.decl.name for s in shown}:
-                setattr(twin, name, _dual(getattr(self, name)))
-        return found
-
-    def _twin(self) -> Component:
-        """Return a copy of this part whose values are dual numbers, with derivatives 0."""
-        twin = object.__new__(type(self))
-        twin.__dict__.update(self.__dict__)
-        twin.der = Derivatives()
-        for name, d in self.declarations.items():
-            setattr(twin, name, _dual(getattr(self, name)))
-            if isinstance(d, State):
-                setattr(twin.der, name, _dual(getattr(self.der, name)))
-        twin.noise = SimpleNamespace(**{k: _dual(v) for k, v in vars(self.noise).items()})
-        return twin
-
-    def _advance(self, h: float) -> None:
-        if self.integrator == "rk4":
-            self._advance_rk4(h)
-            return
-        if self.integrator == "midpoint":
-            self.t = self.t + 0.5 * h
-        anew = getattr(self, self.nonlinear) != 0.0 if isinstance(self.nonlinear, str) else self.nonlinear
-        if anew or h != self._phi_h:
-            self._phi = phi1([[a * h for a in row] for row in self.jacobian()])
-            self._phi_h = h
-        f = self._flow()
-        for s, row in zip(self.states, self._phi, strict=True):
-            dx = 0.0
-            for p, fj in zip(row, f, strict=True):
-                dx = dx + p * fj
-            self._put(s, self._at(s) + h * dx)
-
-    def _advance_rk4(self, h: float) -> None:
-        t, dt = self.t, h / self.rk4_substeps
-        for k in range(self.rk4_substeps):
-            x = [self._at(s) for s in self.states]
-
-            def move(f: list[float], by: float, x: list[float] = x) -> None:
-                for s, xi, fi in zip(self.states, x, f, strict=True):
-                    self._put(s, xi + by * fi)
-
-            self.t = t + k * dt
-            k1 = self._flow()
-            self.t = t + (k + 0.5) * dt
-            move(k1, 0.5 * dt)
-            k2 = self._flow()
-            move(k2, 0.5 * dt)
-            k3 = self._flow()
-            self.t = t + (k + 1) * dt
-            move(k3, dt)
-            k4 = self._flow()
-            sums = [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-            move(sums, dt / 6.0)
-
-
-def _dig(x: Any, path: tuple[Any, ...]) -> Any:
-    for i in path:
-        x = x[i]
-    return x
-
-
-def _dual(x: Any) -> Any:
-    return Vector([_dual(e) for e in x]) if isinstance(x, list) else Dual(float(x))
+        return tangents(self, directions, outputs)
 
 
 def _all_placed(placed: dict[str, Placed]) -> Iterable[Placed]:

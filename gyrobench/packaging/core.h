@@ -2,7 +2,7 @@
  *
  * model.c defines `Vars` (every variable of the part, all double, in the order of the value references),
  * the counts and the tables used here, includes this file, and goes on with the equations.  Each operation below
- * stands in the same order in gyrobench/component/component.py and numerics.py: the two targets agree bit for bit.
+ * stands in the same order in component.py, integration.py and numerics.py of gyrobench/component: bit for bit.
  */
 #include "functions.h"
 
