@@ -181,7 +181,7 @@ def measured_values(points: Sequence[Point], excluded: Sequence[float] = ()) -> 
         if _bounded(inside, points, excluded, cross):
             twin = min(other.crossovers, key=lambda c: abs(c[0] - cross), default=(cross, phase))
             values["crossover"] = cross, math.hypot(_spread(f, f, inside, cross), twin[0] - cross)
-            own = math.hypot(float(np.interp(cross, f, u)), _spread(f, turn, inside, cross))
+            own = math.hypot(_interpolated_u(points, cross), _spread(f, turn, inside, cross))
             values["phase"] = phase, math.hypot(math.degrees(own), twin[1] - phase)
     for name, factor in (("upper", shown.upper), ("lower", shown.lower)):
         if factor is None:
@@ -225,6 +225,15 @@ def _relative_u(points: Sequence[Point], f: Array) -> Array:
     u = np.array([p.u or 0.0 for p in known])
     k = np.clip(np.searchsorted([p.f for p in known], f), 1, u.size - 1)
     return np.asarray(np.maximum(u[k - 1], u[k]))
+
+
+def _interpolated_u(points: Sequence[Point], at: float) -> float:
+    """Return the relative uncertainty of an interpolated value: of its two neighbours, by their distance in log f."""
+    known = sorted(points, key=lambda p: p.f)
+    k = int(np.clip(np.searchsorted([p.f for p in known], at), 1, len(known) - 1))
+    low, high = known[k - 1], known[k]
+    x = math.log(at / low.f) / math.log(high.f / low.f)
+    return math.hypot((1.0 - x) * (low.u or 0.0), x * (high.u or 0.0))
 
 
 def _undecided(f: Array, value: Array, u: Array, at: float) -> tuple[float, float]:
