@@ -8,7 +8,8 @@ Stepping, identical in every target.  A communication step ``[t, t + H]`` is cut
 ``n = ceil(H / step)`` equal internal steps ``h = H / n`` with the inputs held.  In each one
 
 1.  the noise of this internal step is drawn (counter-based: it depends on ``seed``, the port and the
-    count of internal steps, on nothing else);
+    count of internal steps, on nothing else), unless the step is of rounding size, below 1e-6 of the one before: then
+    the last samples hold, for white noise of density s would be s / sqrt(h), without bound;
 2.  the states advance, by the exponential Euler step ``x+ = x + h phi1(h A) f(x)`` with
     ``A = df/dx`` (exact when f is linear in x), with ``self.t`` at the start of the internal step or, "midpoint", in
     its middle (second order for a part that follows an input through the step), or by RK4 with declared substeps;
@@ -56,7 +57,7 @@ from gyrobench.component.declarations import (
     shape_of,
 )
 from gyrobench.component.integration import advance
-from gyrobench.component.numerics import normal
+from gyrobench.component.numerics import ROUNDING, normal
 from gyrobench.component.tangents import Tangent, dig, tangents
 from gyrobench.component.vectors import Vector, copied, is_finite
 
@@ -255,6 +256,7 @@ class Component:
         self._dirty = True
         self._phi: list[list[float]] = []
         self._phi_h = 0.0
+        self._drawn = 0.0
 
     def get_state(self) -> dict[str, Any]:
         """Return the complete state as plain numbers (exact through JSON)."""
@@ -268,6 +270,7 @@ class Component:
             "dirty": self._dirty,
             "phi": [list(r) for r in self._phi],
             "phi_h": self._phi_h,
+            "drawn": self._drawn,
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -282,6 +285,7 @@ class Component:
         self._tick = state["tick"]
         self._running, self._dirty = state["running"], state["dirty"]
         self._phi, self._phi_h = [list(r) for r in state["phi"]], state["phi_h"]
+        self._drawn = state["drawn"]
 
     # ------------------------------------------------------------------ running
     def initialize(self, t0: float = 0.0) -> None:
@@ -328,8 +332,10 @@ class Component:
         for k in range(n):
             self.t = t + k * h
             self._tick += 1
-            self._draw("step")
-            self._draw("second")
+            if h >= ROUNDING * self._drawn:
+                self._drawn = h
+                self._draw("step")
+                self._draw("second")
             if self.states:
                 advance(self, h)
             self.t = t + (k + 1) * h

@@ -6,6 +6,7 @@ from statistics import NormalDist
 
 MASK = (1 << 64) - 1
 GAMMA = 0x9E3779B97F4A7C15
+ROUNDING = 1e-6  # of the internal step before: a shorter one is the rounding of a master that sums up the time
 TAYLOR = 18  # terms of phi1: the first left out is below 1e-17 for a norm of 1/2
 _normal = NormalDist().inv_cdf
 

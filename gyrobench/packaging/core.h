@@ -12,11 +12,13 @@ typedef struct {
     double phi[N_X][N_X]; /* phi1(h A) */
 #endif
     double phi_h; /* the h it was made for */
+    double drawn; /* the h of the last samples of noise, 0 before the first */
     double running, dirty;
 } Numbers; /* all that decides the future */
 
 typedef struct { /* what follows from the numbers, kept because it seldom changes */
     double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
+    int held; /* h is of rounding size: the last samples of noise hold */
     int n, keyed; /* keyed: what follows belongs to the values */
     int n_drawn; /* the streams that are drawn in steps; of each: where its sample stands, whether it is a density */
     struct { int sample, density; double size; uint64_t key; } drawn[N_STREAMS + 1];
@@ -120,6 +122,7 @@ static inline void draw(Part *p) { /* the samples of an internal step */
     const uint64_t count = (uint64_t)(int64_t)p->n.v.tick;
     const double *ahead, by[] = {1.0, p->kept.root};
     int i, n;
+    if (p->kept.held) return;
     if (!p->kept.keyed) prepare_noise(p);
     n = p->kept.n_drawn;
     if (count - p->kept.first >= AHEAD) make_noise(p, count); /* unsigned: before the first too */
@@ -351,6 +354,8 @@ static NEVER_INLINE int linked_step(Part *p, double t, double step) {
         p->kept.n = n < 1 ? 1 : n;
         p->kept.h = step / p->kept.n;
         p->kept.root = sqrt(p->kept.h);
+        p->kept.held = p->kept.h < ROUNDING * p->n.drawn;
+        if (!p->kept.held) p->n.drawn = p->kept.h;
         p->kept.step = step;
         p->kept.largest = largest;
     }

@@ -12,6 +12,7 @@
 #define GAMMA 0x9E3779B97F4A7C15u
 #define AHEAD 64
 #define PATIENCE 8
+#define ROUNDING 1e-6 /* of the step before: a shorter one is the rounding of a master that sums up the time */
 
 #ifdef __GNUC__
 #define NEVER_INLINE __attribute__((noinline))

@@ -95,6 +95,7 @@ static void initialize(Part *p, double t0) {
 static void proceed(Part *p, double t, double step) {
     const double expected = p->n.t0 + p->n.steps * STEP, n = floor(step / STEP + 0.5);
     double k;
+    if (step > 0.0 && step <= ROUNDING * STEP) return; /* rounding of a master that sums up the time: no step */
     if (!(n >= 1.0 && fabs(step - n * STEP) <= 1e-6 * STEP)) {
         fail(p, "a step of %.9g s: it must be a multiple of the system's step of %.9g s", plain(step), STEP);
         return;

@@ -144,6 +144,12 @@ def test_states_instances_and_reset(small: System, write: Write) -> None:
     one.fmu.reset()
     one.start()
     assert one.outputs() == initial
+    one.fmu.doStep(0.0, 0.1)
+    outputs = one.outputs()
+    one.fmu.doStep(0.1, 1e-12)  # of a master that sums up the time
+    assert one.outputs() == outputs
+    one.fmu.doStep(0.1 + 1e-12, 0.1)
+    assert one.outputs() == last
 
 
 def test_what_is_wrong_is_refused(small: System, write: Write, capfd: pytest.CaptureFixture[str]) -> None:
