@@ -164,8 +164,11 @@ def option_problems(options: Mapping[str, Any], step: float, earth_rate: float) 
         found.append(f"window = {options['window']:g} s in a time of {options['time']:g} s: too few windows")
     if found or mounts is None:
         return found
-    values = (mounts, options["latitude"], options["time"], earth_rate, options["terms"])
-    return lock_problems(*values) or rank_problems(*values)
+    turned = options["time"] + options["settle"]  # the table turns while the loops settle
+    values = (earth_rate, options["terms"])
+    return lock_problems(mounts, options["latitude"], turned, *values) or rank_problems(
+        mounts, options["latitude"], options["time"], *values
+    )
 
 
 def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options: Mapping[str, Any]) -> list[str]:
@@ -205,7 +208,7 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
 
     earth_rate = parameters.get("site.earth_rate", frames.EARTH_RATE)
     for m in dict.fromkeys(mounts):
-        lock = lock_by_drift(m, options["latitude"], options["time"], earth_rate, rates)
+        lock = lock_by_drift(m, options["latitude"], options["time"] + options["settle"], earth_rate, rates)
         if lock is not None:
             at, outer, inner = lock
             found.append(

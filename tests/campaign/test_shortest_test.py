@@ -15,7 +15,7 @@ from gyrobench.bench import UsageError
 from gyrobench.campaign.design import choice_search, plan_search, shortest_test
 from gyrobench.campaign.design.approximate_design import approximate_design, evaluate
 from gyrobench.campaign.design.option_protocol import OptionProtocol
-from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError, last_time
+from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError, Workbench, last_time
 from gyrobench.campaign.design.plan_search import Search, Want, finish, rounded
 from gyrobench.campaign.design.predicted_uncertainty import predict
 from gyrobench.campaign.design.shortest_test import design_test, protocol_of
@@ -210,6 +210,13 @@ def test_what_cannot_be_reached_is_refused(
 ) -> None:
     with pytest.raises(error, match=text.replace("(", r"\(")):
         design_test(load_system("accelerometer_multipoint").with_values(values), wants)
+
+
+def test_a_test_without_plans_is_refused_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The day of servo_polar took minutes first."""
+    monkeypatch.setattr(Workbench, "run", None)
+    with pytest.raises(DesignError, match="servo_polar offers no plans to choose from"):
+        design_test(load_system("servo_polar"), {"D_I": "0.001deg/h/g"})
 
 
 def test_the_tests_of_a_suite_that_reach_everything_soonest() -> None:

@@ -50,6 +50,8 @@ def search_choices(
     book, *others = protocol.choices
     reasons: list[str] = []
     found: list[tuple[float, Choice, float, Trial]] = []
+    if protocol.propose is not None:
+        others += protocol.propose(wanted, time, criterion)
     for choice in [book, *_promising(others, protocol, wanted, time)]:
         try:
             length, trial, value = _settled(bench, protocol, choice, merit, time, ROUGH)
@@ -63,7 +65,7 @@ def search_choices(
     again = replace(choice, start=length)
     length, trial, _ = _settled(bench, protocol, again, merit, time, FINAL)
     options = choice.options(length)
-    of_book = next((t for _, c, _, t in found if c is book), None)
+    of_book = trial if choice is book else next((t for _, c, _, t in found if c is book), None)
     own_time = math.inf if of_book is None else of_book.time
     if time is not None and of_book is not None:
         own = of_book

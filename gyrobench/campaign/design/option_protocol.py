@@ -33,6 +33,8 @@ class Choice:
 class OptionProtocol:
     """choices: the system's own plan first.  covariances: of the data of each fit of a run of any of them, from the
     noise of the parts.  names: of the values of which something may be wanted.  unseen: as of VisitProtocol.
+    propose: further choices that are worth a run, of wanted uncertainties (name -> SI), a given time (s) or None, and a
+    criterion; for a test that has too many to list.
     """
 
     choices: tuple[Choice, ...]
@@ -40,3 +42,4 @@ class OptionProtocol:
     names: tuple[str, ...]
     unseen: tuple[str, ...] = ()
     noise: Noise | None = None  # of choices with known windows
+    propose: Callable[[Mapping[str, float], float | None, str], Sequence[Choice]] | None = None

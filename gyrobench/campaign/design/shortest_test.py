@@ -57,9 +57,7 @@ Settled = tuple[float, ExactPlan, Trial, Search]  # cost, plan, its run, the sea
 
 
 def protocol_of(system: System, record: Record) -> VisitProtocol | OptionProtocol:
-    """Return what a system offers to design, from a run of it as it is.  Raises DesignError."""
-    if not system.protocol:
-        raise DesignError(f"{system.name} offers no plans to choose from; docs/guides/shortest_test.md lists the tests")
+    """Return what a system with a protocol offers to design, from a run of it as it is."""
     owner = next(cls for cls in type(system).__mro__ if "protocol" in vars(cls))
     module = importlib.import_module(f".{system.protocol}", owner.__module__)
     found: VisitProtocol | OptionProtocol = module.protocol_of(system, record)
@@ -85,6 +83,8 @@ def design_test(
     """
     if criterion not in CRITERIA:
         raise UsageError(f"criterion '{criterion}': one of {', '.join(CRITERIA)}")
+    if not system.protocol:
+        raise DesignError(f"{system.name} offers no plans to choose from; docs/guides/shortest_test.md lists the tests")
     with Workbench(system, parts or {}, maps or {}, engine, seed, dict(given or {})) as bench:
         record, fits = bench.run({})
         protocol = protocol_of(system, record)
