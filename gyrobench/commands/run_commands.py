@@ -122,7 +122,7 @@ def reduce(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Reduce measured data, or a run that another tool has made, and write the same report.
+    """Reduce measured data, or a run of another tool, and report.
 
     \b
     Examples:
