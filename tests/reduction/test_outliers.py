@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gyrobench import units
-from gyrobench.reduction.estimation import outliers
+from gyrobench.reduction.estimation import nuisances, outliers
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import linear_result
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -56,6 +56,18 @@ def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
     assert text.startswith("Row 41 (+0.") and "without it" in text and "u = " in text
     (table,) = [t for t in r.tables if t["title"] == "Estimates without outliers"]
     assert table["rows"][0][4] < 0.2 * table["rows"][0][2]
+
+
+def test_a_mount_of_outliers() -> None:
+    """Eleven mounts of eight windows, all of the last 60 sigma off, either way: named, and the constant of that mount is in
+    the fit to the others as if it had none.
+    """
+    mounts = nuisances.scatter("σ", nuisances.MOUNTS, np.repeat(np.arange(11), 8).tolist())
+    plain = record({80 + k: 60.0 * (-1.0) ** k for k in range(8)})
+    spoilt = fit(plain.linear, plain.X, plain.y, plain.t_start, plain.t_end, [], "", "", DPH, candidates=[mounts])
+    odd = outliers.find(spoilt)
+    assert odd is not None and odd.rows.tolist() == list(range(80, 88))
+    assert np.all(np.abs(odd.without.value / DPH - [0.3, -0.2]) < 0.01)
 
 
 def test_rows_that_hide_one_another() -> None:

@@ -115,6 +115,7 @@ def fit(
     Q, R = np.linalg.qr(X / scale)
     Z = np.column_stack([np.empty((n, 0)), *(b.columns for b in blocks)])
     z_scale = np.linalg.norm(Z, axis=0)
+    z_scale = np.where(z_scale > 0.0, z_scale, 1.0)  # a mount of which every row is left out
     start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
     remainder = y - Q @ start[:p]
     both = np.column_stack([Q, Z / z_scale, remainder])
