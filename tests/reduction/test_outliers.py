@@ -59,8 +59,8 @@ def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
 
 
 def test_a_mount_of_outliers() -> None:
-    """Eleven mounts of eight windows, all of the last 60 sigma off, either way: named, and the constant of that mount is in
-    the fit to the others as if it had none.
+    """Eleven mounts of eight windows, all of the last one 60 sigma off, either way: they are named, and the fit to the
+    others is that of ten mounts.
     """
     mounts = nuisances.scatter("σ", nuisances.MOUNTS, np.repeat(np.arange(11), 8).tolist())
     plain = record({80 + k: 60.0 * (-1.0) ** k for k in range(8)})
