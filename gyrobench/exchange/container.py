@@ -44,7 +44,10 @@ def export_container(
     if late := sorted({c.wire for c in assembly.connections if c.delayed}):
         raise ExportError(f"container: a container FMU cannot carry the delay of {', '.join(late)}; export to SSP")
     gains = gains_of(assembly)
-    choices = choose(chosen, assembly, seed, expose)
+    asked = list(expose)
+    if "time" in asked:
+        raise ExportError("--expose time: a container has a variable of that name; expose what it sets in a part")
+    choices = [c for c in choose(chosen, assembly, seed, asked) if c.name != "time"]
     outputs = {port: (slot, b) for port, (slot, b) in recorded(assembly).items() if b.constant is None}
     in_si = {port: f"{port.replace('.', '_')}_in_SI" for port, (_, b) in outputs.items() if b.gain != 1.0 or b.offset}
     path = Path(path)

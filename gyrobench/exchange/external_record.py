@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -54,8 +54,9 @@ def find_series(
 ) -> tuple[dict[str, Series], list[str]]:
     """Return the series of the recorded outputs by their names, and the names of those that are not in the file.
 
-    In the file an output is "slot.variable" with the name that its FMU gives it, "slot.output", or either behind the
-    names of what holds the system, "root.slot.variable".  held: slots whose outputs hold what they say of a window.
+    In the file an output is "slot.variable" with the name that its FMU gives it and in the FMU's unit, "slot.output" in
+    SI, as containers have it, or either behind the names of what holds the system, "root.slot.variable".  held: slots
+    whose outputs hold what they say of a window.
     Raises DataError where one that is ``needed`` is missing, or one is there twice.
     """
     found: dict[str, Series] = {}
@@ -75,7 +76,9 @@ def find_series(
         if len(fits) > 1 and not exact:
             problems.append(f"{own} appears as {listed(fits)}; one system in a file")
         elif fits:
-            found[output] = Series((exact or fits)[0], bound, slot in held)
+            name = (exact or fits)[0]
+            si = name not in ends.get(own, ())
+            found[output] = Series(name, replace(bound, gain=1.0, offset=0.0) if si else bound, slot in held)
         elif own in result.constants or output in result.constants:
             problems.append(f"{own} is constant in the file: nothing ran, or its outputs were not stored")
         else:

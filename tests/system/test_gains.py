@@ -15,11 +15,13 @@ from fmpy import read_model_description, simulate_fmu
 
 from gyrobench.engine.session import run
 from gyrobench.exchange.container import export_container
-from gyrobench.exchange.external_record import record_from_series
-from gyrobench.exchange.ssp_export import export_ssp
+from gyrobench.exchange.external_record import find_series, record_from_series
+from gyrobench.exchange.result_files import ResultFile
+from gyrobench.exchange.ssp_export import ExportError, export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
+from gyrobench.system.binding import Bound
 from gyrobench.system.connectors import Socket, inp, out
-from gyrobench.system.system import Slot, System
+from gyrobench.system.system import Slot, System, load_system
 
 Make = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
@@ -159,6 +161,14 @@ def test_a_mapped_gyro_in_other_tools(small: System, make: Make, tmp_path: Path)
         np.testing.assert_array_equal(record.windows[name], column, err_msg=name)
     rows = len(own.channels["time"])
     np.testing.assert_array_equal(found["gyro.u"][::10][1:rows], own.channels["gyro.u"][1:])  # V, not mV
+    # a result file is read alike: the name of the connector is SI, that of the FMU's variable its own unit
+    recorded = {"gyro.u": ("gyro", Bound("u", "V_PICKOFF", 0, "Real", 1e-3))}
+    for name, value in (("gyro.u", 2.0), ("gyro.V_PICKOFF", 2e-3)):
+        block = {"time": np.zeros(1), name: np.full(1, 2.0)}
+        series = find_series(
+            ResultFile("x", list(block), "time", lambda names, b=block: iter([b])), recorded, set(), set()
+        )
+        assert series[0]["gyro.u"].si(block, np.array([0])) == [value]
 
 
 def test_parameters_of_a_container(small: System, tmp_path: Path) -> None:
@@ -179,3 +189,14 @@ def test_parameters_of_a_container(small: System, tmp_path: Path) -> None:
     parameters = {v.name: v for v in read_model_description(str(options)).modelVariables if v.causality == "parameter"}
     assert list(parameters) == ["latitude", "dwell"]  # of the plan and of parts at once: turns
     assert float(parameters["latitude"].start) == math.radians(45.75)
+
+
+def test_an_option_called_time_stays_built_in(tmp_path: Path) -> None:
+    """The container has a variable ``time`` of its own."""
+    pytest.importorskip("fmu_manipulation_toolbox")
+    system = load_system("attitude_estimator")
+    export_container(system, tmp_path / "c.fmu")
+    names = [v.name for v in read_model_description(str(tmp_path / "c.fmu")).modelVariables]
+    assert names.count("time") == 1 and "heading_period" in names
+    with pytest.raises(ExportError, match="--expose time: a container has a variable of that name"):
+        export_container(system, tmp_path / "d.fmu", expose=["time"])
