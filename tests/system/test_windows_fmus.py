@@ -1,0 +1,93 @@
+"""FMUs of Windows give the bits of those of this platform: a part and a system, run by a small host in C under wine.
+
+The same host runs a library of this platform too, so what is compared under wine is known to work here.
+"""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+from fmpy import read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+from gyrobench.exchange.system_fmu import export_fmu
+from gyrobench.packaging import build
+from gyrobench.packaging.compiler import PLATFORMS, command, this_platform
+from gyrobench.packaging.native_target import header_folder
+from gyrobench.system.system import System
+
+HOST = Path(__file__).parents[1] / "foreign" / "host.c"
+STEPS, STEP = 2000, 1e-3
+QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
+
+
+def host(platform: str, folder: Path) -> list[str]:
+    """Compile the host; return the command that runs it.  Skips where the platform cannot be had."""
+    cc = command(platform)
+    if cc is None:
+        pytest.skip(f"no compiler for {platform} (gyrobench[cross])")
+    wine = shutil.which("wine64") or shutil.which("wine")
+    if platform == "win64" and wine is None:
+        pytest.skip("wine is not installed: the FMUs of Windows are not run")
+    file = folder / ("host.exe" if platform == "win64" else "host")
+    libraries = [] if platform == "win64" else ["-ldl"]
+    subprocess.run([*cc, "-O1", f"-I{header_folder()}", str(HOST), "-o", str(file), *libraries], check=True)
+    return [wine, str(file)] if platform == "win64" and wine else [str(file)]
+
+
+def run(host: list[str], fmu: Path, platform: str, references: list[int], folder: Path) -> list[list[float]]:
+    """Return the outputs after each step, from the library in an FMU."""
+    description = read_model_description(str(fmu))
+    name = f"{description.coSimulation.modelIdentifier}{PLATFORMS[platform][0]}"
+    with zipfile.ZipFile(fmu) as archive:
+        library = archive.extract(f"binaries/{platform}/{name}", folder)
+    words = [*host, library, description.guid, str(STEPS), repr(STEP), *map(str, references)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.split("\n")[:-1]
+    return [[struct.unpack(">d", bytes.fromhex(word.strip()))[0] for word in line.split()] for line in lines]
+
+
+def by_fmpy(fmu: Path, references: list[int], folder: Path) -> list[list[float]]:
+    """Return the same by FMPy, from the library of this platform."""
+    description = read_model_description(str(fmu))
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    name = description.coSimulation.modelIdentifier
+    one = FMU2Slave(guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName="one")
+    one.instantiate()
+    one.setupExperiment(startTime=0.0)
+    one.enterInitializationMode()
+    one.exitInitializationMode()
+    rows = []
+    for k in range(STEPS):
+        one.doStep(k * STEP, STEP)
+        rows.append(list(one.getReal(references)))
+    one.freeInstance()
+    return rows
+
+
+def check(fmu: Path, platform: str, command_of_host: list[str], tmp_path: Path) -> None:
+    outputs = [v.valueReference for v in read_model_description(str(fmu)).modelVariables if v.causality == "output"]
+    here = by_fmpy(fmu, outputs, tmp_path / "here")
+    assert len(here) == STEPS and len({tuple(row) for row in here}) > STEPS // 2  # it moves
+    assert run(command_of_host, fmu, platform, outputs, tmp_path / "there") == here
+
+
+@pytest.mark.parametrize("platform", [this_platform(), "win64"])
+def test_a_part_gives_the_same_bits(platform: str, tmp_path: Path) -> None:
+    """With all its noise: the logarithm in the tails of the normal numbers is the platform's own."""
+    command_of_host = host(platform, tmp_path)
+    platforms = tuple(dict.fromkeys([this_platform(), platform]))
+    check(build("floated_gyro", out=tmp_path, platforms=platforms), platform, command_of_host, tmp_path)
+
+
+def test_a_system_gives_the_same_bits_on_windows(small: System, tmp_path: Path) -> None:
+    command_of_host = host("win64", tmp_path)
+    export_fmu(small, tmp_path / "small.fmu", values=QUICK, seed=5, platforms=(this_platform(), "win64"))
+    check(tmp_path / "small.fmu", "win64", command_of_host, tmp_path)
