@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gyrobench as gb
 from gyrobench.engine.session import run
 from gyrobench.exchange.container import export_container
 from gyrobench.exchange.external_record import record_from_series
@@ -92,6 +93,9 @@ def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: 
     series = {n: found[n] for n in names(system)}
     record = record_from_series(system, series, ours["run"].replace(step=2 * STEP))
     fmpy = estimates(system, record)
+    reduced = gb.load("tumble_single_axis", VALUES).reduce_result(found)  # by the names of the array
+    assert {c.name: c.estimate for c in reduced.result.coefficients} == fmpy
+    assert reduced.record.run.step == 2 * STEP and "0.002 s" in reduced.record.run.notes[-1]
     assert len(ours["coefficients"]) == 9
     for name, c in ours["coefficients"].items():
         coupling = 2.0 * (double[name] - single[name])  # of the double step
