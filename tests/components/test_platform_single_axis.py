@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
@@ -17,8 +17,9 @@ Platform = load_part("platform_single_axis", BENCH)
 BARE = {"viscous": 0.0, "k_e": 0.0}
 
 
-def made(inputs=None, **parameters):
-    part = Platform(**parameters)
+def made(inputs=None, native=False, **parameters):
+    """native: for long runs."""
+    part = Native("platform_single_axis", **parameters) if native else Platform(**parameters)
     for name, x in (inputs or {}).items():
         part.set(name, x)
     part.initialize()
@@ -58,7 +59,7 @@ def test_motor_and_platform_are_the_linear_system(h):
 
 def test_motor_without_inductance_is_the_limit_of_a_small_one():
     """i = (v - k_e w) / R at once: w = v / k_e (1 - exp(-t k_t k_e / (R J)))."""
-    p = made(L=0.0, viscous=0.0)
+    p = made(native=True, L=0.0, viscous=0.0)
     run(p, 2.0, each=lambda t: p.set("v", 4.0))
     assert p.theta_dot == pytest.approx(4.0 * (1 - math.exp(-2.0 * 1.0 / (2.0 * 2.0))), rel=1e-9)
     assert p.i_motor == pytest.approx((4.0 - p.theta_dot) / 2.0, rel=1e-12)
@@ -89,12 +90,12 @@ def test_reducer_under_an_accelerated_base():
 
 def test_limits_of_voltage_and_current():
     """48 V at 2 Ohm want 24 A; with i_max = 5 A the torque is 5 N.m: w = 2.5 t but for the first 0.5 ms of rise."""
-    p = made(i_max=5.0, k_e=0.0, viscous=0.0)
+    p = made(native=True, i_max=5.0, k_e=0.0, viscous=0.0)
     run(p, 1.0, each=lambda t: p.set("v", 1e3))
     assert p.i_motor == 5.0 and p.saturated == 1.0
     lost = 5.0 / (48.0 / 4e-3) / 2  # the rise is nearly straight: half of its time is lost
     assert p.theta_dot == pytest.approx(2.5 * (1.0 - lost), rel=2e-4)
-    free = made(viscous=0.0, i_max=1e3)
+    free = made(native=True, viscous=0.0, i_max=1e3)
     run(free, 60.0, h=1e-2, each=lambda t: free.set("v", 1e3))
     assert free.theta_dot == pytest.approx(48.0, rel=1e-6) and free.saturated == 1.0  # v_max / k_e, not 1000
     free.set("v", 40.0)
@@ -132,7 +133,7 @@ def test_gyro_wired_by_its_torque_acts_as_a_load():
 # -------------------------------------------------------------------------------------------- bearing
 def test_slip_stops_where_energy_says_and_stays():
     """J w2/2 = F x: 0.5 rad/s on 0.4 N.m stop after 0.625 rad, 2.5 s (the contact gives way by presliding)."""
-    p = made(friction=0.4, theta_dot_0=0.5, **BARE)
+    p = made(native=True, friction=0.4, theta_dot_0=0.5, **BARE)
     rows = run(p, 4.0)
     assert rows[-1, 1] == pytest.approx(0.625, abs=1e-4)
     stop = rows[np.argmax(rows[:, 2] <= 0.0), 0]
@@ -145,7 +146,7 @@ def test_slip_stops_where_energy_says_and_stays():
 @pytest.mark.parametrize("load, sticks", [(0.59, True), (-0.59, True), (0.61, False), (-0.61, False)])
 def test_sticks_up_to_break_away_without_creep(load, sticks):
     """Held torque: the contact turns by M / (stiction / presliding) and no further; beyond it (M - F) / J goes on."""
-    p = made(friction=0.4, stiction=0.6, presliding=1e-4, **BARE)
+    p = made(native=True, friction=0.4, stiction=0.6, presliding=1e-4, **BARE)
     rows = run(p, 3.0, each=lambda t: p.set("M_load", load * min(1.0, t)))
     if sticks:
         assert rows[-1, 1] == pytest.approx(load / 0.6 * 1e-4, rel=1e-9)
@@ -160,7 +161,7 @@ def test_sticks_up_to_break_away_without_creep(load, sticks):
 def test_stick_slip_as_counted_by_events():
     """A spring k pulled at u: sticks until k x = F_s, then J y'' = k (u t - y) - F_c until y' = 0 (events)."""
     k, u, fs, fc, inertia = 20.0, 0.02, 0.6, 0.4, 2.0
-    p = made(friction=fc, stiction=fs, presliding=2e-6, **BARE)
+    p = made(native=True, friction=fc, stiction=fs, presliding=2e-6, **BARE)
     half = 1.25e-4  # the held torque is that of mid-step
     rows = run(p, 8.0, h=2 * half, each=lambda t: p.set("M_load", k * (u * (t + half) - p.angle - half * p.theta_dot)))
     t, y, slips = 0.0, 0.0, []
@@ -202,7 +203,7 @@ def test_bearing_never_gives_more_than_its_spring_holds():
 # ------------------------------------------------------------------------------- unbalance and frames
 def test_unbalance_makes_a_pendulum():
     """Centre 0.01 kg.m above the axis (+z), f up: J th'' = +u g sin th (falls over); against solve_ivp over 10 s."""
-    p = made(unbalance=[0.0, 0.01], theta_0=0.05, **BARE)
+    p = made(native=True, unbalance=[0.0, 0.01], theta_0=0.05, **BARE)
     rows = run(p, 10.0, h=5e-3)
     fall = lambda t, x: [x[1], 0.01 * 9.80665 * math.sin(x[0]) / 2.0]  # noqa: E731
     truth = solve_ivp(fall, (0, 10), [0.05, 0.0], rtol=1e-11, atol=1e-13).y[0, -1]

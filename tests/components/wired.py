@@ -8,6 +8,8 @@ from typing import Any
 from gyrobench.component import Component
 from gyrobench.component.vectors import copied
 from gyrobench.packaging import load_part
+from gyrobench.packaging.instance import make
+from gyrobench.system.values import flatten
 
 BENCH = Path(__file__).resolve().parents[2]
 DEG_H = 3.141592653589793 / 180.0 / 3600.0
@@ -56,6 +58,35 @@ def plan(phases: list[dict[str, Any]], faces: list[Any]) -> dict[str, Any]:
     flat = [[float(x) for row in f for x in row] for f in faces]
     out["faces"] = flat + [[1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0]] * (12 - len(flat))
     return out
+
+
+class Native:
+    """A part as its native FMU, driven as the plain class is: ``set``, ``do_step``, numbers as attributes.
+
+    For long runs: five times as fast.
+    """
+
+    def __init__(self, name: str, **parameters: Any) -> None:
+        self._fmu = make(name, "native", bench=BENCH)
+        self._fmu.set({e: x for n, v in parameters.items() for e, x in flatten(n, v).items()})
+
+    def initialize(self) -> None:
+        self._fmu.initialize()
+
+    def set(self, name: str, x: float) -> None:
+        self._fmu.set({name: x})
+
+    def get(self, name: str) -> float:
+        return self._fmu.get([name])[0]
+
+    def do_step(self, t: float, h: float) -> None:
+        self._fmu.step(t, h)
+
+    def __getattr__(self, name: str) -> float:
+        return self.get(name)
+
+    def __del__(self) -> None:
+        self._fmu.free()
 
 
 class Wired:
