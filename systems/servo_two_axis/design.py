@@ -1,8 +1,9 @@
 """The test as choices of mounts, each with the time in a mount.
 
 Which mounts are worth a run is found without one: along the path that the gyro's drift and the Earth make the table
-take, the reduction's own regressors give the information of each mount, that of several mounts is its sum, and all sets
-of the twelve are compared.  Neglected there: noise that is common to two mounts, effects that the reduction weighs.
+take, the reduction's own regressors and a trend of the drift, which it cannot exclude, give the information of each
+mount, that of several mounts is its sum, and all sets of the twelve are compared.  Neglected there: noise that is
+common to two mounts, constants that differ from mount to mount.
 """
 
 from __future__ import annotations
@@ -169,7 +170,8 @@ class TestModel:
             if not usable.any():
                 continue
             chosen = sets[usable]
-            merit[k, usable] = self._merit(chosen, known, wanted, criterion)
+            before = self._before(chosen, back, float(length))
+            merit[k, usable] = self._merit(chosen, known, before, wanted, criterion)
             ways = np.where(chosen, back, 0.0)
             total[k, usable] = chosen.sum(axis=1) * (length + self.lost) + ways.sum(axis=1) - ways.max(axis=1)
         length, cost = _crossing(lengths, merit, total, time)
@@ -189,17 +191,26 @@ class TestModel:
         return out
 
     def _merit(
-        self, sets: NDArray[np.bool_], known: Sequence[Mapping[str, Array] | None], wanted: Mapping[str, float],
-        criterion: str,
+        self, sets: NDArray[np.bool_], known: Sequence[Mapping[str, Array] | None], before: Array,
+        wanted: Mapping[str, float], criterion: str,
     ) -> Array:  # fmt: skip
-        """Return the criterion of (u/wanted)^2 of each set of mounts (m, 12), inf where it does not see something."""
+        """Return the criterion of (u/wanted)^2 of each set of mounts (m, 12), inf where it does not see something.
+
+        The last column of the information is the time in a mount; that of the whole test is later by ``before``, which
+        is so much of the column of the constant (the first).
+        """
         squares = []
         for c in "xy":
             names = drift.terms_2dof(c, self.terms)
             index = [names.index(n) for n in wanted if n in names]
-            p = len(names)
+            p = len(names) + 1
             each = np.array([np.zeros((p, p)) if k is None else k[c] for k in known])
-            M = np.einsum("sm,mij->sij", sets.astype(float), each)
+            there = sets.astype(float)
+            M = np.einsum("sm,mij->sij", there, each)
+            later = np.einsum("sm,mi->si", there * before, each[:, :, 0])
+            M[:, -1, -1] += 2.0 * later[:, -1] + np.einsum("sm,m->s", there * before**2, each[:, 0, 0])
+            M[:, :-1, -1] += later[:, :-1]
+            M[:, -1, :-1] += later[:, :-1]
             size = np.sqrt(np.maximum(np.einsum("sii->si", M), 1e-300))
             inverse = np.linalg.inv(M / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(p))
             variance = np.einsum("sii->si", inverse)
@@ -208,6 +219,13 @@ class TestModel:
             squares.append(np.nan_to_num(variance[:, index] / sizes**2, nan=math.inf))
         both = np.concatenate(squares, axis=1)
         out: Array = both.max(axis=1) if criterion == "minimax" else both.mean(axis=1)
+        return out
+
+    def _before(self, sets: NDArray[np.bool_], back: Array, length: float) -> Array:
+        """Return when each mount of each set begins (m, 12), in days: those with the shortest way back come first."""
+        order = np.argsort(back)
+        out = np.empty(sets.shape)
+        out[:, order] = (np.cumsum(sets[:, order], axis=1) - 1) * (length + self.lost) / self.day
         return out
 
     # ------------------------------------------------------------------------------------------ paths
@@ -229,12 +247,13 @@ class TestModel:
         return Track(angle, np.zeros_like(angle), base, t0, t1)
 
     def _information(self, path: Path, length: float) -> dict[str, Array]:
-        """Return the information matrix of each channel of ``length`` in a mount."""
+        """Return the information matrix of each channel of ``length`` in a mount: coefficients, trend."""
         track, out = self.track(path, length), {}
         inner = track.angle[:, :, 1].mean(axis=1)
         for c in "xy":
             L = np.linalg.cholesky(self.covariance(c, track.t_start, track.t_end, inner))
-            Z = np.linalg.solve(L, track.design(self.site, drift.terms_2dof(c, self.terms)))
+            X = track.design(self.site, drift.terms_2dof(c, self.terms))
+            Z = np.linalg.solve(L, np.column_stack([X, (track.t_start + track.t_end) / 2.0 / self.day]))
             out[c] = Z.T @ Z
         return out
 

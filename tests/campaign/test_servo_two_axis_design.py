@@ -86,19 +86,21 @@ def test_mounts_that_are_proposed_can_be_run_and_take_the_time_that_was_promised
     assert last_time(again) == pytest.approx(500.0, rel=0.03) and last_time(record) > 870.0
     with observed_fits() as fits:
         system.reduce(again)
-    promised = model._merit(*_set_of(model, best), wanted, "A")[0]
+    promised = model._merit(*_set_of(model, best), wanted, "A")[0]  # a trend of the drift is among the unknowns
     reached = []
     for c, (fit, _) in zip("xy", fits, strict=True):
         V = model.covariance(c, fit.t_start, fit.t_end, np.zeros_like(fit.t_start))
-        M = fit.X.T @ np.linalg.solve(V, fit.X)
-        reached += list(np.diag(np.linalg.inv(M)) / 1e-16)
+        X = np.column_stack([fit.X, (fit.t_start + fit.t_end) / 2.0 / model.day])
+        reached += list(np.diag(np.linalg.inv(X.T @ np.linalg.solve(V, X)))[:9] / 1e-16)
     assert promised == pytest.approx(np.mean(reached), rel=0.05)
 
 
-def _set_of(model: Any, choice: Any) -> tuple[Any, Any]:
+def _set_of(model: Any, choice: Any) -> tuple[Any, Any, Any]:
     mounts = [int(m) for m in choice.label.split()[1:]]
     known = [model._information(model._path(m), choice.start) if m in mounts else None for m in range(1, 13)]
-    return np.array([[m in mounts for m in range(1, 13)]]), known
+    there = np.array([[m in mounts for m in range(1, 13)]])
+    order = np.array([mounts.index(m) if m in mounts else 99.0 for m in range(1, 13)])
+    return there, known, model._before(there, order, choice.start)
 
 
 def test_the_time_in_which_the_table_settles_counts_towards_gimbal_lock() -> None:
