@@ -1,6 +1,6 @@
-"""Every system as one native FMU in FMPy: validated, and its first steps compared with the bench's own run bit for bit.
+"""Every system as one FMU in FMPy: validated, and its first steps compared with the bench's own run bit for bit.
 
-python tests/benchmarks/system_fmus.py [--steps 1000] [--fmi 2|3] [system ...]
+python tests/benchmarks/system_fmus.py [--steps 1000] [--fmi 2|3 | --container] [system ...]
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from fmpy.validation import validate_fmu
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine.session import Session
+from gyrobench.exchange.container import export_container
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.suite import Suite, load_test
 
@@ -24,6 +25,7 @@ def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     ask.add_argument("--steps", type=int, default=1000)
     ask.add_argument("--fmi", type=int, default=2)
+    ask.add_argument("--container", action="store_true", help="a container of the FMUs in place of the native FMU")
     ask.add_argument("systems", nargs="*")
     asked = ask.parse_args()
     worse = 0
@@ -34,12 +36,17 @@ def main() -> None:
             system, file, began = session.system, Path(folder) / f"{name}.fmu", time.process_time()
             for attribute, value in {"stop": asked.steps * system.step, "channel_period": system.step}.items():
                 setattr(type(system), attribute, value)  # before the export: plans may follow the period
-            export_fmu(system, file, fmi=asked.fmi)
+            if asked.container:
+                export_container(system, file)
+            else:
+                export_fmu(system, file, fmi=asked.fmi)
             problems = list(validate_fmu(str(file)))
             own = session.run().channels
-            found = simulate_fmu(str(file), stop_time=asked.steps * system.step, output_interval=system.step)
-            for channel in own:
-                if channel != "time" and not np.array_equal(found[channel][: len(own["time"])], own[channel]):
+            wanted = [channel for channel in own if channel != "time"]  # locals of a container among them
+            times = {"stop_time": asked.steps * system.step, "output_interval": system.step, "step_size": system.step}
+            found = simulate_fmu(str(file), output=wanted, **times)
+            for channel in wanted:
+                if not np.array_equal(found[channel][: len(own["time"])], own[channel]):
                     problems.append(f"{channel} differs")
             size, took = file.stat().st_size / 1024, time.process_time() - began
         worse += bool(problems)
