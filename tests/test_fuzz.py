@@ -8,8 +8,8 @@ import pytest
 from fuzzing import attacks
 
 INPUTS = {
-    "csv": 400, "numbers": 20, "series": 200, "set": 300, "settings": 200, "units": 800, "mapping": 150, "spec": 100,
-    "record": 100, "result": 150, "fmu": 75, "ssp": 10, "other": 150,
+    "csv": 1200, "numbers": 40, "series": 400, "set": 900, "settings": 500, "units": 900, "mapping": 300, "spec": 200,
+    "record": 200, "result": 300, "fmu": 75, "ssp": 10, "other": 150,
 }  # fmt: skip
 
 
