@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult
@@ -101,6 +102,48 @@ def test_a_tilted_head_is_wrong_by_the_tangent_of_the_latitude(sessions: Callabl
     assert abs(off(run(sessions, "four", **values))) == pytest.approx(3e-3 * math.tan(math.radians(45.75)), rel=1e-2)
     assert abs(off(run(sessions, "tilt", **values))) < 0.02 * ARCMIN
     assert abs(off(run(sessions, "strapdown two", **values))) < 1e-7
+
+
+def test_printed_formulas_fail_on_records(sessions: Callable[[str], Session]) -> None:
+    """GSP 5-50, 5-54, 5-55, 5-59 and 5-65c as printed (EG16, EG18 to EG21, EG24) and corrected, on windows of runs."""
+    psi, latitude = math.radians(40.0), math.radians(45.75)
+    values = {**QUIET, "heading": psi, "latitude": latitude, "gyro.bias": [0.0, 0.0]}
+    north, up = frames.EARTH_RATE * math.cos(latitude), frames.EARTH_RATE * math.sin(latitude)
+
+    def windows(method: str, **more: float) -> tuple[np.ndarray, ...]:
+        """Return angle of the head (clockwise), rates along x and y, specific forces along x and y."""
+        record = run(sessions, method, **values, **more)
+        w = {name: np.asarray(column) for name, column in record.windows.items()}
+        return -(w["angle_start"] + w["angle_end"]) / 2.0, w["mean_x"], w["mean"], w["f_x"], w["f_y"]
+
+    angle, _, rate, *_ = windows("four")
+    w0, w1, w2, w3 = (rate[np.abs(np.sin((angle - k * math.pi / 2) / 2)) < 0.1].mean() for k in range(4))
+    assert math.atan2(w3 - w1, w0 - w2) == pytest.approx(psi, abs=1e-5)
+    assert math.acos((w1 - w3) / (2 * north)) == pytest.approx(psi + math.pi / 2, abs=1e-4)  # 5-50: an arcsine
+
+    angle, _, w, *_ = windows("continuous")
+    part = np.mod(angle, 2 * math.pi) < 4.0  # of whole turns sin and cos are orthogonal, and a wrong sum is times 0
+    s, c, w = np.sin(angle[part]), np.cos(angle[part]), w[part]
+    ss, cc, sc, wc, ws = s @ s, c @ c, s @ c, w @ c, w @ s
+    D = ss * cc - sc**2
+    A, B = (ss * wc - sc * ws) / D, (sc * wc - cc * ws) / D
+    assert math.atan2(B, A) == pytest.approx(psi, abs=1e-3)
+    assert math.atan2(-B, A) == pytest.approx(-psi, abs=1e-3)  # the sign of B in 5-55
+    assert abs((ss * wc - np.sin(w).sum() * sc) / D / A - 1.0) > 0.05  # 5-54: sum w sin
+    assert abs(math.atan2((cc * ws - c.sum() * sc) / D, A) - psi) > 0.5  # 5-55: sum w cos (it gives 90 deg)
+
+    _, x, y, f_x, f_y = (column.mean() for column in windows("strapdown", pitch=0.0873, roll=0.0873))
+    g = float(frames.normal_gravity(latitude))
+    theta = math.asin(f_y / g)
+    gamma = -math.asin(f_x / (g * math.cos(theta)))
+    assert (theta, gamma) == pytest.approx((0.0873, 0.0873), abs=1e-5)
+    forward = north * math.cos(psi) * math.cos(theta)
+    assert y == pytest.approx(forward + up * math.sin(theta), rel=1e-5)
+    assert abs(y - (forward - up * math.sin(theta))) > 0.1 * north  # 5-59
+    for vertical, right in ((up, True), (frames.EARTH_RATE, False)):  # 5-65c has the whole Earth rate
+        above = -(x * math.cos(theta) - y * math.sin(gamma) * math.sin(theta) + vertical * math.sin(gamma))
+        found = math.atan2(above, (y - vertical * math.sin(theta)) * math.cos(gamma))
+        assert (abs(found - psi) < 1e-5) is right and (abs(found - psi) < 10 * ARCMIN) is right
 
 
 def test_drift_of_the_bias(sessions: Callable[[str], Session]) -> None:
