@@ -14,6 +14,8 @@ from gyrobench.files import temporary_folder
 if TYPE_CHECKING:
     from distributed import Client
 
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
 
 @contextlib.contextmanager
 def connect(
@@ -65,8 +67,11 @@ def local_cluster(workers: int) -> Iterator[Client]:
 
     settings = {
         "distributed.scheduler.allowed-failures": 0,  # the campaign decides what is repeated
+        # without dask's MALLOC_TRIM_THRESHOLD_: memory given back after each array and asked for again is a tenth of a run
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(ONE_THREAD, 1),
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.admin.system-monitor.interval": "5s",
         "distributed.comm.timeouts.connect": "30s",
     }
     with (
