@@ -67,7 +67,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
 
     settings = {
         "distributed.scheduler.allowed-failures": 0,  # the campaign decides what is repeated
-        # without dask's MALLOC_TRIM_THRESHOLD_: memory given back after each array and asked for again is a tenth of a run
+        # without dask's MALLOC_TRIM_THRESHOLD_: memory given back after each array is asked for again, a tenth of a run
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(ONE_THREAD, 1),
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.gil.enabled": False,
