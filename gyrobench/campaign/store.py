@@ -273,6 +273,10 @@ class CampaignStore(Campaign):
             self._replace(files, "runs", table.set_column(k, table.field(k), [pa.array(paths, pa.string())]))
         if len(files := self._files("log")) > 1:
             self._replace(files, "log", _concatenated(self._tables("log")))
+        if self.local is not None:
+            for folder in ("runs", "log"):
+                for half in set((self.local / folder).glob("*")) - set((self.local / folder).glob("*.parquet")):
+                    half.unlink()  # of a writer that was killed; this one holds the lock
 
     def _write_table(self, folder: str, table: pa.Table) -> str:
         """Write a table under a name that its content gives it, and return its path."""

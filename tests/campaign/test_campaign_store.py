@@ -36,6 +36,17 @@ def runs(folder: Path) -> bytes:
     return file.read_bytes()
 
 
+def test_half_files_of_killed_writers_are_removed(tmp_path: Path) -> None:
+    with CampaignStore(tmp_path / "c") as store:
+        store.begin(DOCUMENT, PLAN, UNITS)
+        store.append(ROWS, UNITS)
+        half = tmp_path / "c" / "runs" / "0123.parquetx_y.part"
+        half.write_bytes(b"PAR1")
+        assert Campaign.open(tmp_path / "c").arrow().num_rows == 4
+        store.consolidate()
+    assert not half.exists() and runs(tmp_path / "c")
+
+
 def test_order_and_files_of_the_rows_change_no_bit(tmp_path: Path) -> None:
     seen = set()
     for k, order in enumerate(itertools.permutations(ROWS)):
