@@ -13,6 +13,8 @@ demo: $(VENV)/demo.stamp
 
 # mypy, on one core, runs beside the tests and is printed after them.
 # Without reordering: xdist would put files of few, long tests last.
+# With bytecode, whatever the environment says: hundreds of processes start, and each would compile every module.
+test: export PYTHONDONTWRITEBYTECODE =
 test: style
 	@$(BIN)/mypy > $(VENV)/mypy.log 2>&1 & types=$$!; \
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder; failed=$$?; \

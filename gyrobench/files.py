@@ -9,7 +9,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from gyrobench.errors import GyrobenchError
@@ -35,6 +35,40 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def make_once(path: Path, make: Callable[[Path], object]) -> Path:
+    """Return ``path``; where there is no such file, ``make(path)`` writes it whole, in one process at a time.
+
+    The others that want the same file wait for it.  For files of a cache, whose names say what they hold.
+    """
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _turn(path.with_name(path.name + LOCK)):
+            if not path.exists():
+                make(path)
+    return path
+
+
+@contextlib.contextmanager
+def _turn(lock: Path) -> Iterator[None]:
+    """Wait for a lock, hold it, and remove its file; a file system without locks lets everybody in."""
+    while True:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT)
+        with contextlib.suppress(OSError):
+            _lock(handle, wait=True)
+        try:
+            if os.path.samestat(os.fstat(handle), os.stat(lock)):
+                break
+        except FileNotFoundError:
+            pass
+        os.close(handle)  # the process before removed the file between opening and locking it
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # on Windows an open file stays, until the last process is through
+            lock.unlink()
+        os.close(handle)
 
 
 def sha256(path: Path) -> str:
@@ -101,19 +135,20 @@ class FolderLock:
         self.release()
 
 
-def _lock(handle: int) -> None:
-    """Lock an open file for this process.  Raises OSError where another one has it."""
+def _lock(handle: int, wait: bool = False) -> None:
+    """Lock an open file for this process.  Raises OSError where another one has it, or waits for its end."""
     if os.name == "nt":
         import msvcrt
 
         # beyond the number of the process, which others read
         os.lseek(handle, 1024, os.SEEK_SET)
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        how = msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK  # type: ignore[attr-defined,unused-ignore]
+        msvcrt.locking(handle, how, 1)  # type: ignore[attr-defined,unused-ignore]
         os.lseek(handle, 0, os.SEEK_SET)
         return
     import fcntl
 
-    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
 
 
 def temporary_folder() -> Path:

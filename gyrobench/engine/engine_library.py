@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench
+from gyrobench.files import make_once
 from gyrobench.packaging import compiler
 
 SOURCE = Path(__file__).with_name("engine.c")
@@ -31,14 +32,15 @@ def library_path(name: str, source: str) -> Path:
 
 def make_library(path: Path, source: str) -> Path:
     """Compile a library where it is not there, and return its path.  Raises CompilerError."""
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
+
+    def compiled(path: Path) -> None:
         with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            file, compiled = Path(folder) / "engine.c", Path(folder) / path.name
+            file, library = Path(folder) / "engine.c", Path(folder) / path.name
             file.write_text(source, encoding="utf-8")
-            compiler.compile_library(file, compiled, (), compiler.this_platform())
-            os.replace(compiled, path)
-    return path
+            compiler.compile_library(file, library, (), compiler.this_platform())
+            os.replace(library, path)
+
+    return make_once(path, compiled)
 
 
 def open_library(path: Path) -> Any:

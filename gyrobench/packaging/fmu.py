@@ -13,6 +13,7 @@ from pathlib import Path
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
+from gyrobench.files import make_once
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
@@ -139,7 +140,8 @@ def build(
     home = Bench.find(bench)
     suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
     cached = home.cache / f"{name}{suffix}-{content_hash(what, how, documentation, licence_text())[:20]}.fmu"
-    if not cached.exists():
+
+    def write(path: Path) -> None:
         if target == "native":
             files = native_target.source_files(cls, guid, fmi)
             entries = native_entries(files, identifier, platforms, fmi)
@@ -154,7 +156,9 @@ def build(
         entries |= index_page(name, summary(cls), cls.__doc__ or "", cls.layout) | licences(target == "python")
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
-        write_archive(cached, entries)
+        write_archive(path, entries)
+
+    make_once(cached, write)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")

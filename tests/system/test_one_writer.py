@@ -69,6 +69,53 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
         FolderLock(tmp_path / "r")
 
 
+MAKING = """
+import os, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from gyrobench import files
+
+folder = Path(sys.argv[2])
+
+def note(name):
+    with (folder / name).open("a") as file:
+        print(os.getpid(), file=file)
+
+def telling(handle, wait=False, lock=files._lock):
+    note("asked")
+    lock(handle, wait)
+
+def make(path):
+    note("made")
+    if "killed" in sys.argv:
+        os.kill(os.getpid(), signal.SIGKILL)
+    while not (folder / "go").exists():
+        time.sleep(0.01)
+    files.write_whole(path, b"content")
+
+files._lock = telling
+print(files.make_once(folder / "cache" / "library.so", make).read_text())
+"""
+
+
+def test_a_file_of_the_cache_is_made_once(tmp_path: Path) -> None:
+    """Six processes want a file: one makes it, and ends only when all others have asked for their turn.
+
+    A process that was killed in its turn has left it to them.
+    """
+    words = [sys.executable, "-c", MAKING, ROOT, str(tmp_path)]
+    assert subprocess.run([*words, "killed"]).returncode == -signal.SIGKILL
+    made, asked = tmp_path / "made", tmp_path / "asked"
+    assert len(made.read_text().split()) == 1 and not (tmp_path / "cache" / "library.so").exists()
+    asked.unlink()
+    six = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(6)]
+    wait_for(lambda: asked.is_file() and len(set(asked.read_text().split())) == 6, six[0])
+    (tmp_path / "go").touch()
+    assert [p.communicate()[0] for p in six] == ["content\n"] * 6
+    assert len(made.read_text().split()) == 2
+    assert [p.name for p in (tmp_path / "cache").iterdir()] == ["library.so"]  # and no lock
+
+
 def test_two_runs_into_one_folder(command: Command, tmp_path: Path) -> None:
     long = ("fixed_position", "--engine", "reference", "--out", str(tmp_path / "r"))
     process = started(*long, cwd=tmp_path)
