@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.frames import G0
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import SINES
 
@@ -24,13 +25,16 @@ def simulated_errors(run: RunDocument) -> dict[str, float]:
     """Return source -> error, SI, of what is set in the table and in the mount of the gyro; nothing of measured data.
 
     Angle readings of the orders 1 and 2 (positive where too much is read), the axis off the pole, the gyro turned on
-    the table.
+    the table; of a table that a gyro holds, its axis in each phase and its unbalance over the stiffness of its servo.
     """
     if run.measured:
         return {}
-    return {
-        name: x for name, x in (_angles(run.parameters) | _axis(run.parameters) | _mount(run.parameters)).items() if x
-    }
+    p = run.parameters
+    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p)
+    for row in run.plan:
+        if row.mode == "servo":
+            found |= _servo_axis(p, row.phase)
+    return {name: x for name, x in found.items() if x}
 
 
 def _angles(p: Mapping[str, Any]) -> dict[str, float]:
@@ -53,6 +57,38 @@ def _angles(p: Mapping[str, Any]) -> dict[str, float]:
 def _axis(p: Mapping[str, Any]) -> dict[str, float]:
     tilt = p.get("table.tilt", (0.0, 0.0))
     return {"table axis off the pole, about east": tilt[0], "table axis off the pole, about p × east": tilt[1]}
+
+
+def _servo_axis(p: Mapping[str, Any], phase: int) -> dict[str, float]:
+    """Return the turn of the axis x about y and z of the attitude, along which the first two axes of the table lie."""
+    tilt = p.get("table.tilt", (0.0, 0.0))
+    return {f"table axis about {n} (phase {phase})": x for n, x in zip("yz", tilt, strict=True)}
+
+
+def _unbalance(p: Mapping[str, Any]) -> dict[str, float]:
+    """Return the angles by which the unbalance, across the axis at 1 g, turns a table against its servo."""
+    stiffness = servo_stiffness(p)
+    mass = p.get("table.axis_unbalance", p.get("table.unbalance"))
+    if stiffness is None or mass is None or np.size(mass) != 2:
+        return {}
+    return {
+        f"unbalance over stiffness (mass along {n})": float(m) * G0 / stiffness for n, m in zip("yz", mass, strict=True)
+    }
+
+
+def servo_stiffness(p: Mapping[str, Any]) -> float | None:
+    """Return the static stiffness (N.m/rad) of a servo, of its parameter or of a sampled one's law; None where unknown.
+
+    Sampled, all poles at p:  K_T = (2 J / T2)(g - a) / (1 - b), b = (p3 + 3 p2 + 3 p - 3) / 4, g = 2 + b - 3 p,
+    a = p3 - b.  [CTRL-SAMPLED]
+    """
+    if given := p.get("table.stiffness"):
+        return float(given)
+    if any(f"table.{n}" not in p for n in ("law_J", "law_p", "period", "H_g")):
+        return None
+    J, pole, period = (float(p[f"table.{n}"]) for n in ("law_J", "law_p", "period"))
+    b = (pole**3 + 3.0 * pole**2 + 3.0 * pole - 3.0) / 4.0
+    return 2.0 * J / period**2 * (2.0 + 2.0 * b - 3.0 * pole - pole**3) / (1.0 - b)
 
 
 def _mount(p: Mapping[str, Any]) -> dict[str, float]:

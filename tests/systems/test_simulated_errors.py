@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from servoing import QUIET
+from servoing import DAY50, QUIET, W50
 from tumbling import DPH, NAMES, SHORT
 
+from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
 ARCSEC = math.pi / 648000.0
+PHI = math.radians(45.75)
 GYRO = {"D_F": -0.3, "D_I": -0.9, "D_O": 0.1, "D_S": -0.7, "D_II": -0.05, "D_SS": 0.04}  # deg/h/g^n
 DRIFT = {f"gyro.{n}": GYRO.get(n, 0.0) * DPH for n in NAMES}
 STILL = {"gyro.turn_on": 0.0, "gyro.markov": 0.0, "gyro.white": 3e-11, "gyro.pickoff": 0.0, "nuisances": "none"}
@@ -111,3 +113,44 @@ def test_servo_table() -> None:
         "table.encoder_phase[1]": 0.7,
     }
     agree("servo_vertical_level", {}, {**SERVO, "cycles": 1}, errors, 0.05)
+
+
+#: the day in 29 minutes; counts of 0.02", between two of which the servo of a gyro without noise hunts
+BUILT = {**DAY50, **SERVO, "table.quantum": 1e-7, "window": 24.0, "dwell": 72.0}
+del BUILT["table.rumble"]
+
+
+def test_polar_servo_on_the_table_as_it_is_built() -> None:
+    """Scale, axis and unbalance of a table whose sampled controller holds the gyro, and the gyro on it, all at once.
+
+    0.004 kg.m over 11070 N.m/rad (p = 0.5) are 0.73": 0.004 deg/h/g2 in D_IS at fifty Earth rates.  The scale moves
+    D_S, the axis D_I and D_O; each is of the order 0.1 deg/h/g.
+    """
+    errors = {
+        "table.scale_eccentricity": 40.0 * ARCSEC,
+        "table.scale_eccentricity_phase": 0.7,
+        "table.scale_tilt": -30.0 * ARCSEC,
+        "table.tilt": [60.0 * ARCSEC, -40.0 * ARCSEC],
+        "table.axis_unbalance": [0.004, -0.003],
+        "gyro.mount": Rotation.from_rotvec(np.array([0.0, 40.0, 60.0]) * ARCSEC).as_matrix().tolist(),
+    }
+    agree("servo_polar", {"table": "table_servo_dynamic"}, BUILT, errors, 0.05)
+
+
+def test_unbalance_over_the_stiffness_of_a_sampled_servo() -> None:
+    """a = m g0 / K_T with K_T = 547 g.cm/arcsec (p = 0.5): a mass along y moves D_IO, one along z D_IS, each by
+    2 a W g c / (g2 sin 2 phi) downwards.  [BEARING-AIR, SERVO-TF]
+    """
+    system, parts = load_system("servo_polar"), {"table": "table_servo_dynamic"}
+    values = {**BUILT, "route": "combination"}
+    wrong = {**values, "table.axis_unbalance": [0.004, 0.003]}
+    with Session("servo_polar", parts) as session:
+        plain, off = (system.with_values(v).reduce(session.run(v, seed=3)) for v in (values, wrong))
+    stiffness = 547.0 * 9.80665e-5 / ARCSEC
+    g = frames.normal_gravity(PHI) / frames.G0
+    per_mass = frames.G0 / stiffness * W50 / (g * math.sin(PHI)) / DPH
+    moved = {c.name: off[c.name].estimate - c.estimate for c in plain.coefficients}
+    for name, mass in (("D_IO", 0.004), ("D_IS", 0.003)):
+        assert moved[name] == pytest.approx(-mass * per_mass, rel=0.03)
+        assert predicted(off)[name] == pytest.approx(-mass * per_mass, rel=0.01)
+    assert max(abs(v) for n, v in moved.items() if n not in ("D_IO", "D_IS")) < 3e-4 * per_mass, moved

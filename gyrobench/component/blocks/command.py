@@ -103,6 +103,14 @@ class CountCommand(Block):
             "acceleration = {acceleration} rad/s2 is below the resolution, 2^-37 counts in {period} s squared",
         )
         self.unit_v = self.quantum / COUNT
+        self.halt()
+
+    def even(self, counts: Number) -> Number:
+        """Return counts in phase units, rounded to an even number: half of it is whole."""
+        return 2.0 * floor(counts * (0.5 * COUNT) + 0.5)
+
+    def halt(self) -> None:
+        """Forget the motion and its command."""
         self.moving = 0.0
         self.v = 0.0
         self.v_next = 0.0
@@ -111,12 +119,9 @@ class CountCommand(Block):
         self.mode_last = 0.0
         self.target_last = 0.0
 
-    def even(self, counts: Number) -> Number:
-        """Return counts in phase units, rounded to an even number: half of it is whole."""
-        return 2.0 * floor(counts * (0.5 * COUNT) + 0.5)
-
     def rest(self, angle: Number) -> None:
         """Set the reference to rest at an angle."""
+        self.halt()
         y = angle / self.quantum
         self.count = floor(y + EDGE)
         self.part = maximum(floor((y - self.count) * COUNT + 0.5), 0.0)

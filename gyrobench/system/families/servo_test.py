@@ -154,7 +154,7 @@ class ServoTest(TableTest):
             **stand_parameters(SERVO_ATTITUDES[n] for n in names),
             "table.base": BASE,
             "table.index_rate": INDEX_RATE,
-            "table.capture_rate": CAPTURE_RATE,
+            "table.capture_rate?": CAPTURE_RATE,
             **gyro_on_table(parts),
         }
 
