@@ -1,6 +1,7 @@
 """Compare the estimators of the bench in the loop of the platform, at one phase margin and in pairs of equal seed.
 
     python systems/platform_single_axis/compare_estimators.py --out FOLDER
+    python systems/platform_single_axis/compare_estimators.py --out FOLDER --estimators estimator_wavelet:sym4
 
 Every estimator is set to the same phase lag at 10 Hz.  What is left of the differences (none has no lag, averages and
 wavelets come in steps) is taken out by the crossover of the loop, moved until the measured phase margin is the one
@@ -21,15 +22,16 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 import gyrobench as gb
+from gyrobench.component.blocks import wavelets
 
 Array = NDArray[np.float64]
 
 NAMES = (
     "none", "moving_average", "alpha_beta_gamma", "kalman_ar", "kalman_rate", "kalman_robust", "sage_husa", "wavelet",
-    "aided",
+    "aided", "wavelet:bior1.5", "wavelet:db4", "wavelet:sym4", "wavelet:coif4", "wavelet:running",
 )  # fmt: skip
 SYSTEM, FREQUENCY, LAG = "platform_single_axis", 10.0, 8.0  # Hz, degrees
-MARGIN, SEARCHED = 55.0, (5.0, 20.0)  # degrees; Hz
+MARGIN, SEARCHED = 55.0, (3.0, 20.0)  # degrees; Hz
 NOISE, STEP = 3e-4, 5e-4  # A/sqrt(Hz), s
 CORRELATION = 5.0  # s, of the rate in the autoregressive filter: long against a period of the crossover
 
@@ -76,7 +78,8 @@ def tracking_response(theta: float, f: float, step: float) -> complex:
 def tuned(name: str, f: float, lag: float, step: float, variance: float) -> dict[str, float]:
     """Return the parameters of an estimator that lags by ``lag`` degrees at f Hz, or as near as its steps allow.
 
-    step: its sampling period, s.  variance: of a reading.  {} for one without a parameter.
+    name: of its part; "estimator_wavelet:sym4" is that of another wavelet, "estimator_wavelet:running" the one whose
+    thresholds follow the noise.  step: its sampling period, s.  variance: of a reading.  {} without a parameter.
     """
 
     def solved(of: Callable[[float], complex], low: float, high: float) -> float:
@@ -95,14 +98,21 @@ def tuned(name: str, f: float, lag: float, step: float, variance: float) -> dict
         return {"p": 1, "phi[1]": math.exp(-step / CORRELATION), "phi[2]": 0.0, "phi[3]": 0.0, "Q": Q}
     if name == "estimator_moving_average":
         return {"N": max(1, round(1.0 + 2.0 * delay))}
-    if name == "estimator_wavelet":  # Haar: 2^J - 1 readings late
-        return {"moments": 1, "J": min(range(1, 7), key=lambda J: abs(2**J - 1 - delay))}
+    part, _, kind = name.partition(":")
+    if part == "estimator_wavelet":  # Haar, if nothing is said
+        running = kind == "running"
+        number = 1 if running or not kind else wavelets.NAMES.index(kind) + 1
+        late = 0.5 * (wavelets.taps(number) + wavelets.short_taps(number)) - 1.0  # readings, of one level
+        levels = range(1, 6 if kind == "coif4" else 7)
+        J = min(levels, key=lambda J: abs(late * (2.0**J - 1.0) - delay))
+        return {"wavelet": number, "J": J, "running": running}
     return {}
 
 
 def experiment(part: str, crossover: float, hold: str) -> gb.Experiment:
     """Return the test of an estimator at this crossover, Hz."""
-    test = gb.load(SYSTEM, parts={"estimator": part}, contest=True, reading_noise=NOISE, hold=hold, crossover=crossover)
+    parts = {"estimator": part.partition(":")[0]}
+    test = gb.load(SYSTEM, parts=parts, contest=True, reading_noise=NOISE, hold=hold, crossover=crossover)
     for name, value in tuned(part, FREQUENCY, LAG, STEP, NOISE**2 / STEP).items():
         test.set(f"estimator.{name}", value)
     return test
@@ -126,14 +136,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the runs and of the comparison")
     parser.add_argument("--seeds", type=int, default=8, help="runs of each estimator")
     parser.add_argument("--hold", default="40s", help="length of each ride")
-    parser.add_argument("--estimators", nargs="+", default=[f"estimator_{n}" for n in NAMES], help="names of parts")
+    parser.add_argument(
+        "--estimators", nargs="+", default=[f"estimator_{n}" for n in NAMES], help="names, as in tuned()"
+    )
     arguments: Any = parser.parse_args()
     runs, names = [], []
     for part in arguments.estimators:
         crossover = at_margin(part)
         test = experiment(part, crossover, arguments.hold)
         for seed in range(1, arguments.seeds + 1):
-            folder = arguments.out / part / str(seed)
+            folder = arguments.out / part.replace(":", "_") / str(seed)
             runs.append(test.run(seed, check_step=False, out=folder, force=True))
             names.append(f"{part}/{seed}")
         print(f"{part}: crossover {crossover:.2f} Hz, {arguments.seeds} runs in {arguments.out / part}", flush=True)

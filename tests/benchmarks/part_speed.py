@@ -1,7 +1,8 @@
 """Time of one communication step of 1 ms of every native part: set inputs, step, get outputs.
 
 Run by hand: ``python tests/benchmarks/part_speed.py [part ...]``.  Parameters (noise on) and inputs are those of
-the parts' reference runs, repeated.  The best of many short rounds counts: the machine may be shared.
+the parts' reference runs, repeated.  The processor time of the best of many short rounds counts: the machine may be
+shared.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from scipy import linalg, signal
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.series import harmonics, quantization, rates, wavelets
 from gyrobench.reduction.series.checks import SeriesError
-from gyrobench.reduction.series.gauss_markov import GaussMarkov
+from gyrobench.reduction.series.gauss_markov import GaussMarkov, _Likelihood, settling
 from gyrobench.reduction.series.orthogonal import orthogonal_fit, orthonormal
 from gyrobench.reduction.series.smoothing import LinearModel, smooth, smooth_drift
 from gyrobench.reduction.series.stepwise import eliminate
@@ -259,6 +259,19 @@ def test_one_at_a_time_groups_family_and_refusals() -> None:
         eliminate(turn, y, names, 0.05, protected=("C1",))
 
 
+# ------------------------------------------------------------------- correlation time of long records
+def test_filtered_likelihood_is_that_of_the_tridiagonal_factors() -> None:
+    """s < 0: means over the sampling interval.  Values before the filter is steady: r^2k = 1e-18."""
+    x = 3.0 + signal.lfilter([1.0], [1.0, -0.95], np.random.default_rng(19).normal(size=19_000))
+    found = _Likelihood(x, True)
+    for phi, s in ((0.95, 0.0), (0.95, 1.0), (0.5, 30.0), (0.999, 5.0), (0.2, 1e4), (0.97, -0.01)):
+        expected = found.mixed(phi, s)  # shorter than LONG: by factors
+        assert found.filtered(phi, s, settling(phi, s)) == pytest.approx(expected, rel=1e-11)
+    # q = 3/4, s = 1: P^2 = 3/4, r = 1/2/(1.866025) = 0.267949, 2 + 41.45/(2 1.316958) = 17.7
+    assert settling(0.5, 1.0) == 18
+    assert settling(0.9999999, 1e5) > 19_000 and settling(0.9, -0.8) == 0
+
+
 # ---------------------------------------------------------------------------------------- smoothing
 def test_smoother_is_the_dense_estimate() -> None:
     """Random time-varying model, Wbar not zero, 25 readings: states, disturbances and covariances of the estimate of
@@ -318,7 +331,7 @@ def test_levels_and_filters_of_the_source() -> None:
     assert [wavelets.level_for(1.0, dt) for dt in (1e-3, 1e-2)] == [6, 3]
     with pytest.raises(SeriesError, match="no level"):
         wavelets.level_for(30.0, 1e-2)
-    with pytest.raises(SeriesError, match="available: db4"):
+    with pytest.raises(SeriesError, match="available: haar, db4"):
         wavelets.highest_level(100, "db5")
 
 

@@ -285,16 +285,22 @@ def script() -> ModuleType:
         ("aided", 8.0),
         ("moving_average", 8.1),
         ("wavelet", 5.4),
+        ("wavelet:running", 5.4),
+        ("wavelet:bior1.5", 9.0),
+        ("wavelet:db4", 12.6),
+        ("wavelet:sym4", 12.6),
+        ("wavelet:coif4", 41.4),
     ],
 )
 def test_tuned_parts_lag_as_stated(script: ModuleType, name: str, lag: float) -> None:
     """The part itself, run on a sine of 10 Hz: phase of a fit over the last ten periods.
 
-    Averages and wavelets come in steps of readings: 4.5 and 3 readings of 0.5 ms are 8.1 and 5.4 degrees.
+    Averages and wavelets come in steps of readings: 4.5 and 3 readings of 0.5 ms are 8.1 and 5.4 degrees; one level of
+    bior1.5, db4 or sym4, coif4 is 5, 7, 23 readings.
     """
     h, variance = 5e-4, LOUD**2 / 5e-4
     values = script.tuned(f"estimator_{name}", 10.0, 8.0, h, variance)
-    cls = load_part(f"estimator_{name}")
+    cls = load_part(f"estimator_{name.partition(':')[0]}")
     part = cls(Ts=h)
     for key, value in {"R": variance, "sigma": 0.0, **values}.items():
         if key.partition("[")[0] in cls.declarations:
