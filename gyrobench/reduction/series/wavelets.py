@@ -7,7 +7,7 @@ Wavelets: db4, sym4, coif4, bior1.5, haar (PyWavelets).  With a constant truth a
 2^(-J/2) whatever the wavelet, and the deepest level looks best; a signal limits it: 1/(2^(J+1) dt) >= 4 f
 (:func:`level_for`). Running sigma: the median of a window moves with the record, for noise whose level changes.  It
 uses samples on both sides of each value, so it is no filter for a loop: components/estimator_wavelet is, which has the
-same wavelets, threshold and least window (gyrobench/component/blocks/wavelets.py), without decimation and causal.
+same wavelets, threshold and least window, without decimation and causal.
 [EST-WAVELET; Xia 2008, eq. 4.3.1..4.3.8, table 4.3.2 with EX21..EX23, EX29]
 """
 
@@ -20,9 +20,13 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from gyrobench.component.blocks.wavelets import COEFFICIENTS, MEDIAN, WINDOW
-from gyrobench.component.blocks.wavelets import NAMES as WAVELETS
 from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+
+# those of the part, which a reduction does not import (gyrobench/component/blocks/wavelets.py): a test compares them
+WAVELETS = ("haar", "db4", "sym4", "coif4", "bior1.5")
+MEDIAN = 0.6745  # of |d| over the standard deviation of a normal variate
+WINDOW = 1024  # samples, least of a running sigma
+COEFFICIENTS = 31  # least in a running window, on deep levels
 
 
 @dataclass(frozen=True)
