@@ -72,6 +72,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.admin.system-monitor.interval": "5s",
+        "distributed.admin.tick.interval": "500ms",  # of every loop of every process, 20 ms by default
         "distributed.comm.timeouts.connect": "30s",
     }
     with (

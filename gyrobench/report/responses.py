@@ -167,7 +167,8 @@ def _phase_axis(ax: Any) -> None:
     from matplotlib.ticker import MultipleLocator
 
     low, high = ax.get_ylim()
-    ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
+    ticks = ((90.0, 300.0), *((step, 3.0 * step) for step in (45.0, 30.0, 15.0, 10.0, 5.0, 2.0, 1.0)))
+    ax.yaxis.set_major_locator(MultipleLocator(next((step for step, span in ticks if high - low >= span), 0.5)))
     for level in range(-900, 901, 360):
         if low <= level - 180 <= high:
             ax.axhline(level - 180, color=MUTED, linewidth=0.8, zorder=1)

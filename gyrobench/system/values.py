@@ -42,13 +42,15 @@ def nest(values: Mapping[str, Any]) -> dict[str, Any]:
             continue
         cells = arrays.setdefault(name, {})
         nested.setdefault(name, None)  # its place
-        *outer, last = map(int, index[:-1].split(","))
-        for i in outer:
-            cells = cells.setdefault(i, {})
-        cells[last] = value
+        if "," in index:
+            *outer, index = index.split(",")
+            for i in outer:
+                cells = cells.setdefault(int(i), {})
+        cells[int(index[:-1])] = value
 
-    def build(cells: Any) -> Any:
-        return [build(cells[k]) for k in sorted(cells)] if isinstance(cells, dict) else cells
+    def build(cells: dict[int, Any]) -> list[Any]:
+        ordered = [cells[k] for k in sorted(cells)]
+        return [build(c) for c in ordered] if isinstance(ordered[0], dict) else ordered
 
     return nested | {name: build(cells) for name, cells in arrays.items()}
 

@@ -75,8 +75,10 @@ def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) 
         with np.errstate(over="ignore"):  # a constant that a combination does not have: sd 0
             density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
         step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
-        new = np.where((step >= low) & (step <= high) & (k < 12), step, (low + high) / 2.0)
-        done = bool(np.all(np.abs(new - x) <= 1e-9 * high))
+        inside = (step >= low) & (step <= high) & (k < 12)
+        new = np.where(inside, step, (low + high) / 2.0)
+        # the error after a step of Newton's is of the order of its square
+        done = bool(np.all(np.abs(new - x) <= np.where(inside, 1e-6, 1e-9) * high))
         x = new
         if done:
             break
