@@ -3,8 +3,9 @@
     python tests/benchmarks/peers.py NAME FOLDER STEPS
 
 FOLDER holds loop.ssp, loop.fmu (container), one.fmu (linked), the four FMUs and four_parts (the loop in C).  Prints
-{"us": microseconds of processor time a step, of all threads, "at_1s": plant position at t = 1 s}.  Only the stepping is
-timed; every master reads two channels each 10 ms.
+{"us": microseconds of processor time a step, "at_1s": plant position at t = 1 s}; of masters with threads, which wait
+for one another on a machine with idle cores, wall time where that is less.  Only the stepping is timed; every master
+reads two channels each 10 ms.
 """
 
 from __future__ import annotations
@@ -121,17 +122,26 @@ def container(folder: Path, steps: int, name: str = "loop.fmu") -> tuple[float, 
     return time.process_time() - t, float(rows[AT_1S][0])
 
 
+def clocks() -> tuple[float, float]:
+    return time.process_time(), time.perf_counter()
+
+
+def since(then: tuple[float, float]) -> float:
+    """Return the less of processor time, of all threads, and wall time."""
+    return min(now - was for now, was in zip(clocks(), then, strict=True))
+
+
 def ecospy(folder: Path, steps: int) -> tuple[float, float]:
     from ecospy import EcosSimulation
 
     with EcosSimulation(ssp_path=str(folder / "loop.ssp"), step_size=H) as sim:
         sim.init()
         rows = []
-        t = time.process_time()
+        t = clocks()
         for _ in range(0, steps, EVERY):
             sim.step(EVERY)
             rows.append((sim.get_real("plant::position"), sim.get_real("controller::u")))
-        seconds = time.process_time() - t
+        seconds = since(t)
         sim.terminate()
     return seconds, float(rows[AT_1S][0])
 
@@ -151,11 +161,11 @@ def libcosimpy(folder: Path, steps: int) -> tuple[float, float]:
     other = execution.slave_index_from_instance_name("controller")
     command = next(v.reference for v in execution.slave_variables(other) if v.name == b"u")
     rows = []
-    t = time.process_time()
+    t = clocks()
     for _ in range(0, steps, EVERY):
         execution.step(EVERY)
         rows.append((observer.last_real_values(index, [reference])[0], observer.last_real_values(other, [command])[0]))
-    return time.process_time() - t, float(rows[AT_1S][0])
+    return since(t), float(rows[AT_1S][0])
 
 
 PEERS = {

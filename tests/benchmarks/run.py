@@ -68,7 +68,7 @@ def masters(quick: bool) -> None:
     from gyrobench.packaging import build
     from gyrobench.system.system import load_system
 
-    print("\nFour trivial FMUs in a loop, 1 ms step, two channels each 10 ms: microseconds of CPU a step")
+    print("\nFour trivial FMUs in a loop, 1 ms step, two channels each 10 ms: microseconds a step (peers.py)")
     folder = Path(tempfile.mkdtemp(prefix="gyrobench-bench-"))
     try:
         for name in peers.ORDER:
