@@ -171,27 +171,30 @@ class History:
         return np.asarray(np.sqrt(sum(v**2 for _, _, v in self.sources(settings, s).values())))
 
 
-def model(c: Settings, p: Piece) -> Array:
-    """Return F of a stretch."""
-    k1, k2, j1, j2, kz, ki = c.gains(p.stage, p.w, p.rise)
-    heading = p.stage >= TURN
-    x, y = (-c.north * math.sin(p.psi), c.north * math.cos(p.psi)) if heading else (0.0, 0.0)
-    z = c.up - p.turning
-    F = np.zeros((N, N))
-    F[:3, :3] = [[-k1, z, -y], [-z, -k2, x], [y, -x, 0.0]]  # phi x Omega, and - k t
-    F[0, J] = F[1, J + 1] = 1.0
-    F[:3, D : D + 3] = F[:3, M : M + 3] = np.eye(3)
-    F[0, A], F[1, A + 1], F[2, Y] = -k1, -k2, kz
-    if p.stage >= FAST:
-        F[Y, [PHI, A, Y]] = p.w / LAG * np.array([1.0, 1.0, -1.0])
-    F[J, [PHI, A]] = -j1
-    F[J + 1, [PHI + 1, A + 1]] = -j2
-    F[2, I], F[2, KAPPA] = 1.0, z
-    F[I, [PHI, A]] = ki
-    F[V, [PHI, A]] = -p.weight * k1
-    F[V + 1, [PHI + 1, A + 1]] = -p.weight * k2
-    if p.stage == COARSE:
-        F[V, J] = F[V + 1, J + 1] = p.weight
+def models(c: Settings, stretches: list[Piece]) -> Array:
+    """Return F of each stretch (n, 18, 18)."""
+    k1, k2, j1, j2, kz, ki = np.array([c.gains(p.stage, p.w, p.rise) for p in stretches]).T
+    turning, weight, w = np.array([(p.turning, p.weight, p.w) for p in stretches]).T
+    heading = np.array([(-math.sin(p.psi), math.cos(p.psi)) if p.stage >= TURN else (0.0, 0.0) for p in stretches])
+    x, y = c.north * heading.T
+    z = c.up - turning
+    stage = np.array([p.stage for p in stretches])
+    F = np.zeros((len(stretches), N, N))
+    F[:, 0, 0], F[:, 0, 1], F[:, 0, 2] = -k1, z, -y  # phi x Omega, and - k t
+    F[:, 1, 0], F[:, 1, 1], F[:, 1, 2] = -z, -k2, x
+    F[:, 2, 0], F[:, 2, 1] = y, -x
+    F[:, 0, J] = F[:, 1, J + 1] = 1.0
+    F[:, :3, D : D + 3] = F[:, :3, M : M + 3] = np.eye(3)
+    F[:, 0, A], F[:, 1, A + 1], F[:, 2, Y] = -k1, -k2, kz
+    lag = np.where(stage >= FAST, w / LAG, 0.0)
+    F[:, Y, PHI], F[:, Y, A], F[:, Y, Y] = lag, lag, -lag
+    F[:, J, PHI] = F[:, J, A] = -j1
+    F[:, J + 1, PHI + 1] = F[:, J + 1, A + 1] = -j2
+    F[:, 2, I], F[:, 2, KAPPA] = 1.0, z
+    F[:, I, PHI] = F[:, I, A] = ki
+    F[:, V, PHI] = F[:, V, A] = -weight * k1
+    F[:, V + 1, PHI + 1] = F[:, V + 1, A + 1] = -weight * k2
+    F[:, V, J] = F[:, V + 1, J + 1] = np.where(stage == COARSE, weight, 0.0)
     return F
 
 
@@ -254,9 +257,24 @@ def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
 
 
 def transition(F: Array) -> Array:
-    """Return exp(F) by its series, for the small steps of an alignment (1e-4 and better)."""
+    """Return exp(F) of each matrix by its series, for the small steps of an alignment (1e-4 and better)."""
     unit = np.eye(N)
     return np.asarray(unit + F @ (unit + F @ (unit + F @ (unit + F / 4.0) / 3.0) / 2.0))
+
+
+def steps(c: Settings, stretches: list[Piece], tau: float) -> tuple[Array, Array]:
+    """Return the transition over each stretch (n, 18, 18) and what each noise adds to the covariance (n, 3, 18, 18)."""
+    F = models(c, stretches)
+    F[:, M : M + 3, M : M + 3] = -np.eye(3) / tau
+    time = np.array([p.time for p in stretches])[:, None, None]
+    half = transition(F * (0.5 * time))
+    T = half @ half
+    driven = np.empty((len(stretches), len(DRIVEN), N, N))
+    for noise, columns in DRIVEN:
+        G = np.broadcast_to(np.eye(N)[:, columns], F[:, :, columns].shape) if noise == 1 else F[:, :, columns]
+        first, middle, last = (v @ v.transpose(0, 2, 1) for v in (G, half @ G, T @ G))
+        driven[:, noise] = time / 6.0 * (2.0 / tau if noise == 1 else 1.0) * (first + 4.0 * middle + last)  # Simpson
+    return T, driven
 
 
 @lru_cache(maxsize=64)
@@ -268,25 +286,17 @@ def history(c: Settings, psi: float, total: float, tau: float = 300.0) -> Histor
     t, rows = 0.0, []
     before = LEVEL
     at = psi
-    for p in pieces(c, psi, total):
+    stretches = list(pieces(c, psi, total))
+    for p, T, driven in zip(stretches, *steps(c, stretches, tau), strict=True):
         if p.stage != before:
             if before in (COARSE, SECOND):
-                T = windowed(c, before, at)
-                X, P = T @ X, T @ P @ T.T
+                end = windowed(c, before, at)
+                X, P = end @ X, end @ P @ end.T
             if p.stage >= FAST > before and c.positions == 1:
                 X[J] = 0.0
                 P[:, J, :] = P[:, :, J] = 0.0
             before = p.stage
-        F = model(c, p)
-        F[M : M + 3, M : M + 3] = -np.eye(3) / tau
-        half = transition(F * (0.5 * p.time))
-        T = half @ half
-        X, P = T @ X, T @ P @ T.T
-        for noise, columns in DRIVEN:
-            G = np.eye(N)[:, columns] if noise == 1 else F[:, columns]
-            pushes = [G, half @ G, T @ G]  # Simpson
-            size = p.time / 6.0 * (2.0 / tau if noise == 1 else 1.0)
-            P[noise] += size * sum(f * (v @ v.T) for f, v in zip((1, 4, 1), pushes, strict=True))
+        X, P = T @ X, T @ P @ T.T + driven
         t += p.time
         at = p.psi
         rows.append(
@@ -309,6 +319,7 @@ def window_noise(c: Settings, s: Sensors) -> float:
     return math.sqrt((white + wander) / c.positions) / c.north
 
 
+@lru_cache(maxsize=64)
 def designed(c: Settings, s: Sensors, wanted: float, psi: float, total: float) -> Settings:
     """Return the settings with what is not given (coarse_time, frequencies 0, fast_time below 0) chosen for ``wanted``.
 
