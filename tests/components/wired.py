@@ -139,10 +139,10 @@ class Native:
         values = self._values
         if not shape:
             return values[first]
-        if len(shape) == 1:
-            return values[first : first + shape[0]]
+        if len(shape) == 1:  # tuples: a copy that is written to would be lost
+            return tuple(values[first : first + shape[0]])
         rows, columns = shape
-        return [values[first + k * columns : first + (k + 1) * columns] for k in range(rows)]
+        return tuple(tuple(values[first + k * columns : first + (k + 1) * columns]) for k in range(rows))
 
     def __setattr__(self, name: str, x: Any) -> None:
         first, shape = self._places[name]
