@@ -1,11 +1,11 @@
-"""The servo loop of the tests: table and gyro as plain classes."""
+"""The servo loop of the tests: table and gyro, as native FMUs or, to be linearized, as plain classes."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from wired import BENCH, NO_DRIFT, QUIET, FloatedGyro
+from wired import BENCH, NO_DRIFT, QUIET, FloatedGyro, Native
 
 from gyrobench.packaging import load_part
 
@@ -23,11 +23,13 @@ FREE = {"H": 0.04, "J": 3e-5, "C": 1e-9, "K_sg": 10.0}  # undamped
 class Loop:
     """Table and gyro, table first: each sees the newest output of the other."""
 
-    def __init__(self, gyro=SLOW, *, h=H, face=ALONG, inputs=None, gyro_parameters=None, **parameters):
+    def __init__(self, gyro=SLOW, *, h=H, face=ALONG, inputs=None, gyro_parameters=None, plain=False, **parameters):
         self.h, self.k = h, 0
-        self.gyro = FloatedGyro(**{**QUIET, **NO_DRIFT, **gyro, **(gyro_parameters or {})})
+        gyro_values = {**QUIET, **NO_DRIFT, **gyro, **(gyro_parameters or {})}
+        self.gyro = FloatedGyro(**gyro_values) if plain else Native("floated_gyro", **gyro_values)
         design = dict(zip(("H_g", "J_g", "C_g", "K_g"), (gyro[n] for n in ("H", "J", "C", "K_sg")), strict=True))
-        self.table = TableServo(**{"capture": 0, **design, **parameters})
+        table_values = {"capture": 0, **design, **parameters}
+        self.table = TableServo(**table_values) if plain else Native("table_servo", **table_values)
         self.table.mode, self.table.face = 3.0, face
         for name, x in (inputs or {}).items():
             setattr(self.table, name, x)

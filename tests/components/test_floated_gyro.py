@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, RebalanceAnalog, Wired
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, RebalanceAnalog, Wired
 
 from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
@@ -18,9 +18,9 @@ G0 = 9.80665
 RNG = np.random.default_rng(11)
 
 
-def started(**parameters):
+def started(plain=False, **parameters):
     inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f", "i", "dT", "v_float") if k in parameters}
-    part = FloatedGyro(**parameters)
+    part = FloatedGyro(**parameters) if plain else Native("floated_gyro", **parameters)
     for key, x in inputs.items():
         setattr(part, key, x)
     part.initialize()
@@ -30,7 +30,7 @@ def started(**parameters):
 def looped(h=H, late=False, **parameters):
     """Gyro and rebalance; the gyro sees the current of the step before."""
     inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f") if k in parameters}
-    gyro, loop = FloatedGyro(**{**QUIET, **parameters}), RebalanceAnalog(meter=0.0)
+    gyro, loop = Native("floated_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
     for key, x in inputs.items():
         setattr(gyro, key, x)
     return Wired({"gyro": gyro, "rebalance": loop}, ["gyro", "rebalance"], late=late)
@@ -163,7 +163,7 @@ def test_pickoff_saturates():
 
 # ---------------------------------------------------------------------------------------- static model
 def test_standard_gyro():
-    part = started(**QUIET)
+    part = started(plain=True, **QUIET)
     assert {n: getattr(part, n) for n in NAMES} == pytest.approx(STANDARD, rel=1e-15)
     for _ in range(10):
         f = RNG.normal(size=3) * 10.0
@@ -249,9 +249,9 @@ def test_gauss_markov_variance_and_correlation(h):
 def test_gauss_markov_starts_stationary_and_turn_on_is_one_value_a_run():
     first, constant = [], []
     for seed in range(1500):
-        part = started(**{**QUIET, **NO_DRIFT, "markov": 1e-8, "seed": seed})
+        part = started(plain=True, **{**QUIET, **NO_DRIFT, "markov": 1e-8, "seed": seed})
         first.append(part.drift)
-        part = started(**{**QUIET, **NO_DRIFT, "turn_on": 3e-8, "seed": seed})
+        part = started(plain=True, **{**QUIET, **NO_DRIFT, "turn_on": 3e-8, "seed": seed})
         constant.append(part.drift)
     spread = 5 / math.sqrt(2 * 1500)
     assert np.std(first) == pytest.approx(1e-8, rel=spread)

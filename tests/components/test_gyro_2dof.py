@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH, DEG_H, RebalanceAnalog, Wired
+from wired import BENCH, DEG_H, Native, Wired
 
 from gyrobench import drift as bench_drift
 from gyrobench.component import ComponentError
@@ -24,9 +24,9 @@ STILL = {**QUIET, **NO_DRIFT}
 INPUTS = ("omega", "f", "i_x", "i_y")
 
 
-def started(**parameters):
+def started(plain=False, **parameters):
     inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
-    part = Gyro2dof(**parameters)
+    part = Gyro2dof(**parameters) if plain else Native("gyro_2dof", **parameters)
     for key, x in inputs.items():
         setattr(part, key, x)
     part.initialize()
@@ -37,9 +37,9 @@ def looped(late=False, **parameters):
     """The gyro and two rebalances: u_x feeds i_y, u_y feeds i_x."""
     inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
     parts = {
-        "gyro": Gyro2dof(**{**QUIET, **parameters}),
-        "about_y": RebalanceAnalog(meter=0.0),
-        "about_x": RebalanceAnalog(meter=0.0),
+        "gyro": Native("gyro_2dof", **{**QUIET, **parameters}),
+        "about_y": Native("rebalance_analog", meter=0.0),
+        "about_x": Native("rebalance_analog", meter=0.0),
     }
     for key, x in inputs.items():
         setattr(parts["gyro"], key, x)
@@ -65,7 +65,7 @@ def test_ageing_temperature_and_translation_of_each_channel():
     heat = {f"D{c}_T{a}": x for c in "xy" for a, x in zip("xyz", rng.uniform(1e-8, 9e-8, 3), strict=True)}
     move = {f"D{c}_v{a}": x for c in "xy" for a, x in zip("xyz", rng.uniform(0.5, 2.0, 3), strict=True)}
     size = {f"D{c}_{n}": 1e-6 * rng.uniform(1.0, 4.0) for c in "xy" for n in "0xyz"}
-    part = started(**{**STILL, **size, **slow, **heat, **move}, age=100.0)
+    part = started(plain=True, **{**STILL, **size, **slow, **heat, **move}, age=100.0)
     part.f, part.dT, part.v_float = f.tolist(), dT.tolist(), v.tolist()
     for now, age in ((0.0, 100.0), (10.0, 110.0)):
         if now:
@@ -292,7 +292,7 @@ def test_names_and_terms_are_those_of_the_bench():
 def test_every_coefficient_multiplies_its_product():
     rng = np.random.default_rng(8)
     some = {name: rng.normal() * DEG_H for name in NO_DRIFT}
-    part = started(**QUIET, **some, terms_x=10, terms_y=10)
+    part = started(plain=True, **QUIET, **some, terms_x=10, terms_y=10)
     for _ in range(10):
         part.f = (rng.normal(size=3) * 10.0).tolist()
         part._dirty = True
@@ -352,9 +352,9 @@ def test_gauss_markov_per_channel():
 def test_random_drift_at_the_start():
     first, constant = [], []
     for seed in range(1500):
-        part = started(**{**STILL, "markov_x": 1e-8, "markov_y": 2e-8, "seed": seed})
+        part = started(plain=True, **{**STILL, "markov_x": 1e-8, "markov_y": 2e-8, "seed": seed})
         first.append([part.drift_x, part.drift_y])
-        part = started(**{**STILL, "turn_on_x": 3e-8, "turn_on_y": 5e-8, "seed": seed})
+        part = started(plain=True, **{**STILL, "turn_on_x": 3e-8, "turn_on_y": 5e-8, "seed": seed})
         constant.append([part.drift_x, part.drift_y])
     spread = 5 / math.sqrt(2 * 1500)
     assert np.std(first, axis=0) == pytest.approx([1e-8, 2e-8], rel=spread)

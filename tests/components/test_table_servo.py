@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from servo_loop import ARCSEC, FAST, GCM, H, Loop, TableServo
-from wired import TableRate
+from wired import Native, TableRate
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
@@ -15,7 +15,7 @@ from gyrobench.linear.part_linearization import state_space
 
 def kinematic(**parameters):
     inputs = {k: parameters.pop(k) for k in ("mode", "target", "face", "omega_local", "f_local") if k in parameters}
-    part = TableServo(**parameters)
+    part = Native("table_servo", **parameters)
     for key, x in inputs.items():
         setattr(part, key, x)
     part.initialize()
@@ -148,7 +148,7 @@ def test_rumble_gives_the_angle_its_density_over_the_stiffness():
     """Torque noise well inside the band of the loop: angle density = torque density / K_T; rms by the closed loop."""
     part = Loop(rumble=1e-4, h=1e-3)
     track = part.run(6.0)
-    cut = Loop()
+    cut = Loop(plain=True)
     cut.run(H)
     table = state_space(cut.table, ["torque", "u"], ["angle", "omega[1]"])
     gyro = state_space(cut.gyro, ["omega[1]"], ["u"])

@@ -41,7 +41,7 @@ def margins(loop):
 )
 def test_margins_are_those_of_the_method(network, gyro, f_c, pm, gm, low, stiffness):
     """TABLE-SERVO, table of compensations: crossover, margins, lower gain limit, static stiffness in g.cm/arcsec."""
-    loop = Loop(gyro, network=network)
+    loop = Loop(gyro, network=network, plain=True)
     found = margins(loop)
     assert found["f_c"] == pytest.approx(f_c, rel=1e-3)
     assert found["PM"] == pytest.approx(pm, abs=0.06)
@@ -56,7 +56,7 @@ def test_gain_outside_its_limits_is_refused_and_unstable():
     """K_T 13209 g.cm/arcsec may fall to x0.074 and rise by 9.4 dB (x2.95): Routh's table against the poles."""
     nominal = 13209.15 * GCM / ARCSEC
     for factor in (0.0745, 2.93):
-        loop = Loop(stiffness=factor * nominal)
+        loop = Loop(stiffness=factor * nominal, plain=True)
         loop.run(H)
         table = state_space(loop.table, ["u"], ["omega[1]"])
         gyro = state_space(loop.gyro, ["omega[1]"], ["u"])
@@ -84,7 +84,7 @@ def test_own_network():
 @pytest.mark.parametrize("h", [1e-4, 1e-3])
 def test_exact_against_expm(h):
     """The README's number: fine loop open, random held voltages and torques, against expm of its linearization."""
-    part = Loop(h=h, viscous=0.3, angle0=0.2).table
+    part = Loop(h=h, viscous=0.3, angle0=0.2, plain=True).table
     part.omega_local = [0.0, 0.0, 5e-5]
     part.do_step(0.0, h)
     a = np.array(part.jacobian())
@@ -109,7 +109,7 @@ def test_exact_against_expm(h):
 
 
 def test_the_linearization_is_that_of_the_fine_loop_in_every_mode():
-    part = Loop().table
+    part = Loop(plain=True).table
     part.do_step(0.0, H)
     a = part.jacobian()
     part.u = 1.0
@@ -172,7 +172,7 @@ def test_drift_and_earth_rate():
 @pytest.mark.parametrize("h, lost", [(1e-4, 0.0), (1e-3, 0.2)])
 def test_phase_cost_of_the_exchange(h, lost):
     """Table first: the held rate leads by h/2, the held voltage lags by h/2.  At once: h more, 1.8 deg for 0.1 ms."""
-    loop = Loop()
+    loop = Loop(plain=True)
     loop.run(H)
     table = state_space(loop.table, ["u"], ["omega[1]"])
     gyro = state_space(loop.gyro, ["omega[1]"], ["u"])

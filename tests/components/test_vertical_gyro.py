@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from wired import BENCH, Wired
+from wired import BENCH, Native, Wired
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -35,9 +35,9 @@ def row(**first):
 def bench(gyro=None, erection=None, vehicle=None):
     vehicle = {"earth_rate": 0.0, **(vehicle or {})}
     parts = {
-        "vehicle": Manoeuvre(**vehicle),
-        "gyro": VerticalGyro(step=H, **(gyro or {})),
-        "erection": ErectionController(step=H, **(erection or {})),
+        "vehicle": Native("manoeuvre", **vehicle),
+        "gyro": Native("vertical_gyro", step=H, **(gyro or {})),
+        "erection": Native("erection_controller", step=H, **(erection or {})),
     }
     parts["vehicle"].step = H
     wired = Wired(parts, list(parts), WIRES)

@@ -81,8 +81,7 @@ class Native:
     """A part as its native FMU, driven as the plain class is and equal to it bit for bit: for long runs.
 
     Values are read and written in the memory of the instance, which begins with them in the order of the value
-    references (:mod:`gyrobench.engine.linked_system`).  An initialization may be repeated, as that of a plain part:
-    the mode is left with the first step.
+    references (:mod:`gyrobench.engine.linked_system`).  An initialization may be repeated, as that of a plain part.
     """
 
     def __init__(self, name: str, **parameters: Any) -> None:
@@ -95,39 +94,42 @@ class Native:
             _values=(ctypes.c_double * len(layout)).from_address(fmu.fmu.component),
             _component=fmu.fmu.component,
             _step=step(("fmi2DoStep", fmu.fmu.dll)),
-            _output=next(s.name for s in layout if s.section == "output"),
-            _settable=next(s for s in layout if s.section in ("parameter", "input")),
-            _mode="instantiated",
+            _input=next((s for s in layout if s.section == "input"), None),
+            _initialized=False,
+            _written=False,
         )
         self._call(fmu.set, {e: x for n, v in parameters.items() for e, x in flatten(n, v).items()})
 
-    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+    def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
         try:
-            return function(*arguments)
+            return function(*arguments, **named)
         except InstanceError as error:
             raise ComponentError(str(error)) from None
 
     def initialize(self, t0: float = 0.0) -> None:
-        fmu = self._fmu.fmu
-        if self._mode == "instantiated":
-            fmu.setupExperiment(startTime=t0)
-            fmu.enterInitializationMode()
-            vars(self)["_mode"] = "initialization"
-        some = self._settable
-        self.set(some.name, self._values[some.reference])  # the instance does not know of inputs written to its memory
-        self.get(self._output)
+        values, fmu = list(self._values), self._fmu.fmu
+        if self._initialized:
+            self._call(self._fmu.reset)
+            self._values[:] = values  # as the first initialization and the test have left them
+        for call, given in (
+            (fmu.setupExperiment, {"startTime": t0}),
+            (fmu.enterInitializationMode, {}),
+            (fmu.exitInitializationMode, {}),
+        ):
+            self._call(self._fmu._call, "initialize", call, **given)
+        vars(self).update(_initialized=True, _written=False)
 
     def set(self, name: str, x: float) -> None:
         self._call(self._fmu.set, {name: x})
 
     def get(self, name: str) -> float:
+        if self._written and self._input:  # the instance does not know of what is written to its memory
+            self.set(self._input.name, self._values[self._input.reference])
+        vars(self)["_written"] = False
         x: float = self._call(self._fmu.get, [name])[0]
         return x
 
     def do_step(self, t: float, h: float) -> None:
-        if self._mode != "running":
-            self._call(self._fmu._call, "initialize", self._fmu.fmu.exitInitializationMode)
-            vars(self)["_mode"] = "running"
         if self._step(self._component, t, h, 1):
             raise ComponentError("; ".join(self._fmu.messages))
 
@@ -146,6 +148,7 @@ class Native:
 
     def __setattr__(self, name: str, x: Any) -> None:
         first, shape = self._places[name]
+        vars(self)["_written"] = True
         if not shape:
             self._values[first] = x
             return
