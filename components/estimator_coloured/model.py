@@ -3,16 +3,38 @@ from __future__ import annotations
 from gyrobench.component import Discrete, Parameter, sampled
 from gyrobench.component.blocks.matrix_model import (
     NO_COVARIANCE,
+    NO_GAIN,
     NO_MATRIX,
     NO_READING,
+    SMALL,
     UNIT,
     LinearModel,
     M,
+    corner,
     decays,
+    padded,
+    propagated,
+    propagated_states,
     smallest_pivot,
+    tall,
     whitening,
 )
-from gyrobench.component.math import dot, vector
+from gyrobench.component.math import Vector, dot, vector
+
+
+def crossed(F: Vector, P: Vector, H: Vector, W: Vector, C: Vector) -> Vector:
+    """Return F P H' + W C'."""
+    return vector(F @ P @ H.T + W @ C.T)
+
+
+def seen(H: Vector, P: Vector, C: Vector, W: Vector) -> Vector:
+    """Return H P H' + C W C'."""
+    return vector(propagated(H, P) + propagated(C, W))
+
+
+def updated(L: Vector, P: Vector, rest: Vector, W: Vector, K: Vector, noise: Vector) -> Vector:
+    """Return L P L' + rest W rest' + K noise K'."""
+    return vector(propagated(L, P) + propagated(rest, W) + propagated(K, noise))
 
 
 class EstimatorColoured(LinearModel):
@@ -123,7 +145,15 @@ class EstimatorColoured(LinearModel):
                     P = self.F @ self.P @ self.F.T + self.W_k
                     H = vector(self.C)
                 y = z - H @ self.x
-                S = H @ P @ H.T + self.C @ W @ self.C.T + noise
+                small = self.n <= SMALL
+                S = vector(noise)
+                D = vector(NO_GAIN)
+                if small:
+                    S = seen(corner(H), corner(P), corner(self.C), corner(W)) + S
+                    D = tall(crossed(corner(F), corner(P), corner(H), corner(W), corner(self.C)))
+                else:
+                    S = seen(H, P, self.C, W) + S
+                    D = crossed(F, P, H, W, self.C)
                 for i in range(M):
                     if i >= self.m:  # a row of zeros, with a noise that is independent of all others
                         y[i] = 0.0
@@ -134,10 +164,13 @@ class EstimatorColoured(LinearModel):
                     "two readings have the same innovation to rounding (1e-12): P0 is too large against their noise",
                 )
                 e = G @ y
-                K = (F @ P @ H.T + W @ self.C.T) @ G.T @ G
+                K = D @ G.T @ G
                 L = F - K @ H
                 rest = vector(UNIT) - K @ self.C
-                P = L @ P @ L.T + rest @ W @ rest.T + K @ noise @ K.T
+                if small:
+                    P = padded(updated(corner(L), corner(P), corner(rest), corner(W), corner(K), noise))
+                else:
+                    P = updated(L, P, rest, W, K, noise)
                 self.x = F @ self.x + K @ y
                 self.P = (P + P.T) * 0.5
                 self.before = vector([self.z, self.z_2, self.z_3])
@@ -148,8 +181,8 @@ class EstimatorColoured(LinearModel):
                 self.e = dot(e, e)
                 self.show(self.x, self.P)
             else:
-                self.show(self.F @ self.x, self.F @ self.P @ self.F.T + self.W_k)
+                self.show(self.F @ self.x, propagated_states(self.F, self.P, self.n) + self.W_k)
                 self.F = self.A @ self.F  # one period more to the next instant
-                self.W_k = self.A @ self.W_k @ self.A.T + self.W
+                self.W_k = propagated_states(self.A, self.W_k, self.n) + self.W
                 self.psi_k = self.psi @ self.psi_k
                 self.V_k = self.psi @ self.V_k @ self.psi.T + self.V

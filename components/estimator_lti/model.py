@@ -1,7 +1,19 @@
 from __future__ import annotations
 
 from gyrobench.component import Parameter, sampled
-from gyrobench.component.blocks.matrix_model import NO_STATE, UNIT, LinearModel, M, smallest_pivot, whitening
+from gyrobench.component.blocks.matrix_model import (
+    NO_STATE,
+    SMALL,
+    UNIT,
+    LinearModel,
+    M,
+    corner,
+    padded,
+    propagated,
+    propagated_states,
+    smallest_pivot,
+    whitening,
+)
 from gyrobench.component.math import dot, vector
 
 
@@ -52,7 +64,7 @@ class EstimatorLti(LinearModel):
     def tick(self) -> None:
         if self.reading > 0.5:
             x = self.A @ self.x
-            P = self.A @ self.P @ self.A.T + self.W
+            P = propagated_states(self.A, self.P, self.n) + self.W
             z = vector([self.z, self.z_2, self.z_3])
             there = vector([self.valid, self.valid_2, self.valid_3])
             C = vector(self.C)
@@ -77,7 +89,10 @@ class EstimatorLti(LinearModel):
             e = G @ y
             K = P @ C.T @ G.T @ G
             rest = vector(UNIT) - K @ C
-            P = rest @ P @ rest.T + K @ V @ K.T
+            if self.n <= SMALL:
+                P = padded(propagated(corner(rest), corner(P)) + propagated(corner(K), V))
+            else:
+                P = propagated(rest, P) + propagated(K, V)
             self.x = x + K @ y
             self.P = (P + P.T) * 0.5
             self.ys = vector(y)

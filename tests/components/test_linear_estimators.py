@@ -58,6 +58,23 @@ def test_lti_is_the_matrix_filter(n: int, m: int) -> None:
     assert (found[:, 13] == valid.sum(axis=1)).all() and not found[:, n:6].any()
 
 
+@pytest.mark.parametrize("part", ["estimator_lti", "estimator_coloured"])
+def test_three_states_are_the_same_numbers_with_a_fourth_beside_them(part: str) -> None:
+    """Up to three states are computed in matrices of their size, more in those of six: sums without the zeros."""
+    rng = np.random.default_rng(33)
+    given, z = model(rng, 3, 3), rng.normal(size=(120, 3))
+    if part == "estimator_coloured":
+        given["psi"] = np.diag([0.8, 0.5, 0.2])
+    valid = rng.random(size=z.shape) > 0.1
+    wide = {name: np.zeros((4, 4)) for name in ("A", "W", "P0")} | {"C": np.zeros((3, 4)), "x0": np.zeros(4)}
+    for name, place in wide.items():
+        place[tuple(slice(0, k) for k in given[name].shape)] = given[name]
+    found = [
+        play(part, z, STATES, valid=valid, n=n, m=3, **padded(**{**given, **more})) for n, more in ((3, {}), (4, wide))
+    ]
+    assert np.array_equal(*found) and found[0][-1].all(where=[*[True] * 3, *[False] * 9, True, True])
+
+
 def test_lti_ends_at_the_riccati_equation() -> None:
     rng = np.random.default_rng(5)
     given = model(rng, 4, 2)

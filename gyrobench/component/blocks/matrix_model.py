@@ -7,9 +7,11 @@ from gyrobench.component.declarations import Discrete, Input, Output, Parameter
 from gyrobench.component.math import Number, Vector, dot, fabs, index, maximum, sqrt, vector
 
 N, M = 6, 3  # most states, most readings
+SMALL = 3  # models of so many states are computed in matrices of their own size: the same numbers without the zeros
 NO_STATE = [0.0] * N
 NO_READING = [0.0] * M
 NO_MATRIX = [[0.0] * N] * N
+NO_GAIN = [[0.0] * M] * N
 NO_COVARIANCE = [[0.0] * M] * M
 UNIT = [[1.0 if i == j else 0.0 for j in range(N)] for i in range(N)]
 TOLERANCE = 1e-12  # of a pivot, of a matrix whose diagonal is scaled to 1
@@ -19,6 +21,41 @@ ROUNDING = 1e-9  # of a row that depends on others
 def on_the_diagonal(*values: float) -> list[list[float]]:
     """Return a start value (N, N) with these numbers on its diagonal, 0 elsewhere.  For declarations."""
     return [[values[i] if i == j and i < len(values) else 0.0 for j in range(N)] for i in range(N)]
+
+
+def corner(a: Vector) -> Vector:
+    """Return the first SMALL elements of the first SMALL rows."""
+    return vector([a[0][0:SMALL], a[1][0:SMALL], a[2][0:SMALL]])
+
+
+def padded(a: Vector) -> Vector:
+    """Return a matrix (SMALL, SMALL) with zeros up to (N, N)."""
+    out = vector(NO_MATRIX)
+    for i in range(SMALL):
+        for j in range(SMALL):
+            out[i][j] = a[i][j]
+    return vector(out)
+
+
+def tall(a: Vector) -> Vector:
+    """Return a gain (SMALL, M) with zeros up to (N, M)."""
+    out = vector(NO_GAIN)
+    for i in range(SMALL):
+        for j in range(M):
+            out[i][j] = a[i][j]
+    return vector(out)
+
+
+def propagated(A: Vector, P: Vector) -> Vector:
+    """Return A P A'."""
+    return vector(A @ P @ A.T)
+
+
+def propagated_states(A: Vector, P: Vector, n: Number) -> Vector:
+    """Return A P A' (N, N) of a model of n states, without the zeros beyond them where there are few."""
+    if n <= SMALL:
+        return padded(propagated(corner(A), corner(P)))
+    return propagated(A, P)
 
 
 def smallest_pivot(matrix: Vector) -> Number:
