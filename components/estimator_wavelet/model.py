@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Output, Parameter, sampled
 from gyrobench.component.blocks.estimator import SampledEstimator
-from gyrobench.component.blocks.wavelets import (
+from gyrobench.component.blocks.wavelet_bank import (
     COEFFICIENTS,
     LEVELS,
     LONGEST,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 import gyrobench as gb
-from gyrobench.component.blocks import wavelets
+from gyrobench.component.blocks import wavelet_bank
 
 Array = NDArray[np.float64]
 
@@ -101,8 +101,8 @@ def tuned(name: str, f: float, lag: float, step: float, variance: float) -> dict
     part, _, kind = name.partition(":")
     if part == "estimator_wavelet":  # Haar, if nothing is said
         running = kind == "running"
-        number = 1 if running or not kind else wavelets.NAMES.index(kind) + 1
-        late = 0.5 * (wavelets.taps(number) + wavelets.short_taps(number)) - 1.0  # readings, of one level
+        number = 1 if running or not kind else wavelet_bank.NAMES.index(kind) + 1
+        late = 0.5 * (wavelet_bank.taps(number) + wavelet_bank.short_taps(number)) - 1.0  # readings, of one level
         levels = range(1, 6 if kind == "coif4" else 7)
         J = min(levels, key=lambda J: abs(late * (2.0**J - 1.0) - delay))
         return {"wavelet": number, "J": J, "running": running}

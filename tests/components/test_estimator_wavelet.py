@@ -10,7 +10,7 @@ from estimating import play
 from scipy.signal import lfilter
 
 from gyrobench.component import ComponentError
-from gyrobench.component.blocks import wavelets as block
+from gyrobench.component.blocks import wavelet_bank as block
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
 from gyrobench.reduction.series import wavelets as offline
