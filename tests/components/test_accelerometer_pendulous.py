@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -20,8 +20,9 @@ QUIET = {"white": 0.0, "meter": 0.0}
 ROUGH = {"k0": 1e-3, "k1": 1.01, "k2": 2e-3, "k3": -3e-3, "k4": 4e-3, "k5": -5e-3}
 
 
-def started(f=(0.0, 0.0, 0.0), **parameters):
-    part = AccelerometerPendulous(**{**QUIET, **parameters})
+def started(f=(0.0, 0.0, 0.0), plain=False, **parameters):
+    given = {**QUIET, **parameters}
+    part = AccelerometerPendulous(**given) if plain else Native("accelerometer_pendulous", **given)
     part.f = [float(x) for x in f]
     part.initialize()
     return part
@@ -82,7 +83,7 @@ def test_harmonics_of_the_multi_point_test():
 
 # -------------------------------------------------------------------------------------------- dynamics
 def test_poles():
-    part = started()
+    part = started(plain=True)
     poles = sorted(np.linalg.eigvals(np.array(part.jacobian())), key=lambda z: (abs(z), z.imag))
     assert poles == pytest.approx([-87.4, -456 - 127j, -456 + 127j], abs=0.7)
 
@@ -202,7 +203,7 @@ def test_white_acceleration_noise(h):
 def test_random_bias():
     first, constant = [], []
     for seed in range(1000):
-        part = started(k0=0.0, markov=1e-4, seed=seed)
+        part = started(plain=True, k0=0.0, markov=1e-4, seed=seed)
         first.append(part.markov_value)
         part = settled([0.0, 0.0, 0.0], 0.3, k0=0.0, turn_on=3e-4, seed=seed) if seed < 300 else part
         constant.append(part.scale * part.i)
@@ -241,10 +242,10 @@ def test_refuses(parameters, message):
 
 def test_unstable_means_unstable():
     """At 0.99 of the limit of the refusal the poles are left of the axis, at the limit they are on it."""
-    part = started()
+    part = started(plain=True)
     torquer = part.scale * part.P
     limit = part.C * (part.K + torquer * part.K_p) / (part.J * torquer)
-    part = started(K_i=0.99 * limit)
+    part = started(plain=True, K_i=0.99 * limit)
     assert -20.0 < max(np.linalg.eigvals(np.array(part.jacobian())).real) < 0.0
     with pytest.raises(ComponentError, match="unstable"):
         started(K_i=1.0001 * limit)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -38,13 +38,13 @@ def matrix(angle):
 
 def play(parameters, until):
     """Outputs after a step: those beside and at each fiftieth."""
-    part = BaseMotion(**parameters)
+    part = Native("base_motion", **parameters)
     part.initialize()
     rows = {}
     for k in range(round(until / H)):
         part.do_step(k * H, H)
         if (k + 1) % 50 < 3:
-            rows[k] = [np.array([part.get(f"{n}[{i}]") for i in (1, 2, 3)]) for n in ("angle", "omega", "alpha", "f")]
+            rows[k] = [np.array(getattr(part, n)) for n in ("angle", "omega", "alpha", "f")]
     return rows
 
 
@@ -66,13 +66,13 @@ def test_rate_acceleration_and_force_belong_to_the_angles(parameters):
 
 
 def test_profile_passes_its_points_and_rests_outside():
-    part = BaseMotion(**recorded(earth_rate=0.0))
+    part = Native("base_motion", **recorded(earth_rate=0.0))
     part.initialize()
     seen, looked = {}, {1, 20000, *(round(t / H) for t in T)}
     for k in range(20000):
         part.do_step(k * H, H)
         if k + 1 in looked:
-            seen[k + 1] = [part.get(f"angle[{i}]") for i in (1, 2, 3)]
+            seen[k + 1] = list(part.angle)
     for t, angles in zip(T, ANGLES, strict=True):
         assert seen[round(t / H)] == pytest.approx(angles, abs=1e-12)
     assert seen[1] == ANGLES[0] and seen[20000] == ANGLES[-1]
@@ -85,17 +85,16 @@ def test_profile_follows_a_parabola_exactly_inside():
     times = [0.0, 0.2, 0.5, 0.6, 1.0, 1.1]
     values = [0.3 + 0.2 * t - 0.4 * t * t for t in times]
     fill = 400 - len(times)
-    part = BaseMotion(
-        preset=9, points=6, profile_t=times + [0.0] * fill, profile=[[v, 0.0, 0.0] for v in values] + [[0.0] * 3] * fill
-    )
+    profile = [[v, 0.0, 0.0] for v in values] + [[0.0] * 3] * fill
+    part = Native("base_motion", preset=9, points=6, profile_t=times + [0.0] * fill, profile=profile)
     part.initialize()
     for k in range(9999):
         part.do_step(k * H, H)
         t = (k + 1) * H
         if t >= 0.2:
-            assert part.get("angle[1]") == pytest.approx(0.3 + 0.2 * t - 0.4 * t * t, abs=1e-12)
-            assert part.get("omega[1]") == pytest.approx(0.2 - 0.8 * t, abs=1e-11)
-            assert part.get("alpha[1]") == pytest.approx(-0.8, abs=1e-9)
+            assert abs(part.angle[0] - (0.3 + 0.2 * t - 0.4 * t * t)) <= 1e-12
+            assert abs(part.omega[0] - (0.2 - 0.8 * t)) <= 1e-11
+            assert abs(part.alpha[0] + 0.8) <= 1e-9
 
 
 @pytest.mark.parametrize(("preset", "roll", "heave"), [(1, 1.5, 0.2), (3, 8.0, 1.0), (5, 2.0, 1.5)])

@@ -7,13 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
-from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import make
 
-Gyro2dof = load_part("gyro_2dof", BENCH)
 QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
 STILL = {**QUIET, **{f"D{c}_{n}": 0.0 for c in "xy" for n in ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")}}
 POWER = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}  # STAB-POWER-2DOF
@@ -23,7 +21,7 @@ STATES = ("psi_x", "psi_y", "p", "q")
 def started(**parameters):
     inputs = {k: parameters.pop(k) for k in ("omega", "f", "i_x", "i_y", "M_x", "M_y") if k in parameters}
     states = {k: parameters.pop(k) for k in STATES if k in parameters}
-    part = Gyro2dof(**{**STILL, **parameters})
+    part = Native("gyro_2dof", **{**STILL, **parameters})
     for key, x in {**inputs, **states}.items():
         setattr(part, key, x)
     part.initialize()
