@@ -22,7 +22,7 @@ from scipy import ndimage
 
 from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
 
-# those of the part (gyrobench/component/blocks/wavelet_bank.py), which a reduction does not import: a test compares them
+# those of the part (gyrobench.component.blocks.wavelet_bank), which a reduction does not import; a test compares
 WAVELETS = ("haar", "db4", "sym4", "coif4", "bior1.5")
 MEDIAN = 0.6745  # of |d| over the standard deviation of a normal variate
 WINDOW = 1024  # samples, least of a running sigma
