@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import shlex
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from gyrobench.bench import UsageError
 from gyrobench.campaign.design import choice_search, plan_search, shortest_test
 from gyrobench.campaign.design.approximate_design import approximate_design, evaluate
 from gyrobench.campaign.design.option_protocol import OptionProtocol
-from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError, Workbench, last_time
+from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError, Stated, Trial, Workbench, last_time
 from gyrobench.campaign.design.plan_search import Search, Want, finish, rounded
 from gyrobench.campaign.design.predicted_uncertainty import predict
 from gyrobench.campaign.design.shortest_test import design_test, protocol_of
@@ -179,6 +180,28 @@ def test_time_to_a_wanted_uncertainty_by_hand() -> None:
     assert plan.dwell == pytest.approx(50.0, rel=1e-3)
     assert plan.duration == pytest.approx(106.0, abs=0.2)
     assert plan_search.shortest_time(search, (Noise(1.0),))[0] == pytest.approx(103.0, rel=1e-3)
+
+
+def test_the_dwell_is_that_of_the_run_where_u_falls_faster_than_the_noise() -> None:
+    """A reduction with few degrees of freedom: u = (2 T)^-1/2 (200 s/T)^1.2.  By T' = T (u/0.1)^2 alone the error of
+    log T would grow by 1 - 2 x 1.7 = -2.4 a round.
+    """
+    dwells: list[float] = []
+
+    class Bench:
+        def trial(self, values: dict[str, float], covariances: object, draws: int) -> Trial:
+            dwells.append(values["dwell"])
+            least = (2.0 * values["dwell"]) ** -0.5
+            u = least * (200.0 / values["dwell"]) ** 1.2
+            return Trial({"k": Stated(u, least, least, 0.0, "1", 1.0)}, 2.0 * values["dwell"], ())
+
+    one = replace(protocol(Noise(1.0), 3.0), options=lambda visits: {"dwell": visits[0][1]})
+    search = Search(one, (Want(0, 1, 0.1),), ((Noise(1.0),),))
+    start = finish(search, [0, 1], np.ones(2), None)
+    cost, plan, trial, _ = shortest_test._settled(Bench(), search, {"k": Want(0, 1, 0.1)}, start, None, 1)  # type: ignore[arg-type]
+    assert plan.dwell == pytest.approx((200.0**1.2 / (0.1 * 2.0**0.5)) ** (1 / 1.7), rel=0.01)
+    assert plan.dwell == dwells[-1] and cost == trial.time == 2.0 * plan.dwell  # what is stated is of the plan
+    assert trial.values["k"].u == pytest.approx(0.1, rel=0.01) and len(dwells) < 9
 
 
 def test_slow_drift_is_beaten_by_more_visits_and_not_by_longer_ones() -> None:

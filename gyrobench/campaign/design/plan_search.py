@@ -183,9 +183,13 @@ def finish(search: Search, places: Sequence[int], weights: Array, time: float | 
             low, high = (middle, high) if value > 1.0 else (low, middle)
             if high < low * 1.0005:
                 break
-    return ExactPlan(
-        tuple(places), weights, high, search.duration(places, high * weights), search.merit(places, high * weights)
-    )
+    return with_dwell(search, places, weights, high)
+
+
+def with_dwell(search: Search, places: Sequence[int], weights: Array, dwell: float) -> ExactPlan:
+    """Return the plan of these visits with a mean dwell, s."""
+    dwells = dwell * weights
+    return ExactPlan(tuple(places), weights, dwell, search.duration(places, dwells), search.merit(places, dwells))
 
 
 def rounded(shares: Array, visits: int, required: Sequence[int] = ()) -> NDArray[np.int_]:

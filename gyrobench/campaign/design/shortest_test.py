@@ -49,7 +49,8 @@ from gyrobench.system.system import System
 
 Array = NDArray[np.float64]
 CANDIDATES = 2  # plans that are run until their dwell is settled
-CLOSE = 0.01  # of a wanted uncertainty
+CLOSE = 0.01  # of the dwell
+ROUNDS = 12  # runs in which the dwell of a plan is found
 FINAL, ROUGH = 160, 40  # draws of a prediction
 WEAK = 10.0  # times the u of the system's own plan that a value may have of which nothing is wanted
 WINDOW = 60.0  # s, over which the noise of a population of instruments is that of the nominal one
@@ -186,7 +187,14 @@ def _best_of(
     tried = sorted((t for t in tried if math.isfinite(t[0])), key=lambda t: t[0])
     if not tried:
         raise DesignError("; ".join(dict.fromkeys(reasons)) or _unreachable(search, wanted, time))
-    settled = [_settled(bench, judged, wanted, plan, time, ROUGH) for _, plan, _, judged in tried[:CANDIDATES]]
+    settled = []
+    for _, plan, _, judged in tried[:CANDIDATES]:
+        try:
+            settled.append(_settled(bench, judged, wanted, plan, time, ROUGH))
+        except GyrobenchError as error:
+            reasons.append(str(error))
+    if not settled:
+        raise DesignError("; ".join(dict.fromkeys(reasons)))
     return min(settled, key=lambda t: t[0])
 
 
@@ -210,22 +218,34 @@ def _bettered(
 
 def _settled(
     bench: Workbench, search: Search, wanted: Mapping[str, Want], plan: ExactPlan, time: float | None, draws: int,
-    rounds: int = 4,
+    rounds: int = ROUNDS,
 ) -> Settled:  # fmt: skip
     """Run a plan and set its dwell by what the reduction makes of it; return cost, plan, run, search.
 
-    With one round the plan is the one that would be next, its cost that of its promise.
+    With one round the plan is the one that would be next, its cost that of its promise; else the run is the plan's.
+    Raises DesignError where no dwell was found that the reduction confirms.
     """
+    bounds: dict[bool, tuple[float, float]] = {}  # too short, too long: ln of the last dwell, and what it lacks
     for _ in range(rounds):
         trial = bench.trial(search.protocol.options(plan.visits), _covariances(search.protocol, plan.places), draws)
         search = replace(search, wants=tuple(_calibrated(wanted, trial)), _maps={})
         again = plan_search.finish(search, plan.places, plan.weights, time)
         if time is not None or not math.isfinite(again.duration):
             return again.cost(time is not None), plan, trial, search
-        if abs(again.dwell / plan.dwell - 1.0) < CLOSE:
+        lacks = math.log(again.dwell / plan.dwell)
+        if abs(lacks) < CLOSE:
             return trial.time, plan, trial, search
+        # u falls with the dwell faster than the noise does where the noise model has few degrees of freedom: what the
+        # reduction asks for goes beyond the mark, and only between two dwells that were run is it found
+        bounds[lacks > 0.0] = math.log(plan.dwell), lacks
         plan = again
-    return (plan.duration if rounds == 1 else trial.time), plan, trial, search
+        if len(bounds) == 2:
+            (x0, y0), (x1, y1) = bounds.values()
+            between = math.exp(x0 - y0 * (x1 - x0) / (y1 - y0))
+            plan = plan_search.with_dwell(search, plan.places, plan.weights, between)
+    if rounds == 1:
+        return plan.duration, plan, trial, search
+    raise DesignError(f"{len(plan.places)} visits: no dwell found at which the reduction states what is wanted")
 
 
 def _calibrated(wanted: Mapping[str, Want], trial: Trial) -> list[Want]:
