@@ -10,7 +10,7 @@ import itertools
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -137,6 +137,7 @@ class Fmu:
         self.identity = next(_ids)
         self.messages = _logs.setdefault(self.identity, [])
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self._known: dict[tuple[str, ...], list[tuple[str, type, list[int], list[int]]]] = {}
         self.t0 = 0.0
         arguments = {
             "guid": self.description.guid,
@@ -184,26 +185,35 @@ class Fmu:
                 raise
             raise InstanceError(name, None, self.messages or [str(e)]) from None
 
-    def _groups(self, names: Iterable[str]) -> dict[str, list[str]]:
-        groups: dict[str, list[str]] = {}
-        for n in names:
-            groups.setdefault(self.variables[n].type, []).append(n)
-        return groups
+    def _calls(self, names: tuple[str, ...]) -> list[tuple[str, type, list[int], list[int]]]:
+        """Return the calls for these variables: FMI type, type of its values, value references, places in names."""
+        if names not in self._known:
+            groups: dict[str, list[int]] = {}
+            for place, n in enumerate(names):
+                groups.setdefault(self.variables[n].type, []).append(place)
+            self._known[names] = [
+                (
+                    kind,
+                    {"Real": float, "Float64": float, "Boolean": bool}.get(kind, int),
+                    [self.variables[names[place]].valueReference for place in places],
+                    places,
+                )
+                for kind, places in groups.items()
+            ]
+        return self._known[names]
 
     def set(self, values: dict[str, float]) -> None:
-        for kind, names in self._groups(values).items():
-            whole = {"Real": float, "Float64": float, "Boolean": bool}.get(kind, int)
-            given = [whole(values[n]) for n in names]
-            references = [self.variables[n].valueReference for n in names]
-            self._call("set", getattr(self.fmu, f"set{kind}"), references, given)
+        given = list(values.values())
+        for kind, whole, references, places in self._calls(tuple(values)):
+            self._call("set", getattr(self.fmu, f"set{kind}"), references, [whole(given[place]) for place in places])
 
     def get(self, names: Sequence[str]) -> list[float]:
-        values_of: dict[str, float] = {}
-        for kind, group in self._groups(names).items():
-            references = [self.variables[n].valueReference for n in group]
+        found = [0.0] * len(names)
+        for kind, _, references, places in self._calls(tuple(names)):
             values = self._call("get", getattr(self.fmu, f"get{kind}"), references)
-            values_of.update(zip(group, map(float, values), strict=True))
-        return [values_of[n] for n in names]
+            for place, x in zip(places, values, strict=True):
+                found[place] = float(x)
+        return found
 
     def initialize(self, t0: float = 0.0) -> None:
         if self.three:
