@@ -7,6 +7,7 @@ import types
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops import loop_curves
@@ -109,13 +110,36 @@ def test_uncertainty_of_a_change() -> None:
 def test_scatter_of_a_change_knows_slow_noise() -> None:
     """A random walk of step s: over a gap of n samples between two short means a change has s sqrt(n) = 0.01 sqrt(200),
     less a third of each mean's length: n - (before + after) / 3 ... by hand 200 - 20/3 - 10/3 = 190, to 10 % over 400
-    records; white noise of 0.1: 0.1 sqrt(1/20 + 1/10)."""
+    records; white noise of 0.1: 0.1 sqrt(1/20 + 1/10).  8000 samples are 38 pieces: both times
+    t(0.975, 37) / 1.96 = 1.034."""
     rng = np.random.default_rng(9)
     walks = [step_noise_std(np.cumsum(0.01 * rng.standard_normal(8000)), 20, 190, 10) for _ in range(100)]
-    assert np.sqrt(np.mean(np.square(walks))) == pytest.approx(0.01 * math.sqrt(210 - 40 / 3 - 20 / 3), rel=0.1)
+    assert np.sqrt(np.mean(np.square(walks))) == pytest.approx(1.034 * 0.01 * math.sqrt(210 - 40 / 3 - 20 / 3), rel=0.1)
     white = [step_noise_std(0.1 * rng.standard_normal(8000), 20, 190, 10) for _ in range(50)]
-    assert np.mean(white) == pytest.approx(0.1 * math.sqrt(1 / 20 + 1 / 10), rel=0.05)
-    assert step_noise_std(np.zeros(500), 20, 190, 10) is None  # two pieces say nothing
+    assert np.mean(white) == pytest.approx(1.034 * 0.1 * math.sqrt(1 / 20 + 1 / 10), rel=0.05)
+    assert step_noise_std(np.zeros(49), 20, 190, 10) is None  # four means say nothing
+
+
+@pytest.mark.parametrize("samples", [4000, 10_000, 14_000, 40_000])
+@pytest.mark.parametrize("lasting", [0, 40, 400])
+def test_interval_of_a_change_after_a_short_rest(samples: int, lasting: int) -> None:
+    """A change over 3000 samples, the rest 1.3 to 13 times as long: white noise and Gauss-Markov drift of 40 and 400
+    samples, 300 records each.  With the u of white noise 0.02 to 0.14 of the intervals held at 14000 samples and less.
+    """
+    before, gap, after = 1000, 2000, 200
+    rng = np.random.default_rng(samples + lasting)
+    held = 0
+    for _ in range(300):
+        e = rng.standard_normal(samples + before + gap)
+        if lasting:
+            a = math.exp(-1.0 / lasting)
+            e[0] /= math.sqrt(1.0 - a * a)
+            e = lfilter([1.0], [1.0, -a], e)
+        y = e[samples:]
+        u = step_noise_std(e[:samples], before, gap, after)
+        assert u is not None
+        held += abs(y[-after:].mean() - y[:before].mean()) < 1.96 * u
+    assert held >= 0.91 * 300
 
 
 # ------------------------------------------------------------------------------------------- drift

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench import units
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Gate, Point
 from gyrobench.result import Response
 
 Array = NDArray[np.float64]
 CURVE = 241  # points of a drawn curve
+SHOWN = 600  # points of a drawn step response
 
 
 def curve(label: str, f: Array, values: Any) -> dict[str, Any]:
@@ -45,6 +47,31 @@ def bode(
         phase=np.degrees(np.unwrap(np.angle([p.value for p in points]))).tolist(),
         u=[p.u for p in points],
         coherence=[p.coherence for p in points],
+        curves=curves,
+    )
+
+
+def step_figure(
+    gate: Gate, y: Array, line: Array | None, label: str, scale: float, what: str, unit: str
+) -> Response:  # fmt: skip
+    """Return the figure of a step phase.  y, line: measured and of a linear model, SI; scale: SI per printed unit."""
+    t = gate.t - gate.t[0]
+    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
+    curves = [] if line is None else [
+        {"label": label, "x": t[pick].tolist(), "phase": [], "y": (line[pick] / scale).tolist()}
+    ]  # fmt: skip
+    size = f"{gate.amplitude:g}".replace("-", "−")
+    cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
+    return Response(
+        name=f"{gate.label}, {what}",
+        kind="step",
+        caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear model.",
+        x=t[pick].tolist(),
+        x_name="time",
+        x_unit="s",
+        y=(y[pick] / scale).tolist(),
+        y_name=what,
+        y_unit=unit,
         curves=curves,
     )
 

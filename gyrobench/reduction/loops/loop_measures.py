@@ -30,6 +30,8 @@ SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
 AHEAD = 4.0  # at most, of what is moved in the last tenth, is still to come
 MOVING = 10.0  # u of the change: the slope of noise moves by more in one of 300 records (3 sqrt(12) u of a mean)
+PIECES = 5  # of a record at rest, each as long as a step, from which on their scatter is the noise of a step's change
+SEEN = 1e-4  # of a change: a u below it is no noise
 LAST = 0.1  # share of a step's record that is its end
 
 
@@ -294,20 +296,45 @@ def _ahead(slope: float, before: Array, t: Array) -> float:
 
 
 def step_noise_std(y: Array, before: int, gap: int, after: int) -> float | None:
-    """Standard deviation that a change between two means has where nothing is excited.
+    """Standard deviation that noise gives a change between two means, as half of a 95 % interval over 1.96.
 
     y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``
     samples that end ``gap`` samples later; it is taken from every piece of the record without overlap, so noise of any
-    colour is in it.  None for fewer than 5 pieces.
+    colour is in it.  A record of fewer than PIECES pieces has at least sqrt(2) times the scatter of means of ``after``
+    samples, which knows noise up to the record's own length alone.  None for fewer than 5 of these, too.
     """
+    line = y - np.polyval(np.polyfit(np.arange(y.size), y, 1), np.arange(y.size))
     span = before + gap
     starts = range(0, y.size - span + 1, max(span, 1))
-    if len(starts) < 5:
-        return None
-    line = y - np.polyval(np.polyfit(np.arange(y.size), y, 1), np.arange(y.size))
-    ends = [line[k + span - after : k + span].mean() for k in starts]
-    begins = [line[k : k + before].mean() if before else line[k] for k in starts]
-    return float(np.std(np.array(ends) - np.array(begins), ddof=1))
+    found = []
+    if len(starts) > 1:
+        ends = [line[k + span - after : k + span].mean() for k in starts]
+        begins = [line[k : k + before].mean() if before else line[k] for k in starts]
+        found.append(_of_few(np.std(np.array(ends) - np.array(begins), ddof=1), len(starts) - 1))
+    if len(starts) < PIECES:
+        n = y.size // after
+        if n < 5:
+            return None
+        means = line[: n * after].reshape(n, after).mean(axis=1)
+        found.append(_of_few(math.sqrt(2.0) * np.std(means, ddof=2), n - 2))
+    return max(found)
+
+
+def short_rest(quiet: Gate, samples: int, measures: Step) -> str:
+    """Return a warning of a phase at rest too short for what slow noise does to a step of so many samples, or ""."""
+    length = samples * float(quiet.t[1] - quiet.t[0])
+    time = float(quiet.t[-1] - quiet.t[0])
+    if time >= PIECES * length or measures.u_change <= SEEN * abs(measures.change):
+        return ""
+    return (
+        f"The phase {quiet.label} of {time:.3g} s is shorter than {PIECES} steps of {length:.3g} s: slower noise is "
+        f"not in the u of the steps. Hold for {PIECES * length:.3g} s or longer."
+    )
+
+
+def _of_few(std: float, dof: int) -> float:
+    """Return a standard deviation of few numbers, wide enough for an interval of 1.96 of it."""
+    return float(std * stats.t.ppf(0.975, dof) / NORMAL)
 
 
 # ------------------------------------------------------------------------------------------- drift

@@ -18,14 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import units
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins as m
-from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated
+from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
 from gyrobench.reduction.loops.loop_measures import (
     LAST,
     Drift,
@@ -35,6 +34,7 @@ from gyrobench.reduction.loops.loop_measures import (
     drift,
     gates,
     response,
+    short_rest,
     step,
     step_noise_std,
 )
@@ -52,7 +52,6 @@ from gyrobench.result import Coefficient, LoopResult, Response, Specification
 
 Array = NDArray[np.float64]
 ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
-SHOWN = 600  # points of a drawn step response
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 
@@ -325,36 +324,15 @@ class LoopFindings:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
             u = step_noise_std(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
             measures = measures if u is None else measures.with_noise(u)
-        t = gate.t - gate.t[0]
-        pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
-        curves = []
+            short = short_rest(quiet, baseline.size + y.size, measures)
+            self.warnings += [short] if short and short not in self.warnings else []
         model = self.linear.closed.discrete
         predicted = None if model is None else simulated(model, gate, output)
         if model is not None and predicted is not None and plus:
             second = simulated(model, gate, plus)
             predicted = None if second is None else predicted + second
-        if predicted is not None:
-            curve = {"label": NAMES["discrete"], "x": t[pick].tolist(), "phase": []}
-            curves.append({**curve, "y": ((measures.initial + predicted[pick]) / scale).tolist()})
-        what = y_name or output
-        size = f"{gate.amplitude:g}".replace("-", "−")
-        cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
-        self.responses.append(
-            Response(
-                name=f"{gate.label}, {what}",
-                kind="step",
-                caption=(
-                    f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear model."
-                ),
-                x=t[pick].tolist(),
-                x_name="time",
-                x_unit="s",
-                y=(y[pick] / scale).tolist(),
-                y_name=what,
-                y_unit=unit,
-                curves=curves,
-            )
-        )
+        line = None if predicted is None else measures.initial + predicted
+        self.responses.append(step_figure(gate, y, line, NAMES["discrete"], scale, y_name or output, unit))
         return measures
 
     # ------------------------------------------------------------------ drift
