@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import IDENTITY, Component, Input, Output, Parameter, Rotation
-from gyrobench.component.math import Number, atan, cos, exp, pi, sin, vector
+from gyrobench.component.math import Number, Vector, atan, cos, exp, pi, sin, vector
 
 NONE = [0.0, 0.0, 0.0]
 
@@ -25,12 +25,15 @@ class Surroundings(Component):
         dT_j = gradient_j + gradient_ramp_j t + share_j (room - T)
 
     The magnetic field is given in ENU, with differences over the length of the instrument along E, N, U (change of its
-    size: a vector too), both turned into the axes of the instrument on a table with one axis, C = face Rz(angle) base:
+    size: a vector too), both turned into the axes of the instrument, on a table with one axis (inner = 0) or two:
 
         B = C (field + field_swing sin(w t + phase)),   dB = C field_difference
+        C = face Rz(angle) base axes,   inner = 1: C = face Ry(angle_y) Rx(angle) base axes
 
-    Not modelled: several time constants, air flow, heat of motor and gyro rotor, wobble and tilt of the table in C (of
-    second order), direction of the field's change, shields (give the field inside).
+    axes: of the stand that carries the table, in ENU.
+
+    Not modelled: several time constants, air flow, heat of motor and gyro rotor, wobble, squareness and tilt of the
+    table in C (of second order), direction of the field's change, shields (give the field inside).
     Source: Hu 1981, section 5.6, Tables 5-4..5-7.
     """
 
@@ -49,9 +52,12 @@ class Surroundings(Component):
     field = Parameter(NONE, "T", "magnetic field, ENU")
     field_swing = Parameter(NONE, "T", "amplitude of its sine, ENU")
     field_difference = Parameter(NONE, "T", "differences of the field over the instrument along E, N, U")
-    base = Rotation("rows: table axes in ENU at angle 0; the third is the axis")
+    base = Rotation("rows: table axes in ENU at angle 0; the third is the axis, of two axes X outer, Y inner")
+    inner = Parameter(0, int, "1: a table with two axes, X outer and Y inner", min=0, max=1)
 
-    angle = Input(0.0, "rad", "table angle")
+    angle = Input(0.0, "rad", "table angle, of two axes the outer one")
+    angle_y = Input(0.0, "rad", "angle of the inner axis")
+    axes = Input(IDENTITY, "1", "rows: axes of the stand that carries the table, in ENU")
     face = Input(IDENTITY, "1", "mount: rows are the instrument's axes in table axes")
 
     temperature = Output("K", "mean temperature of the instrument above that of its coefficients")
@@ -72,6 +78,18 @@ class Surroundings(Component):
         wave = self.swing * cos(lag) * sin(2.0 * pi / self.period * t + self.phase - lag)
         return self.offset + self.ramp * (t - self.tau) + wave
 
+    def turned(self, v: Vector) -> Vector:
+        """Return a vector in table axes at angle 0 in those at the present angles."""
+        c = cos(self.angle)
+        s = sin(self.angle)
+        if self.inner == 0.0:
+            return vector([c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]])
+        y = c * v[1] + s * v[2]
+        z = c * v[2] - s * v[1]
+        cy = cos(self.angle_y)
+        sy = sin(self.angle_y)
+        return vector([cy * v[0] - sy * z, y, cy * z + sy * v[0]])
+
     def outputs(self) -> None:
         wave = sin(2.0 * pi / self.period * self.t + self.phase)
         self.room = self.offset + self.ramp * self.t + self.swing * wave
@@ -82,9 +100,7 @@ class Surroundings(Component):
         apart = self.room - self.temperature
         for j in range(3):
             self.dT[j] = self.gradient[j] + self.gradient_ramp[j] * self.t + self.share[j] * apart
-        c = cos(self.angle)
-        s = sin(self.angle)
-        b = self.base @ (vector(self.field) + wave * vector(self.field_swing))
-        d = self.base @ vector(self.field_difference)
-        self.B = self.face @ vector([c * b[0] + s * b[1], c * b[1] - s * b[0], b[2]])
-        self.dB = self.face @ vector([c * d[0] + s * d[1], c * d[1] - s * d[0], d[2]])
+        b = self.turned(self.base @ (self.axes @ (vector(self.field) + wave * vector(self.field_swing))))
+        d = self.turned(self.base @ (self.axes @ vector(self.field_difference)))
+        self.B = self.face @ b
+        self.dB = self.face @ d

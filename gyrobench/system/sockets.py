@@ -56,7 +56,9 @@ SOCKETS: dict[str, Socket] = {
             "Surroundings",
             "temperature and magnetic field at the instrument",
             (
-                inp("angle", "rad", "table angle", optional=True),
+                inp("angle", "rad", "table angle, of two axes the outer one", optional=True),
+                inp("angle_y", "rad", "angle of the inner axis", optional=True),
+                inp("axes", "1", "rows: axes of the stand that carries the table, in ENU", 3, 3, optional=True),
                 inp("face", "1", "rows: the instrument's axes in table axes", 3, 3, optional=True),
                 out("temperature", "K", "mean temperature of the instrument above that of its coefficients"),
                 out("room", "K", "temperature of the room above that of the coefficients", optional=True),
@@ -153,6 +155,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("omega_face", "rad/s", "Earth rate, ENU", 3),
                 out("f", "m/s2", "specific force, attitude axes", 3),
                 out("omega", "rad/s", "Earth rate, attitude axes", 3),
+                out("axes", "1", "rows: the attitude axes in ENU", 3, 3, optional=True),
             ),
         ),
         Socket(

@@ -78,6 +78,12 @@ WIRES = f"""
     {sampled("sampler_x", "outer: angle_read")}
     {sampled("sampler_y", "inner: angle_read")}
 """
+#: what turns the magnetic field into the axes of the gyro
+FIELD = """
+    stand -> surroundings: axes
+    outer -> surroundings: angle
+    inner -> surroundings: angle=angle_y
+"""
 COLUMNS = {
     "phase": "sampler_x.window_phase",
     **{c: f"sampler_x.{c}" for c in ("t_start", "t_end", "n", "flagged")},

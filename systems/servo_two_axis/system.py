@@ -10,7 +10,7 @@ from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, type
 from gyrobench.system.families.physical_form import PHYSICAL_FORM, physical_drift
 from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
 from gyrobench.system.families.servo_test import SITE_AND_STAND, TRACKING
-from gyrobench.system.families.table_test import TableTest
+from gyrobench.system.families.table_test import TableTest, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
@@ -48,6 +48,7 @@ class ServoTwoAxis(TableTest):
         "sampler_y": Slot("Sampler", "sampler"),
     }
     wires = setup.WIRES
+    on_request = surroundings("outer: angle_read", setup.FIELD)
     open = ("outer.face",)  # left at their start values
     options = (
         SITE_AND_STAND
@@ -87,7 +88,13 @@ class ServoTwoAxis(TableTest):
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         physical = physical_drift(self, parts)
-        return {**self.plan().parameters(), **self.owned(), **physical, **setup.parameters(parts, self.mounts())}
+        field = self.field_axes() if "surroundings" in self.slots else {}
+        return {
+            **self.plan().parameters(), **self.owned(), **physical, **setup.parameters(parts, self.mounts()), **field
+        }  # fmt: skip
+
+    def field_axes(self) -> dict[str, Any]:
+        return {**super().field_axes(), "surroundings.inner": 1}
 
     def check(self) -> list[str]:
         from .refusals import option_problems

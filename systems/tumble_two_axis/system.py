@@ -12,7 +12,7 @@ from gyrobench import drift
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
-from gyrobench.system.families.table_test import Array, sampled, surroundings
+from gyrobench.system.families.table_test import TWO_AXES, Array, sampled, surroundings
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
@@ -48,7 +48,7 @@ class TumbleTwoAxis(RebalanceTest):
         rebalance.i_read -> sampler_inner.x
         {sampled("sampler_inner", "table: angle_y_read")}
     """
-    on_request = surroundings("table: angle_x_read", turned=False)
+    on_request = surroundings("table: angle_x_read", TWO_AXES)
     options = (
         SITE
         | PHYSICAL_FORM
@@ -85,6 +85,9 @@ class TumbleTwoAxis(RebalanceTest):
 
     def base(self) -> Array:
         return geometry.base(self["latitude"])
+
+    def field_axes(self) -> dict[str, Any]:
+        return {**super().field_axes(), "surroundings.inner": 1}
 
     def plan(self) -> Plan:
         """The positions in order, every one with both angles; angles are counted on through the turns.

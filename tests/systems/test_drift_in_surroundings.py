@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import servoing_two_axes
+from servoing import DAY50, QUIET
 from tumbling import DPH, NAMES, SHORT, load, quiet
 
+from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.packaging import build
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult
-from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import load_system
 
@@ -103,14 +105,57 @@ def test_surroundings_are_there_only_where_they_are_asked_for() -> None:
     assert asked.with_values({"dwell": 10.0}).slots == asked.slots
 
 
-def test_a_field_is_refused_where_it_is_not_turned_into_gyro_axes() -> None:
-    system = load_system("servo_polar")
-    system.set("surroundings.field[3]", "44uT")
-    with (
-        Session(system) as session,
-        pytest.raises(InvalidConfigurationError, match="does not turn the field"),
-    ):
-        session.run()
+def shifts(name: str, values: dict[str, Any], *fields: dict[str, Any]) -> list[dict[str, float]]:
+    """Changes of the estimates of a test by magnetic fields, deg/h per g^n."""
+    system = load_system(name)
+    system.request("surroundings")
+    with Session(system) as session:
+        runs = [session.run({**values, **field}, seed=1) for field in ({}, *fields)]
+    plain, *others = ({c.name: c.estimate for c in system.with_values(values).reduce(r).coefficients} for r in runs)
+    return [{n: found[n] - plain[n] for n in plain} for found in others]
+
+
+def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_its_table() -> None:
+    """Vertical, b U: unbalance, as in the tumble.  East, b E: y = -E at angle 0 in both mounts, so that B_y = -b cos a,
+    B_z = b sin a, while X Z = g2 s c cos a and X Y = g2 s c sin a in both: D_IS by -b D_BO / (g2 s c), D_IO by
+    b D_BS / (g2 s c).
+    """
+    b, sensitivity = 44e-6, {1: 2000.0, 2: 800.0, 3: -500.0}
+    values = {**DAY50, **QUIET, "route": "combination"} | {f"gyro.D_B[{k}]": x * DPH for k, x in sensitivity.items()}
+    up, east = shifts("servo_polar", values, {"surroundings.field[3]": b}, {"surroundings.field[1]": b})
+    phi = math.radians(45.75)
+    g = frames.normal_gravity(phi) / frames.G0
+    product = g * g * math.sin(phi) * math.cos(phi)
+    expected = {"D_I": -b * 2000.0 / g, "D_O": -b * 800.0 / g, "D_S": b * 500.0 / g}
+    assert {n: up[n] for n in expected} == pytest.approx(expected, rel=2e-3)
+    assert max(abs(v) for n, v in up.items() if n not in expected) < 1e-4, up
+    expected = {"D_IS": -b * 800.0 / product, "D_IO": -b * 500.0 / product}
+    assert {n: east[n] for n in expected} == pytest.approx(expected, rel=2e-3)
+    assert max(abs(v) for n, v in east.items() if n not in expected) < 1e-4, east
+
+
+def test_the_field_is_turned_on_two_axes() -> None:
+    """Vertical, b U: unbalance by -b D_B / gamma along all three axes of a gyro that is tumbled by both axes."""
+    b = 44e-6
+    values = {"dwell": 10.0, "windows": 1, "settle": 3.0, **quiet(load_system("tumble_two_axis")), "nuisances": "none"}
+    values |= {"gyro.D_B[1]": 2000.0 * DPH, "gyro.D_B[2]": 800.0 * DPH, "gyro.D_B[3]": -500.0 * DPH}
+    (up,) = shifts("tumble_two_axis", values, {"surroundings.field[3]": b})
+    g = frames.normal_gravity(math.radians(45.75)) / frames.G0
+    expected = {"D_I": -b * 2000.0 / g, "D_O": -b * 800.0 / g, "D_S": b * 500.0 / g}
+    assert {n: up[n] for n in expected} == pytest.approx(expected, rel=2e-3)
+    assert max(abs(v) for n, v in up.items() if n not in expected) < 1e-4, up
+
+
+def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_two_axes() -> None:
+    """The same of both channels, over the attitudes of mounts 2 and 4."""
+    b, values = 44e-6, servoing_two_axes.day(200.0, 72, **servoing_two_axes.QUIET)
+    given = {"Dx_B": (2000.0, 800.0, -500.0), "Dy_B": (-1500.0, 400.0, 900.0)}
+    values |= {f"gyro.{n}[{k}]": x * DPH for n, of in given.items() for k, x in enumerate(of, 1)}
+    (up,) = shifts("servo_two_axis", values, {"surroundings.field[3]": b})
+    g = frames.normal_gravity(math.radians(45.75)) / frames.G0
+    expected = {f"{n[:2]}_{axis}": -b * x / g for n, of in given.items() for axis, x in zip("xyz", of, strict=True)}
+    assert {n: up[n] for n in expected} == pytest.approx(expected, rel=5e-3)
+    assert max(abs(v) for n, v in up.items() if n not in expected) < 2e-4, up
 
 
 def test_a_gyro_on_tilting_ground_reads_the_rate_of_the_tilt() -> None:

@@ -25,7 +25,16 @@ from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.servo_expectation import Expected, capture_problems
-from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table, sampled, surroundings
+from gyrobench.system.families.table_test import (
+    FACE,
+    ON_STAND,
+    ON_TABLE,
+    SDF_NOISES,
+    TableTest,
+    on_table,
+    sampled,
+    surroundings,
+)
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -94,7 +103,7 @@ class ServoTest(TableTest):
     gyro -> sampler: u=x saturated=flag
     {sampled()}
     """
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=False)
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=ON_STAND)
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
         | PHYSICAL_FORM
@@ -157,6 +166,9 @@ class ServoTest(TableTest):
             "table.capture_rate?": CAPTURE_RATE,
             **gyro_on_table(parts),
         }
+
+    def field_axes(self) -> dict[str, Any]:
+        return {"surroundings.base": BASE}
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)

@@ -51,22 +51,28 @@ TABLE = """
 """
 
 
-def surroundings(angle: str = "table: angle_read", turned: bool = True) -> dict[str, OnRequest]:
-    """Return the slot with the temperature and the magnetic field at the gyro, and a thermometer in the windows.
-
-    angle: "slot: output", as of :func:`sampled`.  turned: the field is turned into gyro axes, which takes a table with
-    one axis that stands on the site itself.
-    """
-    wires = f"""
-    surroundings -> gyro: temperature dT
-    surroundings -> thermometer: temperature=x
-    {sampled("thermometer", angle)}
-    """
-    if turned:
-        wires += """
-    surroundings -> gyro: B dB
+#: what turns the magnetic field into the axes of the instrument: a table with one axis, on a stand, with two axes
+ONE_AXIS = """
     table -> surroundings: angle
     sequencer -> surroundings: face
+"""
+ON_STAND = ONE_AXIS + "stand -> surroundings: axes"
+TWO_AXES = """
+    table -> surroundings: angle_x=angle angle_y
+    sequencer -> surroundings: face
+"""
+
+
+def surroundings(angle: str = "table: angle_read", turned: str = ONE_AXIS) -> dict[str, OnRequest]:
+    """Return the slot with the temperature and the magnetic field at the gyro, and a thermometer in the windows.
+
+    angle: "slot: output", as of :func:`sampled`.  turned: wires of the attitude of the gyro.
+    """
+    wires = f"""
+    surroundings -> gyro: temperature dT B dB
+    surroundings -> thermometer: temperature=x
+    {sampled("thermometer", angle)}
+    {turned}
     """
     slots = {"surroundings": Slot("Surroundings", "surroundings"), "thermometer": Slot("Sampler", "sampler")}
     columns = {"temperature": "thermometer.mean"}
@@ -105,7 +111,7 @@ class TableTest(System):
             **self.owned(),
             **physical_drift(self, parts),
             "table.base": self.base(),
-            **({"surroundings.base": self.base()} if self._field_turned() else {}),
+            **(self.field_axes() if "surroundings" in self.slots else {}),
         }
 
     def check(self) -> list[str]:
@@ -117,23 +123,11 @@ class TableTest(System):
             f"sequencer.faces, {n}": face for n, face in self.planned_faces(parameters).items()
         }
         matrices |= {n: m for n, m in parameters.items() if n.endswith((".mount", ".base")) and np.shape(m) == (3, 3)}
-        return frames.rotation_problems(matrices) + self._field_problems(parameters)
+        return frames.rotation_problems(matrices)
 
-    def _field_turned(self) -> bool:
-        return "sequencer -> surroundings: face" in self.wires
-
-    def _field_problems(self, parameters: Mapping[str, Any]) -> list[str]:
-        given = [
-            name
-            for name in ("field", "field_swing", "field_difference")
-            if np.any(np.asarray(parameters.get(f"surroundings.{name}", 0.0)) != 0.0)
-        ]
-        if not given or self._field_turned():
-            return []
-        return [
-            f"surroundings.{given[0]}: this test does not turn the field into gyro axes; it is possible in tests on a "
-            "table with one axis that stands on the site (tumble_single_axis, fixed_position ...)"
-        ]
+    def field_axes(self) -> dict[str, Any]:
+        """Return the parameters of the surroundings that say how the table stands."""
+        return {"surroundings.base": self.base()}
 
 
 class OpenLoopTest(TableTest):
