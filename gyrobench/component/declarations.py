@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import operator
 from collections.abc import Iterator
@@ -146,6 +147,15 @@ def _flat(x: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...],
         yield path, x
 
 
+def element_names(name: str, shape: Shape) -> list[str]:
+    """FMI names of the elements of an array, row by row: ``face[1,1]``, ``face[1,2]``, ``der(q[1])``."""
+    if not shape:
+        return [name]
+    if name.startswith("der("):
+        return [f"der({n})" for n in element_names(name[4:-1], shape)]
+    return [f"{name}[{','.join(map(str, at))}]" for at in itertools.product(*(range(1, n + 1) for n in shape))]
+
+
 def make_layout(decls: dict[str, Declaration]) -> list[Scalar]:
     kind = {"parameter": Parameter, "input": Input, "output": Output, "state": State, "discrete": Discrete}
     out: list[Scalar] = []
@@ -154,9 +164,8 @@ def make_layout(decls: dict[str, Declaration]) -> list[Scalar]:
             if not isinstance(d, kind.get(section, State)):
                 continue
             derivative = section == "derivative"
-            for p, start in _flat(d.start):
-                name = d.name + ("[" + ",".join(str(i + 1) for i in p) + "]" if p else "")
+            names = element_names(f"der({d.name})" if derivative else d.name, d.shape)
+            for name, (p, start) in zip(names, _flat(d.start), strict=True):
                 path = ("der", d.name, *p) if derivative else (d.name, *p)
-                name = f"der({name})" if derivative else name
                 out.append(Scalar(name, section, path, d, len(out), 0.0 if derivative else start))
     return out

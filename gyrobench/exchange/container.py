@@ -11,7 +11,7 @@ from typing import Any
 
 from gyrobench.exchange.exposure import choose
 from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
-from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, with_experiment
+from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, slots_with_arrays, with_experiment
 from gyrobench.system.system import System
 
 
@@ -32,8 +32,8 @@ def export_container(
     expose: as for :func:`gyrobench.exchange.exposure.choose`; a parameter of parts that share a value sets all of them.
     Within a step the FMUs run in the execution order of the bench, each with the newest values, factors of wires right
     before the part that takes them; initial outputs are not propagated around cut loops (the toolbox logs this).
-    Raises ExportError without the toolbox, or where a mapping file states a delay, and what a run would raise before
-    it runs.
+    Raises ExportError without the toolbox, where a mapping file states a delay or a slot has arrays (FMI 3.0), and what
+    a run would raise before it runs.
     """
     try:
         from fmu_manipulation_toolbox.assembly import AssemblyNode
@@ -43,6 +43,8 @@ def export_container(
     assembly, starts, notes = prepare(chosen, parts, maps, None, seed, bench)
     if late := sorted({c.wire for c in assembly.connections if c.delayed}):
         raise ExportError(f"container: a container FMU cannot carry the delay of {', '.join(late)}; export to SSP")
+    if arrays := slots_with_arrays(assembly, starts):
+        raise ExportError(f"container: {', '.join(arrays)}: has arrays (FMI 3.0); the toolbox connects scalars only")
     gains = gains_of(assembly)
     asked = list(expose)
     if "time" in asked:

@@ -108,6 +108,8 @@ def export_ssp(
     late = sorted({c.wire for c in assembly.connections if c.delayed})
     if late:
         notes.append(f"delays stated in a mapping file are not in the archive: {', '.join(late)}")
+    if arrays := slots_with_arrays(assembly, starts):
+        notes.append(f"{', '.join(arrays)}: elements of arrays (FMI 3.0) are connectors, which few importers take")
     initial, missing = initial_inputs(assembly, gains, parts, maps, seed, bench)
     notes += missing
     values_of = {name: [*initial.get(name, ()), *v] for name, v in {**starts, **gains.starts()}.items()}
@@ -134,6 +136,13 @@ def export_ssp(
             archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
     temporary.replace(path)
     return notes
+
+
+def slots_with_arrays(assembly: Assembly, starts: Starts) -> list[str]:
+    """Return the slots whose FMUs have arrays (FMI 3.0) among what is connected, recorded or set."""
+    used = [end for c in assembly.connections for end in ((c.source, c.output), (c.target, c.input))]
+    used += [*recorded(assembly).values(), *((slot, b) for slot, given in starts.items() for b, _ in given)]
+    return sorted({slot for slot, bound in used if bound.size})
 
 
 def initial_inputs(

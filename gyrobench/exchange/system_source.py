@@ -12,7 +12,7 @@ from gyrobench.component.declarations import Scalar
 from gyrobench.engine.linked_system import HELPER, READ, assignments, checks_inputs, places
 from gyrobench.engine.program import Program
 from gyrobench.packaging.linked_parts import c_name, linked_files
-from gyrobench.packaging.native_target import header_folder
+from gyrobench.packaging.native_target import extents_header, header_folder
 
 HERE = Path(packaging.__file__).parent
 KINDS = {float: "Real", int: "Integer", bool: "Boolean"}
@@ -142,6 +142,7 @@ def source_files(s: SystemSource, guid: str, fmi: int) -> dict[str, str]:
     return {
         **linked_files({c_name(name): cls for name, cls in s.parts.values()}),
         "model.c": model_text(s, guid),
+        **({"extents.h": extents_header([1] * len(s.exposed))} if fmi == 3 else {}),
         **{n: (HERE / n).read_text(encoding="utf-8") for n in ("system_core.h", "instance.h", f"fmi{fmi}.c")},
         **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
     }

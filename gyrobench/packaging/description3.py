@@ -1,12 +1,14 @@
 """modelDescription.xml (FMI 3.0) of a part.
 
-The variables are the independent variable, whose value reference is 0, and the scalars of the FMI 2.0 description, with
-the same structured names and references larger by one (arrays are not declared as such).
+The variables are the independent variable, whose value reference is 0, and what the part declares: a vector or matrix
+is one variable with dimensions, its values row by row.  Value references are larger by one than in the FMI 2.0
+description; an array has that of its first element.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
@@ -20,19 +22,20 @@ from gyrobench.packaging.description import (
     unit_name,
     units,
 )
+from gyrobench.packaging.native_target import variables
 from gyrobench.packaging.source import Source
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 
 
 def reference(s: Scalar) -> str:
-    """Return the value reference of a scalar: 0 is the time's."""
+    """Return the value reference of a scalar, or of the array that begins with it: 0 is the time's."""
     return str(s.reference + 1)
 
 
 def time_name(cls: type[Component]) -> str:
     """Return the name of the independent variable: "time", unless the part has a variable of that name."""
-    taken = {s.name for s in cls.layout}
+    taken = {s.name.partition("[")[0] for s in cls.layout}
     return next(n for n in ("time", "simulation_time", "independent_time") if n not in taken)
 
 
@@ -50,13 +53,19 @@ def xml_text(root: ET.Element) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+def array_name(s: Scalar) -> str:
+    """Return the name of the variable that a scalar is an element of, or its own."""
+    return f"der({s.decl.name})" if s.section == "derivative" else s.decl.name
+
+
+def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, array: Sequence[Scalar] = ()) -> None:
+    """Add a variable: the scalar, or the array of these elements, of which it is the first."""
     causality, variability, initial = ATTRIBUTES[s.section]
     kind = TYPES[s.decl.type]
     if kind != "Float64" and variability == "continuous":
         variability = "discrete"
     attributes = {
-        "name": s.name,
+        "name": array_name(s) if array else s.name,
         "valueReference": reference(s),
         "causality": causality,
         "variability": variability,
@@ -78,8 +87,10 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
             attributes["min"] = number(lo, s.decl.type)
         if kind != "Boolean" and hi is not None:
             attributes["max"] = number(hi, s.decl.type)
-        attributes["start"] = number(s.start, s.decl.type)
-    ET.SubElement(parent, kind, attributes)
+        attributes["start"] = " ".join(number(e.start, s.decl.type) for e in array or (s,))
+    variable = ET.SubElement(parent, kind, attributes)
+    for n in s.decl.shape if array else ():
+        ET.SubElement(variable, "Dimension", {"start": str(n)})
 
 
 def add_time(parent: ET.Element, cls: type[Component]) -> None:
@@ -118,23 +129,26 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
-    variables = ET.SubElement(root, "ModelVariables")
-    add_time(variables, cls)
-    for s in cls.layout:
-        add_variable(variables, cls, s)
+    declared = ET.SubElement(root, "ModelVariables")
+    add_time(declared, cls)
+    every = variables(cls)
+    for v in every:
+        add_variable(declared, cls, v[0], v if v[0].decl.shape else ())
 
     structure = ET.SubElement(root, "ModelStructure")
     source = Source(cls)
     follows, initial = dependencies(source), initial_references(cls, source)
-    outputs = [s for s in cls.layout if s.section == "output"]
-    derivatives = [s for s in cls.layout if s.section == "derivative"]
+    firsts = [v[0] for v in every]
+    outputs = [s for s in firsts if s.section == "output"]
+    derivatives = [s for s in firsts if s.section == "derivative"]
+    states = [s for s in firsts if s.section == "state"]
     for s in outputs:
-        on = [x for x in cls.layout if x.section == "input" and x.decl.name in follows[s.decl.name]]
-        known = " ".join(reference(x) for x in (*on, *cls.states))
+        on = [x for x in firsts if x.section == "input" and x.decl.name in follows[s.decl.name]]
+        known = " ".join(reference(x) for x in (*on, *states))
         ET.SubElement(structure, "Output", {"valueReference": reference(s), "dependencies": known})
     for s in derivatives:
         ET.SubElement(structure, "ContinuousStateDerivative", {"valueReference": reference(s)})
     for s in (*outputs, *derivatives):
-        known = " ".join(str(r + 1) for r in initial[s.name])
+        known = " ".join(reference(x) for x in firsts if x.reference in initial[s.name])
         ET.SubElement(structure, "InitialUnknown", {"valueReference": reference(s), "dependencies": known})
     return xml_text(root)

@@ -1,7 +1,6 @@
 """What an FMU holds for its reader: documentation/index.html, made from what is declared, and licences.
 
-Of FMI 3.0 also terminals: each vector of inputs or outputs is one, its elements in their order, so that a tool can
-connect it with one line.
+Of FMI 3.0 also terminals: each vector or matrix of inputs or outputs is one, with the array as its only member.
 """
 
 from __future__ import annotations
@@ -73,21 +72,14 @@ def index_page(title: str, summary: str, text: str, layout: Iterable[Scalar], wh
 
 
 def terminals(cls: type[Component]) -> dict[str, bytes]:
-    """Return terminalsAndIcons/terminalsAndIcons.xml of FMI 3.0; nothing where no connector is a vector."""
+    """Return terminalsAndIcons/terminalsAndIcons.xml of FMI 3.0; nothing where no connector is an array."""
     root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     parent = ET.SubElement(root, "Terminals")
-    vectors = (s for s in cls.layout if s.section in ("input", "output") and s.decl.shape)
-    for name, group in groupby(vectors, lambda s: s.decl.name):
-        elements = list(group)
-        of = {"name": name, "matchingRule": "sequence", "terminalKind": "org.gyrobench.vector"}
-        terminal = ET.SubElement(parent, "Terminal", of | {"description": elements[0].decl.doc})
-        for s in elements:
-            member = {
-                "variableName": s.name,
-                "memberName": s.name.partition("[")[2].rstrip("]"),
-                "variableKind": "signal",
-            }
-            ET.SubElement(terminal, "TerminalMemberVariable", member)
+    arrays = {s.decl.name: s.decl for s in cls.layout if s.section in ("input", "output") and s.decl.shape}
+    for name, d in arrays.items():
+        of = {"name": name, "matchingRule": "sequence", "terminalKind": "org.gyrobench.array", "description": d.doc}
+        member = {"variableName": name, "variableKind": "signal"}
+        ET.SubElement(ET.SubElement(parent, "Terminal", of), "TerminalMemberVariable", member)
     if not len(parent):
         return {}
     ET.indent(root)

@@ -5,6 +5,7 @@
 
 typedef fmi2CallbackLogger Logger;
 #define FIRST_REFERENCE 0u
+#define EXTENT(place) 1 /* no arrays */
 #include "instance.h"
 
 static void say(Instance *m, const char *message) {
@@ -65,8 +66,8 @@ fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
         size_t i;                                                                                         \
         if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                    \
         for (i = 0; i < n; i++) {                                                                         \
-            double x = 0.0;                                                                               \
-            if (get_value(m, vr[i], &x)) return fmi2Error;                                                \
+            const double *const v = values_of(m, vr[i]), x = v ? *v : 0.0;                                \
+            if (!v) return fmi2Error;                                                                     \
             out[i] = expression;                                                                          \
         }                                                                                                 \
         return told(m);                                                                                   \
@@ -75,8 +76,11 @@ fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
     fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, const Type in[]) { \
         Instance *m = (Instance *)c;                                                                      \
         size_t i;                                                                                         \
-        for (i = 0; i < n; i++)                                                                           \
-            if (set_value(m, vr[i], (double)in[i])) return fmi2Error;                                     \
+        for (i = 0; i < n; i++) {                                                                         \
+            double *const v = settable(m, vr[i]);                                                         \
+            if (!v) return fmi2Error;                                                                     \
+            *v = (double)in[i];                                                                           \
+        }                                                                                                 \
         m->part.n.dirty = 1.0;                                                                            \
         return fmi2OK;                                                                                    \
     }

@@ -1,13 +1,16 @@
 /* FMI 3.0 co-simulation face of a native component.  Compiled as one unit: model.c is generated.
  *
- * The time has the value reference 0; after it come the variables as scalars, in the order of the FMI 2.0 face.
+ * The time has the value reference 0; after it come the variables in the order of the FMI 2.0 face.  An array has the
+ * reference of its first element, and those of the others are of no variable.
  */
 #include "model.c"
+#include "extents.h" /* generated: the number of values of the variable that begins at a place, 0 within an array */
 
 #include "fmi3Functions.h"
 
 typedef fmi3LogMessageCallback Logger;
 #define FIRST_REFERENCE 1u
+#define EXTENT(place) extents[place]
 #include "instance.h"
 
 #if defined(__GNUC__)
@@ -75,28 +78,45 @@ fmi3Status fmi3EnterConfigurationMode(fmi3Instance m) { return fmi3OK; }
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance m) { return fmi3OK; }
 
 /* -------------------------------------------------------------------------------------- variables */
-static const char *const counts = "as many values as value references are expected";
+static int n_values(unsigned reference) { return reference ? extent(reference) : 1; } /* the time has one */
+
+static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size_t given) {
+    size_t i, expected = 0;
+    for (i = 0; i < n; i++) {
+        if (!n_values(vr[i])) return missing(m, vr[i]);
+        expected += (size_t)n_values(vr[i]);
+    }
+    if (given == expected) return 0;
+    return wrong(m, "%u values for variables of %u values", (unsigned)given, (unsigned)expected);
+}
 
 #define GETTER(Name, Type, expression)                                                                               \
     fmi3Status fmi3Get##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, Type out[], size_t n_out) {    \
         Instance *m = (Instance *)c;                                                                                 \
-        size_t i;                                                                                                    \
-        if (n != n_out) return wrong(m, counts);                                                                     \
+        size_t i, j = 0;                                                                                             \
+        int k;                                                                                                       \
+        if (miscounted(m, vr, n, n_out)) return fmi3Error;                                                           \
         if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                               \
         for (i = 0; i < n; i++) {                                                                                    \
-            double x = m->part.n.v.t;                                                                                \
-            if (vr[i] != 0 && get_value(m, vr[i], &x)) return fmi3Error;                        \
-            out[i] = expression;                                                                                     \
+            const double *const v = vr[i] ? values_of(m, vr[i]) : &m->part.n.v.t;                                    \
+            for (k = 0; k < n_values(vr[i]); k++) {                                                                  \
+                const double x = v[k];                                                                               \
+                out[j++] = expression;                                                                               \
+            }                                                                                                        \
         }                                                                                                            \
         return told(m);                                                                                              \
     }
 #define SETTER(Name, Type)                                                                                           \
-    fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const Type in[], size_t n_in) { \
+    fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const Type in[], size_t n_in) {\
         Instance *m = (Instance *)c;                                                                                 \
-        size_t i;                                                                                                    \
-        if (n != n_in) return wrong(m, counts);                                                                      \
-        for (i = 0; i < n; i++)                                                                                      \
-            if (set_value(m, vr[i], (double)in[i])) return fmi3Error;                                                \
+        size_t i, j = 0;                                                                                             \
+        int k;                                                                                                       \
+        if (miscounted(m, vr, n, n_in)) return fmi3Error;                                                            \
+        for (i = 0; i < n; i++) {                                                                                    \
+            double *const v = settable(m, vr[i]);                                                                    \
+            if (!v) return fmi3Error;                                                                                \
+            for (k = 0; k < extent(vr[i]); k++) v[k] = (double)in[j++];                                              \
+        }                                                                                                            \
         m->part.n.dirty = 1.0;                                                                                       \
         return fmi3OK;                                                                                               \
     }
@@ -159,7 +179,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance m, const fmi3Byte bytes[], size_
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance m, const fmi3ValueReference unknown[], size_t n_unknown,
                                         const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
                                         size_t n_seed, fmi3Float64 out[], size_t n_out) {
-    if (n_seed != n_known || n_out != n_unknown) return wrong((Instance *)m, counts);
+    if (miscounted((Instance *)m, known, n_known, n_seed) || miscounted((Instance *)m, unknown, n_unknown, n_out)) return 3;
     return derivative((Instance *)m, unknown, n_unknown, known, n_known, seed, out);
 }
 

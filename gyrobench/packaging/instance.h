@@ -1,7 +1,8 @@
 /* What the FMI 2 and FMI 3 faces share: an instance, its log, values by reference, states, derivatives.
  *
  * Included after model.c.  `Logger` is the type of the FMI version's log callback, `say` its call, FIRST_REFERENCE the
- * value reference of the first variable.
+ * value reference of the first variable, EXTENT(place) the number of values of the variable at a place of `Vars`: 0
+ * where none begins, within an array.
  * The results are FMI status values: 0 OK, 3 error, the same in both versions.
  */
 #include <stdlib.h>
@@ -63,7 +64,11 @@ static inline int in_range(unsigned reference, int first, int n) {
 
 static inline unsigned place(unsigned reference) { return reference - FIRST_REFERENCE; }
 
-static inline int has(unsigned reference) { return in_range(place(reference), 0, N_REFERENCES); }
+static inline int extent(unsigned reference) { /* the number of its values; 0 where there is no such variable */
+    return in_range(place(reference), 0, N_REFERENCES) ? EXTENT(place(reference)) : 0;
+}
+
+static inline int has(unsigned reference) { return extent(reference) > 0; }
 
 static int has_all(Instance *m, const unsigned references[], size_t n) {
     size_t i;
@@ -79,20 +84,25 @@ static void freshen(Instance *m, const unsigned references[], size_t n) {
         if (in_range(place(references[i]), Y0, N_Y)) refresh(&m->part);
 }
 
-static inline int get_value(Instance *m, unsigned reference, double *x) {
-    if (!has(reference)) return missing(m, reference);
-    *x = value(&m->part)[place(reference)];
-    return 0;
+/* Where the values of a variable are; NULL where there is no such variable. */
+static inline const double *values_of(Instance *m, unsigned reference) {
+    if (has(reference)) return value(&m->part) + place(reference);
+    missing(m, reference);
+    return NULL;
 }
 
-static inline int set_value(Instance *m, unsigned reference, double x) {
-    if (!in_range(place(reference), U0, N_U)) { /* no input */
-        if (!has(reference)) return missing(m, reference);
-        if ((int)place(reference) < U0 && m->part.n.running != 0.0)
-            return wrong(m, "parameter %s is fixed once initialization has ended: reset first", names[place(reference)]);
+/* The same, to be set; NULL where it may not be set now. */
+static inline double *settable(Instance *m, unsigned reference) {
+    const char *name;
+    if (!has(reference)) {
+        missing(m, reference);
+        return NULL;
     }
-    value(&m->part)[place(reference)] = x;
-    return 0;
+    if ((int)place(reference) >= U0 || m->part.n.running == 0.0) return value(&m->part) + place(reference);
+    name = names[place(reference)];
+    wrong(m, "parameter %.*s is fixed once initialization has ended: reset first",
+          (int)(extent(reference) > 1 ? strcspn(name, "[") : strlen(name)), name);
+    return NULL;
 }
 
 static int step(Instance *m, double t, double h) {
@@ -114,14 +124,17 @@ static int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, c
                       const double dv[], double out[]) {
     Vars seed;
     const Vars before = m->part.n.v; /* asking changes nothing: outputs may read the derivatives of the last step */
-    size_t i;
+    size_t i, j = 0;
+    int k;
     memset(&seed, 0, sizeof seed);
     if (!has_all(m, unknown, n_unknown) || !has_all(m, known, n_known)) return 3;
-    for (i = 0; i < n_known; i++) ((double *)&seed)[place(known[i])] = dv[i];
+    for (i = 0; i < n_known; i++)
+        for (k = 0; k < extent(known[i]); k++) ((double *)&seed)[place(known[i]) + k] = dv[j++];
     flow_d(&m->part, &seed);
     outputs_d(&m->part, &seed);
     m->part.n.v = before;
-    for (i = 0; i < n_unknown; i++) out[i] = ((double *)&seed)[place(unknown[i])];
+    for (i = j = 0; i < n_unknown; i++)
+        for (k = 0; k < extent(unknown[i]); k++) out[j++] = ((double *)&seed)[place(unknown[i]) + k];
     return told(m);
 }
 

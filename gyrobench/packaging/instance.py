@@ -10,12 +10,13 @@ import itertools
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from gyrobench.component import Component, ComponentError
+from gyrobench.component.declarations import element_names
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import temporary_folder, unzip_fmu
 from gyrobench.packaging.fmu import build
@@ -107,6 +108,24 @@ def _log3(environment: int | None, status: int, _category: bytes, message: bytes
         _logs.setdefault(environment or 0, []).append(message.decode("utf-8", "replace"))
 
 
+def elements(variables: Iterable[Any]) -> list[str]:
+    """Return the names of all elements of variables of a description."""
+    return [n for v in variables for n in element_names(v.name, tuple(v.shape or ()))]
+
+
+class _Access(NamedTuple):
+    """A call that sets or gets variables of one FMI type.
+
+    number: type of its values.  names: of all elements of the variables.  in_part: some of these are not asked for.
+    """
+
+    kind: str
+    number: type
+    references: list[int]
+    names: list[str]
+    in_part: bool
+
+
 @dataclass
 class Unzipped:
     """The model description of an FMU, as FMPy reads it, and the folder of its files."""
@@ -137,7 +156,8 @@ class Fmu:
         self.identity = next(_ids)
         self.messages = _logs.setdefault(self.identity, [])
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self._known: dict[tuple[str, ...], list[tuple[str, type, list[int], list[int]]]] = {}
+        self._known: dict[tuple[str, ...], list[_Access]] = {}
+        self.holding = {n: v for v in self.variables.values() for n in elements([v])}  # element -> its variable
         self.t0 = 0.0
         arguments = {
             "guid": self.description.guid,
@@ -185,35 +205,44 @@ class Fmu:
                 raise
             raise InstanceError(name, None, self.messages or [str(e)]) from None
 
-    def _calls(self, names: tuple[str, ...]) -> list[tuple[str, type, list[int], list[int]]]:
-        """Return the calls for these variables: FMI type, type of its values, value references, places in names."""
+    def _variables(self, names: Iterable[str]) -> list[Any]:
+        """Return the variables that hold these elements, each once."""
+        return list({v.valueReference: v for v in map(self.holding.__getitem__, names)}.values())
+
+    def _calls(self, names: tuple[str, ...]) -> list[_Access]:
+        """Return the calls for these elements, one for each FMI type."""
         if names not in self._known:
-            groups: dict[str, list[int]] = {}
-            for place, n in enumerate(names):
-                groups.setdefault(self.variables[n].type, []).append(place)
+            groups: dict[str, list[Any]] = {}
+            for v in self._variables(names):
+                groups.setdefault(v.type, []).append(v)
             self._known[names] = [
-                (
+                _Access(
                     kind,
                     {"Real": float, "Float64": float, "Boolean": bool}.get(kind, int),
-                    [self.variables[names[place]].valueReference for place in places],
-                    places,
+                    [v.valueReference for v in of],
+                    elements(of),
+                    not set(names) >= set(elements(of)),
                 )
-                for kind, places in groups.items()
+                for kind, of in groups.items()
             ]
         return self._known[names]
 
+    def _values(self, access: _Access) -> dict[str, float]:
+        size = {"nValues": len(access.names)} if self.three else {}
+        values = self._call("get", getattr(self.fmu, f"get{access.kind}"), access.references, **size)
+        return dict(zip(access.names, map(float, values), strict=True))
+
     def set(self, values: dict[str, float]) -> None:
-        given = list(values.values())
-        for kind, whole, references, places in self._calls(tuple(values)):
-            self._call("set", getattr(self.fmu, f"set{kind}"), references, [whole(given[place]) for place in places])
+        for access in self._calls(tuple(values)):
+            given = {**self._values(access), **values} if access.in_part else values  # an array is set as a whole
+            numbers = [access.number(given[n]) for n in access.names]
+            self._call("set", getattr(self.fmu, f"set{access.kind}"), access.references, numbers)
 
     def get(self, names: Sequence[str]) -> list[float]:
-        found = [0.0] * len(names)
-        for kind, _, references, places in self._calls(tuple(names)):
-            values = self._call("get", getattr(self.fmu, f"get{kind}"), references)
-            for place, x in zip(places, values, strict=True):
-                found[place] = float(x)
-        return found
+        found: dict[str, float] = {}
+        for access in self._calls(tuple(names)):
+            found |= self._values(access)
+        return [found[n] for n in names]
 
     def initialize(self, t0: float = 0.0) -> None:
         if self.three:
@@ -228,9 +257,14 @@ class Fmu:
 
     def derivative(self, unknown: Sequence[str], known: dict[str, float]) -> list[float]:
         """Return the directional derivative of the unknowns along ``known``."""
-        z = [self.variables[n].valueReference for n in unknown]
-        v = [self.variables[n].valueReference for n in known]
-        return list(self._call("derivative", self.fmu.getDirectionalDerivative, z, v, list(known.values())))
+        variables = self._variables(unknown), self._variables(known)
+        rows, columns = map(elements, variables)
+        references = [[v.valueReference for v in of] for of in variables]
+        size = {"nSensitivity": len(rows)} if self.three else {}
+        seed = [known.get(n, 0.0) for n in columns]
+        found = self._call("derivative", self.fmu.getDirectionalDerivative, *references, seed, **size)
+        values = dict(zip(rows, found, strict=True))
+        return [values[n] for n in unknown]
 
     def get_state(self) -> Any:
         return self._call("state", self.fmu.getFMUState if self.three else self.fmu.getFMUstate)

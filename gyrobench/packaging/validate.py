@@ -9,7 +9,7 @@ from typing import Any
 from gyrobench.bench import Bench, BenchError
 from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
-from gyrobench.packaging.instance import Fmu, InstanceError, Plain
+from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
 from gyrobench.packaging.reference import Reference, compare, outdated, read_reference
 from gyrobench.units import UnitError, unit
 
@@ -100,7 +100,7 @@ def _reference_run(path: Path, description: Any, home: Bench) -> list[str]:
         return []
     if reference.version != description.version:
         return [f"{name} {description.version}, but the reference run is that of {reference.version}"]
-    of = {k: [v.name for v in description.modelVariables if v.causality == k] for k in ("input", "output")}
+    of = {k: elements(v for v in description.modelVariables if v.causality == k) for k in ("input", "output")}
     problems = outdated(reference, of)
     if problems:
         return problems

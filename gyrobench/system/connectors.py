@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from gyrobench.component.declarations import element_names
+
 Shape = tuple[int, ...]
 #: what a signal in V or A may stand for; an FMU declares it by the attribute quantity of a variable
 QUANTITIES = {"angle": "an angle", "rate": "an angular rate"}
-
-
-def element_names(name: str, shape: Shape) -> list[str]:
-    """FMI 2 names of the elements of an array, row by row: ``face[1,1]``, ``face[1,2]`` ..."""
-    if not shape:
-        return [name]
-    indices = [""]
-    for n in shape:
-        indices = [f"{head},{i}" if head else str(i) for head in indices for i in range(1, n + 1)]
-    return [f"{name}[{i}]" for i in indices]
 
 
 @dataclass(frozen=True)

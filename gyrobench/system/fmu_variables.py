@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gyrobench.component.declarations import element_names
 from gyrobench.files import sha256
-from gyrobench.system.connectors import element_names
 
 #: type of an FMU variable -> family: what can be connected with what, and how values are given as text
 FAMILIES = {

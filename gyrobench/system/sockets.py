@@ -11,7 +11,8 @@ Conventions of the connectors: SI units; vectors along I, O, S (gyro), face axes
 from __future__ import annotations
 
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.system.connectors import Connector, Shape, Socket, element_names, inp, limit_flag, out
+from gyrobench.component.declarations import element_names
+from gyrobench.system.connectors import Connector, Shape, Socket, inp, limit_flag, out
 from gyrobench.system.loop_sockets import LOOPS
 from gyrobench.system.north_sockets import NORTH
 from gyrobench.system.table_sockets import TABLES

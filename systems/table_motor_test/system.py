@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.system.connectors import Socket, element_names, inp, out
+from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.loop_test import LoopTest
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
+from gyrobench.system.sockets import element_names
 from gyrobench.system.system import Option, Slot
 
 METER = Socket(

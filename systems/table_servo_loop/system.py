@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.system.connectors import element_names
 from gyrobench.system.families.loop_test import LoopTest, data_sheet, hold, torquer
 from gyrobench.system.families.servo_test import gyro_on_table
 from gyrobench.system.families.table_test import SDF_NOISES
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
+from gyrobench.system.sockets import element_names
 from gyrobench.system.system import Option, Slot
 
 from .closed import loop_of

@@ -11,11 +11,12 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from gyrobench.engine.session import RunError, Session, run
-from gyrobench.exchange.ssp_export import export_ssp
+from gyrobench.exchange.container import export_container
+from gyrobench.exchange.ssp_export import ExportError, export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.packaging import build
 from gyrobench.system import sockets
-from gyrobench.system.system import Slot, System
+from gyrobench.system.system import Slot, System, load_system
 from gyrobench.system.values import InvalidValueError
 
 Make = Callable[[str], Path]
@@ -106,13 +107,26 @@ def test_what_ends_a_run(make: Make, engine: str, system: type[System], values: 
 
 
 def test_own_builds_give_the_record_of_fmi_2(small: System, tmp_path: Path) -> None:
-    parts = {slot: build(small.slots[slot].part, fmi=3, out=tmp_path) for slot in ("gyro", "rebalance", "sampler")}
+    """All parts, whose vectors are arrays then, and some of them beside parts of FMI 2."""
+    every: dict[str, Path | str] = {slot: build(s.part, fmi=3, out=tmp_path) for slot, s in small.slots.items()}
     two = run(small, values=QUICK, seed=5)
+    for parts in (every, {slot: every[slot] for slot in ("gyro", "rebalance", "sampler")}):
+        for engine in ("native", "reference"):
+            three = run(small, values=QUICK, seed=5, parts=parts, engine=engine)
+            assert three.same_data(two)
+            assert three.run.parts["gyro"].fmi == "3.0"
+            assert three.run.order == two.run.order
+
+
+def test_arrays_of_own_builds_that_are_wired_and_set_in_part(tmp_path: Path) -> None:
+    """A platform on three axes: wires from and to single elements; of a matrix one element set."""
+    system = load_system("platform_three_axis")
+    system.step, system.stop, system.done = 5e-4, 0.5, None
+    values = {"gyro_x.mount[1,2]": 0.0, "platform.I_a[2]": 0.55}
+    every: dict[str, Path | str] = {slot: build(s.part, fmi=3, out=tmp_path) for slot, s in system.slots.items()}
+    two = run(system, values=values, seed=5)
     for engine in ("native", "reference"):
-        three = run(small, values=QUICK, seed=5, parts=parts, engine=engine)
-        assert three.same_data(two)
-        assert three.run.parts["gyro"].fmi == "3.0"
-        assert three.run.order == two.run.order
+        assert run(system, values=values, seed=5, parts=every, engine=engine).same_data(two)
 
 
 def test_a_vendors_gyro_with_arrays(small: System, make: Make) -> None:
@@ -133,7 +147,8 @@ def test_a_vendors_gyro_with_arrays(small: System, make: Make) -> None:
 def test_arrays_in_an_archive(small: System, make: Make, tmp_path: Path) -> None:
     """Elements of arrays are connectors of their names; the archive reads back with the same connections."""
     parts, maps = {"gyro": make("vendor_gyro3")}, {"gyro": FOREIGN / "vendor_gyro3.toml"}
-    export_ssp(small, tmp_path / "v.ssp", parts, maps, {"gyro.D_S": "0.4deg/h"})
+    notes = export_ssp(small, tmp_path / "v.ssp", parts, maps, {"gyro.D_S": "0.4deg/h"})
+    assert "gyro: elements of arrays (FMI 3.0) are connectors, which few importers take" in notes
     archive = read_ssp(tmp_path / "v.ssp", 1e-3)
     assert archive.raw["gyro.MU[3]"] == pytest.approx(0.4, rel=1e-14)
     with Session(small, parts, maps) as a, Session(archive) as b:
@@ -143,3 +158,23 @@ def test_arrays_in_an_archive(small: System, make: Make, tmp_path: Path) -> None
         ]
     assert ("table", "omega[2]", "gyro", "W[2]") in links[0]
     assert links[0] == pytest.approx(links[1], rel=1e-15)
+
+
+def test_an_archive_of_own_builds_gives_the_values_of_fmi_2(small: System, tmp_path: Path) -> None:
+    """Start values of inputs, parameters and wires, element by element: the same channels."""
+    found = []
+    for fmi in (2, 3):
+        parts: dict[str, Path | str] = {n: build(s.part, fmi=fmi, out=tmp_path) for n, s in small.slots.items()}
+        export_ssp(small, tmp_path / "s.ssp", parts, values=QUICK, seed=5)
+        found.append(run(read_ssp(tmp_path / "s.ssp", 1e-3)))
+    names = [n for n in found[0].channels if "[" in n]
+    assert {"site.f[3]", "table.omega[1]"} <= set(names)
+    assert found[1].same_data(found[0])
+
+
+def test_a_container_of_arrays_is_refused(small: System, tmp_path: Path) -> None:
+    pytest.importorskip("fmu_manipulation_toolbox")
+    parts: dict[str, Path | str] = {n: build(small.slots[n].part, fmi=3, out=tmp_path) for n in ("gyro", "sampler")}
+    with pytest.raises(ExportError, match=r"container: gyro: has arrays \(FMI 3.0\); the toolbox"):
+        export_container(small, tmp_path / "c.fmu", parts)
+    export_container(small, tmp_path / "c.fmu", {"sampler": parts["sampler"]})  # no arrays, FMI 3.0
