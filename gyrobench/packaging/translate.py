@@ -385,7 +385,7 @@ class Translation:
             method = Method(self, code, False, "sampled")
             bases = sum(c.node.name == code.node.name for _, c in self.source.equations["sampled"]) > 1
             owner = code.placed.name if code.placed else piece.owner.__name__ if bases else ""
-            name = f"{owner}_{code.node.name}" if owner else code.node.name
+            name = (f"{owner}_{code.node.name}" if owner else code.node.name) + "_"  # no name of the runtime ends so
             self.functions.append(method.text(name)[1])
             self.written |= method.touched
             call = f"{name}(part);"

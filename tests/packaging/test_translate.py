@@ -225,6 +225,28 @@ def strict(cls: type[Component], folder: Path, once: bool = False) -> None:
         assert warnings(folder / f"fmi{fmi}.c", "-fsyntax-only" if once and fmi == 3 else "-O1") == ""
 
 
+@pytest.mark.parametrize("name", ["place", "told", "draw"])
+def test_a_sampled_method_may_have_the_name_of_a_function_of_the_runtime(
+    written: Written, tmp_path: Path, name: str
+) -> None:
+    """place and told stand in instance.h, draw in core.h."""
+    body = f"""    n = Discrete(0.0, "1", "ticks")
+    y = Output("1", "ticks")
+    @sampled(every=2)
+    def {name}(self) -> None:
+        self.n += 1.0
+    def outputs(self) -> None:
+        self.y = self.n
+"""
+    strict(written("toy", body), tmp_path)
+    one = make("toy", "native", bench=tmp_path)
+    one.initialize()
+    for k in range(4):
+        one.step(k * 1e-3, 1e-3)
+    assert one.get(["y"]) == [2.0]
+    one.free()
+
+
 def test_parts_compile_without_warnings(part: str, tmp_path: Path) -> None:
     strict(load_part(part), tmp_path, once=True)
 
