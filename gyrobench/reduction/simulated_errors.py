@@ -25,12 +25,13 @@ def simulated_errors(run: RunDocument) -> dict[str, float]:
     """Return source -> error, SI, of what is set in the table and in the mount of the gyro; nothing of measured data.
 
     Angle readings of the orders 1 and 2 (positive where too much is read), the axis off the pole, the gyro turned on
-    the table; of a table that a gyro holds, its axis in each phase and its unbalance over the stiffness of its servo.
+    the table, the axes of a table with two out of the right angle; of a table that a gyro holds, its axis in each phase
+    and its unbalance over the stiffness of its servo.
     """
     if run.measured:
         return {}
     p = run.parameters
-    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p)
+    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p) | _square(p)
     for row in run.plan:
         if row.mode == "servo":
             found |= _servo_axis(p, row.phase)
@@ -45,6 +46,8 @@ def _angles(p: Mapping[str, Any]) -> dict[str, float]:
             amplitude, phase = ([p[f"{scale}{n}{end}"] for n in SCALE] for end in ("", "_phase"))
         elif np.ndim(given := p.get("table.encoder_amplitude", [])) == (2 if name else 1):
             amplitude, phase = (np.atleast_2d(x)[row] for x in (given, p.get("table.encoder_phase", [])))
+        elif name and f"{name.strip()}.encoder_amplitude" in p:  # one table on another
+            amplitude, phase = (p[f"{name.strip()}.encoder_{n}"] for n in ("amplitude", "phase"))
         else:
             continue
         for a, f, often in zip(amplitude, phase, OFTEN, strict=False):
@@ -52,6 +55,14 @@ def _angles(p: Mapping[str, Any]) -> dict[str, float]:
             for part, x in zip(SINES, (math.cos(f), math.sin(f)), strict=True):
                 out[f"{name}angle error, {often} a turn ({part})"] = float(a) * x
     return out
+
+
+def _square(p: Mapping[str, Any]) -> dict[str, float]:
+    """Return the turn of the inner axis out of the right angle: of a table with two axes, of one table on another."""
+    return {
+        "table axes out of the right angle": float(p.get("table.squareness", 0.0)),
+        "right angle of the table axes": float(p.get("inner.tilt", (0.0, 0.0))[0]),
+    }
 
 
 def _axis(p: Mapping[str, Any]) -> dict[str, float]:
