@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from masters import Array, Names, run_in
+from masters import Array, Names, PeerError, run_in
 
 from gyrobench.engine.session import run
 from gyrobench.errors import GyrobenchError
@@ -19,9 +19,10 @@ from gyrobench.reduction.step_effect import step_effects
 from gyrobench.result import Coefficient, Result
 from gyrobench.system.system import System, load_system
 
+ROUNDING = 1e-12  # in the units of reports
 #: systems that measure their noise: the same draws at the same step, others at another one
 NOISY = {"drift_compensation", "drift_record", "estimator_bench"}
-LATE = 60  # steps by which a tool that couples in parallel may come to the end later
+LATE = 200  # steps by which a tool that couples in parallel may come to the end later: some in each phase
 
 
 def at_step(name: str, values: Mapping[str, Any], step: float | None = None, noise: bool = False) -> System:
@@ -54,7 +55,7 @@ def rows_apart(system: System, own: Record) -> int:
     return max(k for k in range(1, channels + 1) if channels % k == 0 and (k == 1 or k < shortest / 4))
 
 
-def record_in(tool: str, file: Path, system: System, own: Record, timeout: float = 600.0) -> tuple[Record, float]:
+def record_in(tool: str, file: Path, system: System, own: Record, timeout: float = 3600.0) -> tuple[Record, float]:
     """Return the record that a tool gives of an exported system, and seconds a step.
 
     own: the bench's, whose plan, parameters and initial channels it takes.  Raises PeerError.
@@ -66,12 +67,19 @@ def record_in(tool: str, file: Path, system: System, own: Record, timeout: float
 
 
 def record_of(system: System, series: Mapping[str, Array], first: int, every: int, own: Record) -> Record:
-    """Return the record of series with a row each ``every`` steps from step ``first`` on, until the plan is over."""
+    """Return the record of series with a row each ``every`` steps from step ``first`` on, until the plan is over.
+
+    Raises PeerError where it is not over in the last row: windows would lack.
+    """
     number = first + every * np.arange(len(next(iter(series.values()))))
-    if system.done is not None and system.done in series:
+    if system.done is None:  # it ends with the time
+        last = int(np.count_nonzero(number <= round(float(own.run.stopped_at or 0.0) / system.step)))
+    else:
         over = np.flatnonzero(series[system.done] != 0.0)
-        last = int(over[0]) + 1 if len(over) else len(number)
-        number, series = number[:last], {n: c[:last] for n, c in series.items()}
+        if not len(over):
+            raise PeerError(f"the plan is not over after {number[-1]} steps")
+        last = int(over[0]) + 1
+    number, series = number[:last], {n: c[:last] for n, c in series.items()}
     run = own.run.replace(step=system.step)
     windows = record_from_series(system, series).windows if system.windows is not None else {}
     period = max(1, round(system.channel_period / system.step))
@@ -98,14 +106,18 @@ def numbers(result: Result) -> dict[str, Coefficient]:
 
 
 def scales(result: Result, noisy: System) -> dict[str, float]:
-    """Return u of each measure in a run with noise; where it has none, the largest measure of the unit."""
+    """Return u of each measure in a run with noise; where it has none, the largest measure of the unit.
+
+    A measure of rounding size beside none larger has the scale 1.
+    """
     try:
         found = {n: c.u for n, c in numbers(noisy.reduce(run(noisy))).items()}
     except GyrobenchError:
         found = {}
     ours = numbers(result)
     largest = {n: max(abs(c.estimate) for c in ours.values() if c.unit == o.unit) for n, o in ours.items()}
-    return {n: u if math.isfinite(u := found.get(n, 0.0)) and u > 0.0 else largest[n] or 1.0 for n in ours}
+    without = {n: x if x > ROUNDING else 1.0 for n, x in largest.items()}
+    return {n: u if math.isfinite(u := found.get(n, 0.0)) and u > ROUNDING else without[n] for n in ours}
 
 
 def differences(
@@ -150,7 +162,7 @@ CANNOT = {
         "accelerometer_four", "angle_system_test", "north_finder", "table_environment", "table_position_test",
         "tumble_two_axis",
     },
-    "first step": {"gyro_magnetic_compass"},
+    "first step": {"gyro_magnetic_compass", "servo_polar", "servo_two_axis", "servo_vertical_level"},
 }  # fmt: skip
 
 

@@ -56,13 +56,13 @@ PLANS: dict[str, tuple[dict[str, Any], float | None]] = {
     "pickoff_scale_factor": ({"points": 10}, 5e-4),
     "platform_alignment": ({"crossover": 2.5}, 5e-3),
     "platform_four_gimbal": ({"hold": 1.0}, 1e-3),
-    "platform_single_axis": ({"hold": 10.0}, 2e-3),
+    "platform_single_axis": ({"hold": 10.0}, 1e-3),
     "platform_three_axis": ({"sweeps": False, "hold": 5.0, "swing": 0.0}, 5e-4),
     "platform_three_gimbal": ({"hold": 1.0}, 1e-3),
     "rebalance_loop_test": ({"rates": "0.3 0.6 1", "gate": 0.2, "rest": 6, "readings": 3, "settle": 1.0}, None),
     "servo_polar": (
         {"site.earth_rate": 1e3 * W, "time": 86.2, "window": 2.4, "dwell": 24.0, "settle": 2.0, "cage.i_max": 2.0},
-        4e-3,
+        2e-3,
     ),
     "servo_two_axis": (
         {
@@ -80,7 +80,7 @@ PLANS: dict[str, tuple[dict[str, Any], float | None]] = {
     "table_motor_test": ({"coast": 0.5}, 5e-4),
     "table_position_test": ({"move_rate": "8deg/s", "settle": "0.5s", "dwell": "0.3s", "mounts": "0 30"}, 2.5e-3),
     "table_rate_test": ({"rates": "100 999.99", "dwell": 5.0, "least": 20, "settle": 1.0}, None),
-    "table_servo_loop": ({"hold": 1.0}, 5e-4),
+    "table_servo_loop": ({"hold": 1.0}, 2.5e-4),
     "table_supervision": ({"repeats": 1, "pairs": 0, "quiet": 10.0}, None),
     "vertical_gyro": ({"time": 20.0}, None),
     "torquer_scale_factor": ({"currents": "20 60 100", "range": "0.5deg", "range_large": "2deg", "windows": 5}, None),

@@ -85,6 +85,7 @@ def test_what_a_tool_cannot(tmp_path: Path) -> None:
     for name, output, words in (
         ("accelerometer_four", ("sampler", "count"), "KeyError"),
         ("gyro_magnetic_compass", ("exciter", "done"), "sensor: output psi is nan"),
+        ("servo_vertical_level", ("sampler", "count"), "stand: mount = 0 must be a whole number from 1"),
     ):
         system = load_system(name)
         export_ssp(system, tmp_path / f"{name}.ssp")
