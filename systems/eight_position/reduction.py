@@ -23,7 +23,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, repeatability, residual_series
-from gyrobench.reduction.estimation.effects import corrected
+from gyrobench.reduction.estimation.effects import with_set_up
 from gyrobench.reduction.estimation.findings import Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -152,7 +152,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     weighed = _candidates(channel, data, setup, d, lin) if setup.nuisances else ()
     found = fit(steps, lin.X, lin.y, t0, t1, [shown], "drift rate", "°/h", DPH, candidates=weighed)
     other = budget.own_sources("y" if channel == "x" else "x")
-    found = corrected(
+    found = with_set_up(
         found, lambda f: budget.effects(channel, setup, f, lin, readings, position), setup.corrections, other
     )
     each = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])

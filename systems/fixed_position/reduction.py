@@ -23,7 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances, repeatability
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -92,7 +92,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
     found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
                 candidates=nuisances.common(windows) if setup.nuisances else ())  # fmt: skip
-    found = corrected(found, lambda f: _effects(setup, f, i), setup.corrections)
+    found = with_set_up(found, lambda f: _effects(setup, f, i), setup.corrections)
     trend = _trend(found, middle)
     result = linear_result(
         found,

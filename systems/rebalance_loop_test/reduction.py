@@ -32,7 +32,7 @@ from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import nuisances, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, corrected
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -104,7 +104,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         [_quantity(setup, n) for n in NAMES], X, rate / setup.k - x, t0, t1, groups, "input current less reading", "µA",
         1e-6, candidates=nuisances.common(windows) if setup.nuisances else (),
     )  # fmt: skip
-    found = corrected(found, lambda f: _effects(setup, f, rate), setup.corrections)
+    found = with_set_up(found, lambda f: _effects(setup, f, rate), setup.corrections)
     result = linear_result(
         found,
         system="rebalance_loop_test",

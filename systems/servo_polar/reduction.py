@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
+from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -98,7 +98,7 @@ def _examined(record: Record, specification: Specification | None = None) -> Dri
     def effects_of(found: Findings) -> list[Effect]:
         return servo_regression.effects(held, site, found, lambda h: model.columns(h, site), phase, sizes)
 
-    found = corrected(found, effects_of, run.options.get("corrections", ""))
+    found = with_set_up(found, effects_of, run.options.get("corrections", ""), remount=run_metadata.remount_of(run))
     turns = Turns(found, [(labels[p], phase == p) for p in labels if labels[p] in POLAR], start, end)
     turns.test()
     found = model.report(found, reported)

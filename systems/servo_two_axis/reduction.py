@@ -25,7 +25,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.effects import Effect, corrected, remounts
+from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -83,7 +83,9 @@ def from_record(record: Record, specification: Specification | None = None) -> D
             DPH, noise="readings", limit=1e6, candidates=_candidates(run, record.windows, held, phase, c),
         )  # fmt: skip
         effects_of = functools.partial(_effects, j, seen, phase, site, run, drift.terms_2dof(c, terms))
-        found[c] = corrected(found[c], effects_of, run.options.get("corrections", ""))
+        found[c] = with_set_up(
+            found[c], effects_of, run.options.get("corrections", ""), remount=run_metadata.remount_of(run)
+        )
         _mount_test(found[c], phase)
         results[f"{c} channel"] = _channel(c, j, found[c], seen, phase, site, run, terms, truth, specification)
     tables = [_mounts_table(phase, labels, seen, found, mount, site), _book_table(found), _shared_table(found)]

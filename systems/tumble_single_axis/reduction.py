@@ -27,7 +27,7 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import corrected, remounts
+from gyrobench.reduction.estimation.effects import remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -90,7 +90,9 @@ def reduce(windows: Mapping[str, Array], setup: TumbleSetup) -> DriftTestResult:
         DPH,
         candidates=_candidates(setup, turning, phase, windows, nuisances.fitted(rate, X, y)),
     )
-    found = corrected(found, lambda f: budget.effects(setup, turning, current, spread, f), setup.corrections)
+    found = with_set_up(
+        found, lambda f: budget.effects(setup, turning, current, spread, f), setup.corrections, remount=setup.remount
+    )
     turning_phases = [(setup.label(p), phase == p) for p in setup.faces if setup.turns(p)]
     turns = Turns(found, turning_phases, -turning.angle_start, -turning.angle_end)
     turns.test()

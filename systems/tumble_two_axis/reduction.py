@@ -25,7 +25,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, corrected
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -108,7 +108,7 @@ def reduce(windows: Mapping[str, Array], setup: TwoAxisSetup) -> DriftTestResult
         [_group(s, theta) if s.path else _visited(w["phase"])],
         "drift rate", "°/h", DPH, candidates=weighed,
     )  # fmt: skip
-    found = corrected(found, lambda f: _effects(s, f, outer, inner, C, readings), s.corrections)
+    found = with_set_up(found, lambda f: _effects(s, f, outer, inner, C, readings), s.corrections)
     if s.path:
         _model_test(found, theta)
         _cycle_test(found, theta)

@@ -25,7 +25,7 @@ from gyrobench.reduction import handling_candidates, handling_errors, run_metada
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Windows
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import corrected, remounts
+from gyrobench.reduction.estimation.effects import remounts, with_set_up
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -101,7 +101,9 @@ def _channel(
     spread = np.asarray(windows.get(f"std_{OTHER[c]}", np.zeros_like(current)), dtype=float)
     readings = Windows(current, spread, turning.t_end - turning.t_start)
     other = evidence.own_sources(OTHER[c])
-    found = corrected(found, lambda f: evidence.effects(s, c, f, turning, readings), s.corrections, other)
+    found = with_set_up(
+        found, lambda f: evidence.effects(s, c, f, turning, readings), s.corrections, other, remount=s.remount
+    )
     turns = evidence.turns(s, found, phase, turning)
     left_out, warnings = evidence.left_out(s, c, found, turning)
     if s.model == "nine" and s.fold:

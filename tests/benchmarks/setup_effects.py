@@ -30,8 +30,7 @@ from coverage import plan
 
 from gyrobench import drift, frames
 from gyrobench.reduction.estimation import noise, nuisances, outliers, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, Remount, remounts, standard_changes
-from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.effects import Effect, Remount, remounts, standard_changes, with_set_up
 from gyrobench.reduction.estimation.linear_fit import fit
 
 SIGMA = 0.0022  # deg/h, of a window
@@ -138,20 +137,21 @@ class Bench:
         )  # fmt: skip
         if how == "named" and (odd := outliers.find(fitted)):
             fitted = odd.without
-        parts = [np.sum(standard_changes(fitted, e) ** 2, axis=0) for e in self._stated(fitted, how, case)]
+        table = self._of_table(case) if how == "stated" else []
+        remount = Remount(case.remount if how == "stated" else 0.0)
+        fitted = with_set_up(fitted, lambda _: table, remount=remount)
+        stated = [*table, *remounts(fitted, remount)]
+        parts = [np.sum(standard_changes(fitted, e) ** 2, axis=0) for e in stated]
         part = np.sum([np.zeros(fitted.value.size), *parts], axis=0)
         half = np.sqrt(fitted.reported.half_width**2 + uncertainty.NORMAL**2 * part)[:k]
         return fitted.est.beta[:k] - p.truth, half, [c.name for c, _ in fitted.joined]
 
-    def _stated(self, fitted: Findings, how: str, case: Case) -> list[Effect]:
-        if how != "stated":
-            return []
+    def _of_table(self, case: Case) -> list[Effect]:
         p = self.plan
-        table = [
+        return [
             Effect(n, size, "arcsec", rows) for n, size, rows in
             (("encoder", case.encoder, p.encoder), ("mount", case.mounted, p.mounted)) if size
         ]  # fmt: skip
-        return [*table, *remounts(fitted, Remount(case.remount))]
 
 
 def tumble(order: tuple[int, ...], turn: int, dwell: int) -> setup_plans.Plan:

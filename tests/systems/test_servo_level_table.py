@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from servoing import DPH, NAMES, QUIET
+from stated import FAINT
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
@@ -52,7 +53,7 @@ def check(plain: Result, found: Result, expected: dict[str, float], predicted: n
 
 def told(result: Result, source: str) -> np.ndarray[Any, Any]:
     """Rows: independent errors of one source; columns: what each changes the coefficients by."""
-    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"])
+    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"]) / FAINT
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_axis_tilt(bench: Session, about: str, axis: int, expected: dict[str, fl
     and D_I, D_O, D_S are half of (down less up) over gamma.  The budget has a row for each phase, set up by itself: the
     same tilt in all of them is the sum of its rows.
     """
-    plain = held(bench, u_axis=TILT)
+    plain = held(bench, u_axis=TILT * FAINT)
     found = held(bench, **{f"table.tilt[{axis}]": TILT})
     predicted = told(plain, f"table axis about {about}").sum(axis=0)
     check(plain, found, {n: v * TILT / GAMMA for n, v in expected.items()}, predicted)
@@ -90,7 +91,7 @@ def test_unbalance_over_stiffness(bench: Session, axis: int, name: str, row: int
     D_SS.  The budget of u_unbalance does not have this part.
     """
     hard = {"attitudes": NORTH, "table.stiffness": STIFFNESS}
-    plain = held(bench, u_unbalance=AT_1G, **hard)
+    plain = held(bench, u_unbalance=AT_1G * FAINT, **hard)
     found = held(bench, **hard, **{f"table.unbalance[{axis}]": UNBALANCE})
     float_off = {"D_SS": -H_C * AT_1G * W * S / GAMMA} if axis == 1 else {}
     predicted = told(plain, "unbalance over stiffness")[row]

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from servoing import DAY50, DPH, QUIET, W50
+from stated import FAINT
 from tumbling import WOBBLE
 
 from gyrobench import frames
@@ -57,7 +58,7 @@ def test_ripple_over_stiffness(
     a = torque / stiffness
     plain = smooth(stiffness)
     ripple = {"table.ripple": torque, "table.ripple_cycles": 1, "table.ripple_phase": phase}
-    found, result = estimates(polar, load_system(NAME), table__stiffness=stiffness, u_angle1=a, **ripple)
+    found, result = estimates(polar, load_system(NAME), table__stiffness=stiffness, u_angle1=a * FAINT, **ripple)
     shift = {n: found[n] - plain[n] for n in found}
     size = a * W50 / (G * math.cos(PHI)) / DPH
     assert shift[name] == pytest.approx(sign * size, rel=0.01)
@@ -94,9 +95,9 @@ def test_wobble(phase: float, row: int) -> None:
     system.name, system.folder = plain_system.name, plain_system.folder
     with Session(system) as session:
         plain, _ = estimates(session, system, **heavy)
-        wobble = {"wobble.amplitude": size, "wobble.phase": phase, "u_wobble": size}
+        wobble = {"wobble.amplitude": size, "wobble.phase": phase, "u_wobble": size * FAINT}
         found, result = estimates(session, system, **heavy, **wobble)
-    expected = np.array(next(b for b in result.type_b if b["source"].startswith("wobble"))["changes"])[row]
+    expected = np.array(next(b for b in result.type_b if b["source"].startswith("wobble"))["changes"])[row] / FAINT
     shift = np.array([found[n] - plain[n] for n in found])
     assert np.max(np.abs(expected)) > 2e-4
     assert np.max(np.abs(shift - expected)) < 0.05 * np.max(np.abs(expected)), (shift, expected)

@@ -28,6 +28,7 @@ from servoing_two_axes import (
     refusals,
     stiffness_effect,
 )  # fmt: skip
+from stated import FAINT
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import RunError, Session, run
@@ -101,12 +102,12 @@ def test_inner_axis_is_where_the_formula_says(quiet: Any) -> None:
 
 # ------------------------------------------------------------------------------------------ table effects
 def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[Any, Any]:
-    """(18,) changes of the coefficients for the size given, from the budget that both channels share: of its m
-    independent errors the one of ``row``, or all at once.
+    """(18,) changes of the coefficients over FAINT, from the budget that both channels share: of its m independent
+    errors the one of ``row``, or all at once.
     """
     parts = [np.array(b["changes"]) for b in result.type_b if b["source"].startswith(source)]
     assert parts
-    return np.array(sum(p.sum(axis=0) if row is None else p[row] for p in parts))
+    return np.array(sum(p.sum(axis=0) if row is None else p[row] for p in parts)) / FAINT
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +142,7 @@ def test_table_effects_as_predicted(
     shift (five hundred Earth rates make the shifts large)."""
     size = 20.0 * ARCSEC
     plain = np.array([c.estimate for c in load_system(NAME).reduce(brief).coefficients])
-    budget = reduced(brief, **{option: size})
+    budget = reduced(brief, **{option: size * FAINT})
     expected = predicted(budget, source, row)
     values = {n: v * (size if "phase" not in n else 1.0) for n, v in setting.items()}
     shifted = load_system(NAME).reduce(table.run({**day(500.0), **QUIET, **values}))
@@ -154,7 +155,7 @@ def test_gyro_askew_on_the_plate_as_predicted(table: Session, brief: Any) -> Non
     """The gyro turned by 20 arcsec about each axis of the plate; about z it mixes the channels of the loops."""
     size = 20.0 * ARCSEC
     plain = np.array([c.estimate for c in load_system(NAME).reduce(brief).coefficients])
-    budget = reduced(brief, u_mount=size)
+    budget = reduced(brief, u_mount=size * FAINT)
     for k, axis in enumerate("xyz"):
         M = frames.rotation(np.eye(3)[k], size).T  # rows: the gyro's axes
         values = {f"gyro.mount[{i + 1},{j + 1}]": float(M[i, j]) for i in range(3) for j in range(3)}

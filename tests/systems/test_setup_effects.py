@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from servoing import DAY50, DPH
 from servoing_two_axes import day
+from stated import FAINT
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
@@ -61,7 +62,7 @@ def passes_when_remounts_are_stated(record: Record, *at_rest: str) -> None:
     moves.
     """
     wide = {c.name: (-1e3, 1e3) for c in reduced(record).coefficients}
-    said = {"u_axis": 1e-6}
+    said = {"u_axis": FAINT}  # more would say something of the constants itself
     bare = reduced(record, wide, measured=True, **said)
     words = " ".join(w for w in bare.warnings if "each mount is taken once" in w)
     assert bare.verdict == "inconclusive"

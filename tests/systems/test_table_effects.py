@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import two_channels
+from stated import FAINT
 from test_two_axis import DPH, NAMES, SHORT, load, quiet
 from tumbling import wobbling
 
@@ -36,7 +37,8 @@ def reduced(system: System, record: Record, corrections: str = "") -> Result:
 
 def told(result: Result, source: str, row: int) -> Array:
     """What the budget says all coefficients change by; a source of several channels stands there for each."""
-    return np.array(np.sum([b["changes"][row] for b in result.type_b if b["source"].startswith(source)], axis=0))
+    changes = [b["changes"][row] for b in result.type_b if b["source"].startswith(source)]
+    return np.array(np.sum(changes, axis=0)) / FAINT
 
 
 def check(plain: Result, wrong: Result, right: Result, predicted: Array) -> None:
@@ -56,7 +58,8 @@ def session() -> Iterator[Session]:
 
 
 VALUES = {**SHORT, **quiet(), **{f"gyro.{n}": GYRO.get(n, 0.0) * DPH for n in NAMES}, "gyro.white": WHITE}
-VALUES |= {"nuisances": "none"} | {f"u_{n}": 1e-4 for n in ("axis", "square", "mount", "angle1", "angle2", "wobble")}
+SOURCES = ("axis", "square", "mount", "angle1", "angle2", "wobble")
+VALUES |= {"nuisances": "none"} | {f"u_{n}": 1e-4 * FAINT for n in SOURCES}
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +122,7 @@ def test_wobble_of_the_two_channel_tumble(row: int) -> None:
     base = two_channels.load()
     system = wobbling(base)
     values = {**two_channels.SHORT, **two_channels.quiet(base), **two_channels.gyro(np.random.default_rng(4))}
-    values |= {"nuisances": "none", "gyro.white_x": 1e-6, "gyro.white_y": 1e-6, "u_wobble": size}
+    values |= {"nuisances": "none", "gyro.white_x": 1e-6, "gyro.white_y": 1e-6, "u_wobble": size * FAINT}
     system = system.with_values(values)
     with Session(system) as prepared:
         plain = system.reduce(prepared.run(values))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stated import FAINT
 from tumbling import DPH, NAME, NAMES, RATE, SHORT, load, quiet, wobbling
 
 from gyrobench import frames
@@ -43,7 +44,7 @@ def shifts(found: Result, plain: Result, what: str) -> Array:
 
 def told(result: Result, source: str, row: int) -> Array:
     """What the budget says the coefficients change by."""
-    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"])[row]
+    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"])[row] / FAINT
 
 
 def check(shift: Array, expected: dict[str, float], part: float) -> None:
@@ -54,7 +55,7 @@ def check(shift: Array, expected: dict[str, float], part: float) -> None:
 
 @pytest.fixture(scope="module")
 def plain(session: Session) -> Result:
-    return tumble(session, load(), gyro__white=WHITE, u_angle1=ERROR, u_angle2=ERROR)
+    return tumble(session, load(), gyro__white=WHITE, u_angle1=ERROR * FAINT, u_angle2=ERROR * FAINT)
 
 
 HALF = math.pi / 2.0
@@ -123,7 +124,7 @@ def test_wobble(phase: float) -> None:
     """
     system = wobbling(load())
     with Session(system) as session:
-        before = tumble(session, system, u_wobble=WOBBLE)
+        before = tumble(session, system, u_wobble=WOBBLE * FAINT)
         found = tumble(session, system, wobble__amplitude=WOBBLE, wobble__phase=phase)
     size = -2.0 * WOBBLE * RATE / (GAMMA * C) / DPH
     expected = {"D_I": size} if phase == 0.0 else {"D_OS": size / (GAMMA * S)}

@@ -58,7 +58,10 @@ def predict(fit: Findings, type_b: Array, V: Array, draws: int = DRAWS, seed: in
         J = np.diag(fit.reported.u[:q] / np.maximum(fit.est.u[:q], 1e-300))[:, :p]
     u, variance = np.zeros(q), np.zeros(q)
     for _ in range(draws):
-        again, gain = _again(fit, model + L @ rng.standard_normal(fit.y.size), J)
+        drawn = model + L @ rng.standard_normal(fit.y.size)
+        if fit.known is not None:
+            drawn += rng.standard_normal(len(fit.known)) @ fit.known
+        again, gain = _again(fit, drawn, J)
         u += again / draws
         variance += np.einsum("qi,ij,qj->q", gain, V, gain) / draws
     white = np.linalg.solve(L, fit.X)
@@ -83,7 +86,7 @@ def _again(fit: Findings, y: Array, J: Array) -> tuple[Array, Array]:
     else:
         blocks = [c.block for c in fit.candidates]
         readings = fit.mode == "readings"
-        est = noise_mixture_fit.fit(fit.X, y, names, fit.t_start, fit.t_end, math.inf, readings, blocks)
+        est = noise_mixture_fit.fit(fit.X, y, names, fit.t_start, fit.t_end, math.inf, readings, blocks, fit.known)
     full = np.column_stack([J, np.zeros((len(J), est.beta.size - p))])
     sd, half = est.mixture.spread(full)
     return np.minimum(sd, half / NORMAL), full @ est.gain

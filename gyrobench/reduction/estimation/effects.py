@@ -1,10 +1,12 @@
 """Sources of type B: what an error of the set-up does to the data, and measured errors, which are taken out of them.
 
     effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.error(-k * current))]
-    found = corrected(found, lambda f: [Effect(...)], "torquer scale factor = 1.2e-4 (2e-5)")
+    found = with_set_up(found, lambda f: [Effect(...)], "torquer scale factor = 1.2e-4 (2e-5)")
 
 A correction is linear in the error, as the budget is; what the data are wrong by is taken from them and the fit made
-again, noise model included, so a known error neither biases the coefficients nor widens their intervals.
+again, noise model included, so a known error neither biases the coefficients nor widens their intervals.  An error of
+which only the standard uncertainty is stated is in the covariance of the data (known_errors): what it leaves in the
+residuals is not taken for noise, which would count it a second time.
 """
 
 from __future__ import annotations
@@ -87,25 +89,39 @@ class Correction:
     unit: str
 
 
-def corrected(
-    found: Findings, effects_of: Callable[[Findings], Sequence[Effect]], text: str, elsewhere: Sequence[str] = ()
-) -> Findings:
-    """Return the fit of the data less the errors that ``text`` states, :data:`FORM`; effects_of: the test's sources.
+def with_set_up(
+    found: Findings, effects_of: Callable[[Findings], Sequence[Effect]], text: str = "", elsewhere: Sequence[str] = (),
+    remount: Remount | None = None,
+) -> Findings:  # fmt: skip
+    """Return the fit of the data less the errors that ``text`` states, :data:`FORM`, with those that have a standard
+    uncertainty only in the covariance of the data; effects_of: the test's sources, remount: another.
 
-    elsewhere: sources of another channel, whose corrections are left to it.  Raises ReductionError for text of another
-    form, and for a source or unit that the test does not have.
+    elsewhere: sources of another channel, whose corrections are left to it.  The same fit where nothing is stated.
+    Raises ReductionError for text of another form, and for a source or unit that the test does not have.
     """
-    if not text.strip():
-        return found
-    effects = effects_of(found)
+    effects = [*effects_of(found), *(remounts(found, remount) if remount else [])]
+    taken = _corrections(effects, text, elsewhere)
     errors = {n: row for e in effects if e.names for n, row in zip(e.names, np.atleast_2d(e.error), strict=True)}  # type: ignore[arg-type]
+    rows = [(e, np.atleast_2d(e.error)) for e in effects if e.error is not None]
+    known = [_standard_sizes(e, len(error), taken)[:, None] * error for e, error in rows]
+    every = np.vstack([np.zeros((0, found.y.size)), *known])
+    every = every[np.any(every, axis=1)]
+    if not taken and not len(every):
+        return found
+    error = sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size))
+    again = without(found, error, every if len(every) else None)
+    return replace(again, corrections=tuple(taken), known_tests=again.made_tests)
+
+
+def _corrections(effects: Sequence[Effect], text: str, elsewhere: Sequence[str]) -> list[Correction]:
+    if not text.strip():
+        return []
     unit = {n: e.unit for e in effects for n in e.names}
     stated = [one for one in text.split(";") if one.strip()]
     taken = [_read(one, unit) for one in stated if one.rpartition("=")[0].strip() not in elsewhere]
     if len({c.source for c in taken}) < len(taken):
         raise ReductionError(f"corrections: a source stands twice in '{text}'")
-    again = without(found, sum((c.value * errors[c.source] for c in taken), np.zeros(found.y.size)))
-    return replace(again, corrections=tuple(taken), known_tests=again.made_tests)
+    return taken
 
 
 def _read(text: str, unit: dict[str, str]) -> Correction:
@@ -149,11 +165,15 @@ def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:
 
 def standard_changes(fit: Findings, effect: Effect) -> Array:
     """Return the changes (m, q) by one standard uncertainty of each part: the source's, or that of its correction."""
-    own = {c.source: c.u for c in fit.corrections}
     changes = effect.changes(fit)
-    sizes = [own.get(name, effect.size) for name in effect.names or [""] * len(changes)]
-    out: Array = changes * np.array(sizes)[:, None]
+    out: Array = changes * _standard_sizes(effect, len(changes), fit.corrections)[:, None]
     return out
+
+
+def _standard_sizes(effect: Effect, parts: int, corrections: Sequence[Correction]) -> Array:
+    """Return the standard uncertainty (parts,) of each part."""
+    own = {c.source: c.u for c in corrections}
+    return np.array([own.get(name, effect.size) for name in effect.names or [""] * parts])
 
 
 def budget_rows(fit: Findings, effect: Effect) -> Iterator[tuple[str, float, Array, str]]:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.mixture import equivalent_dof
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
@@ -79,6 +79,7 @@ class Findings:
     mode: str = "estimated"  # noise, as of fit()
     function: Callable[[Array], ArrayLike] | None = None  # of derive()
     corrections: tuple[Any, ...] = ()  # what was taken out of the data, see gyrobench.reduction.estimation.effects
+    known: Array | None = None  # (m, n): errors of known size in the data, as of fit()
 
     def __post_init__(self) -> None:
         dof = self.dof
@@ -346,9 +347,13 @@ class Findings:
     def _whitened_moments(self, columns: Array) -> tuple[Array, Array, Array]:
         """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
         if not self.white:
-            tau, share, reading, weight = self.est.models.T
-            grid = noise_model.NoiseGrid(tau, share, weight, reading)
-            return noise_mixture_fit.moments(self.t_start, self.t_end, columns, grid)[:3]
+            e = self.est
+            tau, share, reading, weight = e.models.T
+            grid, n = noise_model.NoiseGrid(tau, share, weight, reading), self.y.size
+            every = np.column_stack([columns[:, :-1], e.known, columns[:, -1]])
+            moments = noise_mixture_fit.moments(self.t_start, self.t_end, every, grid)
+            found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.variance)
+            return found.square, found.own, found.data
         Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
         square = (Z.T @ Z)[None]
         return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1]

@@ -29,7 +29,7 @@ IDEAL = 1e-6  # residuals over data, below which there is no noise
 def fit(
     quantities: Sequence[Quantity | str], X: Array, y: Array, t_start: Array | None, t_end: Array | None,
     groups: Sequence[Group], y_name: str, y_unit: str, y_scale: float, *, noise: str = "estimated",
-    weights: Array | None = None, limit: float = 1e3, candidates: Sequence[Candidate] = (),
+    weights: Array | None = None, limit: float = 1e3, candidates: Sequence[Candidate] = (), known: Array | None = None,
 ) -> Findings:  # fmt: skip
     """Least squares of ``y = X a + noise``: X (n, p), y (n,) in SI, means over windows [t_start, t_end] (s).
 
@@ -38,41 +38,43 @@ def fit(
     few readings; then ``weights`` (n,) may be given, and times may be None); "readings": estimated, of data that are
     differences of readings at t_start and t_end (angles over time).  limit: largest condition number.  candidates:
     set-up effects that may be in the data (gyrobench.reduction.estimation.nuisances); those that are follow the
-    quantities.  Noise that is assumed takes none.
+    quantities.  known (m, n): errors of the set-up of one standard uncertainty each, independent, which are in the data
+    beside the noise (known_errors).  Noise that is assumed, and data without noise, take neither.
     Raises ReductionError for data that cannot carry the model.
     """
     n = len(y)
     if t_start is None or t_end is None:
         t_start, t_end = np.arange(n, dtype=float), np.arange(n, dtype=float) + 1.0
-    known = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in quantities)
-    names = [q.name for q in known]
-    tested = candidates if noise != "white" and not _noise_free(X, y) else ()
+    wanted = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in quantities)
+    names = [q.name for q in wanted]
+    noisy = noise != "white" and not _noise_free(X, y)
+    tested, known = (candidates, known) if noisy else ((), None)
     seen, hidden = nuisances.observable(X, names, tested, y)
     try:
         if noise == "white":
             est = noise_mixture_fit.ordinary(X, y, names, t_start, t_end, weights, limit)
         elif noise in ("estimated", "readings") and weights is None:
             est = noise_mixture_fit.fit(
-                X, y, names, t_start, t_end, limit, noise == "readings", [c.block for c in seen]
+                X, y, names, t_start, t_end, limit, noise == "readings", [c.block for c in seen], known
             )
         else:
             raise ValueError(f"noise '{noise}': 'estimated', 'readings', or 'white' with or without weights")
     except RegressionError as error:
         raise ReductionError(str(error)) from None
     joined = nuisances.reported(seen, est)
-    known += tuple(Quantity(c.name, c.meaning, c.unit, c.scale) for c, _ in joined)
+    wanted += tuple(Quantity(c.name, c.meaning, c.unit, c.scale) for c, _ in joined)
     return Findings(
-        known, X, y, t_start, t_end, est, _reported(est, joined, X.shape[1]), list(groups), y_name, y_unit, y_scale,
-        noise == "white", weights, candidates=seen, hidden=hidden, linear=known[: X.shape[1]], mode=noise,
+        wanted, X, y, t_start, t_end, est, _reported(est, joined, X.shape[1]), list(groups), y_name, y_unit, y_scale,
+        noise == "white", weights, candidates=seen, hidden=hidden, linear=wanted[: X.shape[1]], mode=noise, known=known,
     )  # fmt: skip
 
 
-def without(found: Findings, error: Array) -> Findings:
-    """The same fit of the data less ``error`` (n,)."""
+def without(found: Findings, error: Array, known: Array | None = None) -> Findings:
+    """The same fit of the data less ``error`` (n,), with errors of known size (m, n) in their covariance."""
     weighed = [*found.candidates, *(h.candidate for h in found.hidden)]
     again = fit(
         found.linear, found.X, found.y - error, found.t_start, found.t_end, found.groups, found.y_name, found.y_unit,
-        found.y_scale, noise=found.mode, weights=found.weights, limit=math.inf, candidates=weighed,
+        found.y_scale, noise=found.mode, weights=found.weights, limit=math.inf, candidates=weighed, known=known,
     )  # fmt: skip
     if found.function is None:
         return again

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+
 Array = NDArray[np.float64]
 DOUBT = 0.05  # probability from which on a verdict must hold if the noise is slow drift, too
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
@@ -20,40 +22,71 @@ LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out
 
 @dataclass(frozen=True)
 class Mixture:
-    """Candidates that count: weights (g,), their estimates less the mean (g, p), covariances (g, p, p), t's dof."""
+    """Candidates that count: weights (g,), their estimates less the mean (g, p), covariances (g, p, p), t's dof.
+
+    known (p, p): the part of the covariance that errors of known size make under the likeliest noise model, as the
+    lines of a budget have it, known_each (g, p, p): of each candidate; None without such.
+    """
 
     weight: Array
     off: Array
     covariance: Array
     dof: int
     slow: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, bool))  # (g,): with drift slower than SLOW
+    known: Array | None = None
+    known_each: Array | None = None
 
     def spread(self, J: Array) -> tuple[Array, Array]:
-        """Standard deviation and 95 % half width of the combinations J (q, p) of the coefficients."""
-        off = self.off @ J.T
+        """Standard deviation and 95 % half width, of type A, of the combinations J (q, p) of the coefficients.
+
+        Errors of known size are in the covariances of the candidates and taken out here; combine_uncertainties() adds
+        them source by source.  What is left makes the whole with them again, or more: it is no less than without them
+        in each candidate.
+        """
+        off, (each, dof) = self.off @ J.T, self._each(J)
+        half = _half_width(self.weight, off, each, dof)
+        sd = np.sqrt(self.weight @ (each**2 + off**2))
+        if self.known is None or self.known_each is None:
+            return sd, half
+        known = np.einsum("qi,ij,qj->q", J, self.known, J)
+        least = sd**2 - np.einsum("qi,gij,qj,g->q", J, self.known_each, J, self.weight)
+        k = np.minimum(half / np.maximum(sd, 1e-300), NORMAL)
+        own, own_half = np.maximum(sd**2 - known, least), np.maximum(half**2 - k**2 * known, k**2 * least)
+        return np.sqrt(np.maximum(own, 0.0)), np.sqrt(np.maximum(own_half, 0.0))
+
+    def _each(self, J: Array) -> tuple[Array, Array]:
+        """Standard deviations (g, q) of the combinations and their degrees of freedom, those of the noise or, where a
+        part of the variance is known, by Welch and Satterthwaite.
+        """
         variance = np.einsum("qi,gij,qj->gq", J, self.covariance, J)
-        sd = np.sqrt(np.maximum(variance, 0.0))
-        half = _half_width(self.weight, off, sd, self.dof)
-        return np.sqrt(self.weight @ (sd**2 + off**2)), half
+        dof = np.full(variance.shape, float(self.dof))
+        if self.known_each is not None:
+            noise = variance - np.einsum("qi,gij,qj->gq", J, self.known_each, J)
+            variance = np.maximum(variance, 1e-300)
+            dof *= np.square(variance / np.maximum(noise, 1e-2 * variance))
+        return np.sqrt(np.maximum(variance, 0.0)), dof
 
     def if_slow(self, J: Array) -> tuple[float, Array]:
-        """Return the probability of slow drift, and the 95 % half widths of the combinations, about the mean of all
-        candidates, if that is the noise; zeros where it is less probable than DOUBT.
+        """Return the probability of slow drift, and the 95 % half widths of the combinations, of type A and about the
+        mean of all candidates, if that is the noise; zeros where it is less probable than DOUBT.
         """
         probability = float(self.weight[self.slow].sum())
         if probability < DOUBT:
             return probability, np.zeros(len(J))
-        variance = np.einsum("qi,gij,qj->gq", J, self.covariance[self.slow], J)
-        sd = np.sqrt(np.maximum(variance, 0.0))
-        return probability, _half_width(self.weight[self.slow] / probability, self.off[self.slow] @ J.T, sd, self.dof)
+        sd, dof = (x[self.slow] for x in self._each(J))
+        half = _half_width(self.weight[self.slow] / probability, self.off[self.slow] @ J.T, sd, dof)
+        if self.known is None:
+            return probability, half
+        known = NORMAL**2 * np.einsum("qi,ij,qj->q", J, self.known, J)
+        return probability, np.sqrt(np.maximum(half**2 - known, 0.0))
 
     def outside(self, J: Array, distance: Array) -> Array:
         """Return the probability that a combination lies farther than ``distance`` (q,) from its mean."""
-        sd = np.sqrt(np.maximum(np.einsum("qi,gij,qj->gq", J, self.covariance, J), 1e-300))
-        return _tails(self.weight, self.off @ J.T, sd, self.dof, distance)
+        sd, dof = self._each(J)
+        return _tails(self.weight, self.off @ J.T, np.maximum(sd, 1e-150), dof, distance)
 
 
-def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
+def _tails(w: Array, off: Array, sd: Array, dof: Array, distance: Array) -> Array:
     """Return the probability of the mixture outside +-distance from its mean, per coefficient."""
     upper = special.stdtr(dof, -(distance - off) / sd)
     lower = special.stdtr(dof, -(distance + off) / sd)
@@ -61,20 +94,20 @@ def _tails(w: Array, off: Array, sd: Array, dof: int, distance: Array) -> Array:
     return np.clip(out, 0.0, 1.0)
 
 
-def _half_width(w: Array, off: Array, sd: Array, dof: int, level: float = 0.95) -> Array:
+def _half_width(w: Array, off: Array, sd: Array, dof: Array, level: float = 0.95) -> Array:
     """Newton's method on the tails between bounds that close in; bisection where a narrow candidate makes it creep."""
-    quantile = float(special.stdtrit(dof, 0.5 + level / 2))
+    quantile = special.stdtrit(dof, 0.5 + level / 2)
     high = np.max(np.abs(off) + quantile * sd, axis=0)
     low = np.zeros_like(high)
-    height = math.exp(math.lgamma((dof + 1) / 2) - math.lgamma(dof / 2)) / math.sqrt(dof * math.pi)
+    height = np.exp(special.gammaln((dof + 1.0) / 2.0) - special.gammaln(dof / 2.0)) / np.sqrt(dof * math.pi)
     size = np.maximum(sd, 1e-300)
-    x = np.minimum(quantile * np.sqrt(w @ (sd**2 + off**2)), high)
+    x = np.minimum(np.min(quantile, axis=0) * np.sqrt(w @ (sd**2 + off**2)), high)
     for k in range(40):
         excess = _tails(w, off, size, dof, x) - (1.0 - level)
         low, high = np.where(excess > 0.0, x, low), np.where(excess > 0.0, high, x)
         with np.errstate(over="ignore"):  # a constant that a combination does not have: sd 0
-            density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1) / 2) for s in (1.0, -1.0))
-        step = x + excess / np.maximum(height * (w @ (density / size)), 1e-300)
+            density = sum((1.0 + ((x + s * off) / size) ** 2 / dof) ** (-(dof + 1.0) / 2.0) for s in (1.0, -1.0))
+        step = x + excess / np.maximum(w @ (height * density / size), 1e-300)
         inside = (step >= low) & (step <= high) & (k < 12)
         new = np.where(inside, step, (low + high) / 2.0)
         # the error after a step of Newton's is of the order of its square

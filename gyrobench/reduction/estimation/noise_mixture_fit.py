@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.estimation import noise, nuisance_states
+from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, Mixture, equivalent_dof
 from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
@@ -92,17 +92,21 @@ class Estimate:
     fitted: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns that ``whitened`` are residuals of
     models: Array = field(default_factory=lambda: np.array([[1.0, 0.0, 0.0, 1.0]]))
     # (g, 4): tau, share, reading and weight of the noise models that count, the most likely one first
+    known: Array = field(default_factory=lambda: np.empty((0, 0)))  # (n, r): errors of known size, known_errors.columns
+    variance: Array = field(default_factory=lambda: np.ones(1))  # (g,): of unit weight beside them, of each of models
+    set_up: Array = field(default_factory=lambda: np.zeros(1))  # (n,) or 0: what is predicted of them
 
 
 def fit(
     X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False,
-    blocks: Sequence[Block] = (),
+    blocks: Sequence[Block] = (), known: Array | None = None,
 ) -> Estimate:  # fmt: skip
     """Return the coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
 
     readings: the data are differences of readings at t0 and t1, neighbours share one.  blocks: effects that may be in
     the data too (gyrobench.reduction.estimation.nuisance_states); their columns must not be combinations of X.  The
-    coefficients of those that are, with a probability above JOINED, follow the others.
+    coefficients of those that are, with a probability above JOINED, follow the others.  known (m, n): errors in the
+    data of one standard uncertainty each, independent (known_errors): they are in the weights, in no u and half width.
 
     Raises RegressionError (a ValueError) for data that cannot carry the model and for windows without length or out
     of order.  u, half width and interval are in the unit of the coefficients.
@@ -118,8 +122,11 @@ def fit(
     z_scale = np.where(z_scale > 0.0, z_scale, 1.0)  # a mount of which every row is left out
     start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
     remainder = y - Q @ start[:p]
-    both = np.column_stack([Q, Z / z_scale, remainder])
-    M, xy, yy, logdet = moments(t0, t1, both, grid)
+    stated = known_errors.columns(known, remainder)
+    c = start.size
+    both = np.column_stack([Q, Z / z_scale, stated, remainder])
+    absorbed = known_errors.absorb(moments(t0, t1, both, grid), c, n)
+    M, xy, yy, logdet = absorbed.square, absorbed.own, absorbed.data, absorbed.logdet
     T = np.zeros((start.size, start.size))  # back from the columns of both
     T[:p, :p] = np.linalg.inv(R) / scale[:, None]
     T[p:, p:] = np.diag(1.0 / z_scale)
@@ -131,7 +138,7 @@ def fit(
     tiny = 1e-12 * np.linalg.norm(y)
     if np.linalg.norm(remainder) <= tiny:  # ideal data: what is left is rounding, no noise
         ll = np.where(white_only & (np.arange(len(each)) == 0)[:, None], 0.0, -np.inf)
-    elif blocks and np.linalg.norm(remainder - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], remainder)[0]) <= tiny:
+    elif blocks and np.linalg.norm(remainder - both[:, :c] @ np.linalg.lstsq(both[:, :c], remainder)[0]) <= tiny:
         ll = np.where(white_only, ll, -np.inf)
     w = np.exp(ll - ll.max())
     w /= w.sum()
@@ -150,26 +157,46 @@ def fit(
     slow_drift = _slow(grid, t0, t1)
     slow_drift = np.tile(slow_drift, len(each))[counts]
     mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof, slow_drift)
+    if stated.size:
+        pulled = T @ known_errors.pulled(absorbed, each, parts, counts.reshape(w.shape))
+        part = pulled @ pulled.transpose(0, 2, 1)
+        # the errors are of known size: what the scatter says of the noise is not of them
+        extra = 1.0 - s2[counts] / np.tile(absorbed.variance, len(each))[counts]
+        likeliest = pulled[int(np.searchsorted(np.flatnonzero(counts), np.argmax(ll)))]  # as the gain
+        mixture = replace(
+            mixture, covariance=cov_each + extra[:, None, None] * part, known=likeliest @ likeliest.T, known_each=part
+        )
     evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
     keep = np.concatenate([np.ones(p, bool), *(np.full(e.block.columns.shape[1], e.joined) for e in evidence)])
-    mixture = replace(mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep])
+    mixture = replace(
+        mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep],
+        known=None if mixture.known is None else mixture.known[np.ix_(keep, keep)],
+        known_each=None if mixture.known_each is None else mixture.known_each[:, keep][:, :, keep],
+    )  # fmt: skip
     eye = np.eye(int(keep.sum()))
     covariance = np.einsum("g,gpq->pq", mixture.weight, mixture.covariance)
     covariance += np.einsum("g,gp,gq->pq", mixture.weight, mixture.off, mixture.off)
     sd, half = mixture.spread(eye)
     sd = np.maximum(sd, 1e-300)
     u = np.minimum(sd, half / NORMAL)
+    if mixture.known_each is not None:
+        covariance -= np.einsum("g,gpq->pq", mixture.weight, mixture.known_each)
+        sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     covariance = covariance * np.outer(u / sd, u / sd)
     probability = mixture.outside(eye, np.abs(beta[keep]))
 
     index, at = each[best].index, int(best) * grid.tau.size + int(k)
     only = slice(k, k + 1)
-    Zk = noise.whiten(t0, t1, both, grid.tau[only], grid.share[only], grid.reading[only])[0][:, 0, :]
-    Mk = M[k][np.ix_(index, index)] + np.diag(each[best].precision[k])
-    scatter = Zk[:, -1] - Zk[:, index] @ b[at, index]
+    one = grid.tau[only], grid.share[only], grid.reading[only]
+    Zk = noise.whiten(t0, t1, both, *one)[0][:, 0, :]
+    z = absorbed.predicted(int(k), index, b[at, index])
+    scatter = Zk[:, -1] - Zk[:, index] @ b[at, index] - Zk[:, c:-1] @ z
+    plain = np.sum(Zk[:, c:-1] ** 2, axis=0) > absorbed.variance[k]  # told from the noise: the fit takes it away
     model = float(grid.tau[k]), float(grid.share[k]), float(grid.reading[k])
+    Mk = M[k][np.ix_(index, index)] + np.diag(each[best].precision[k])
+    own = noise.whiten_transposed(t0, t1, Zk[:, [*index, *range(c, c + stated.shape[1])]], model).T
     gain = np.zeros((start.size, n))
-    gain[index] = np.linalg.solve(Mk, noise.whiten_transposed(t0, t1, Zk[:, index], model).T)
+    gain[index] = np.linalg.solve(Mk, own[: len(index)] - absorbed.taken[k][index] @ own[len(index) :])
     gain = (T @ gain)[keep]
     window = float(np.median(t1 - t0))
     v = noise.mean_variance(window / grid.tau)
@@ -188,14 +215,15 @@ def fit(
             f"{tau[2]:.0f} s). Slower drift is confounded with the constant term, whose interval is valid for this "
             "record only."
         )
-    columns = np.column_stack([X, Z])[:, keep]
+    columns, counted = np.column_stack([X, Z])[:, keep], _counted(models, int(k))
     joined = tuple(c for e in evidence if e.joined for c in e.names)
     return Estimate(
         (*names, *joined), beta[keep], covariance, u, half, probability, equivalent_dof(half / np.maximum(u, 1e-300)),
         y - columns @ beta[keep], scatter / math.sqrt(max(float(s2[at]), 1e-300)), gain, design, white, tau, sigma,
         density, model[:2], tuple(warnings), mixture, model[2],
         _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
-        Zk[:, index], _listed(grid, models, int(k)),
+        np.column_stack([Zk[:, index], Zk[:, c:-1][:, plain]]), _listed(grid, models, counted), stated,
+        absorbed.variance[counted], stated @ z,
     )  # fmt: skip
 
 
@@ -210,12 +238,14 @@ def _slow(grid: noise.NoiseGrid, t0: Array, t1: Array) -> NDArray[np.bool_]:
     return out
 
 
-def _listed(grid: noise.NoiseGrid, weight: Array, k: int) -> Array:
-    """Return tau, share, reading and weight (g, 4) of the models with more than a hundredth of the largest weight and
-    of model k, which comes first.
-    """
+def _counted(weight: Array, k: int) -> NDArray[np.intp]:
+    """Return the numbers of model k and of the models with more than a hundredth of the largest weight."""
     counts = np.flatnonzero(weight > 0.01 * weight.max())
-    order = np.concatenate([[k], counts[counts != k]])
+    return np.concatenate([[k], counts[counts != k]])
+
+
+def _listed(grid: noise.NoiseGrid, weight: Array, order: NDArray[np.intp]) -> Array:
+    """Return tau, share, reading and weight (g, 4) of the models ``order``."""
     w = weight[order] / weight[order].sum()
     return np.column_stack([grid.tau[order], grid.share[order], grid.reading[order], w])
 

@@ -55,7 +55,7 @@ def find(found: Findings) -> Outliers | None:
     if found.ideal or most < 1:
         return None
     limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
-    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual))
+    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.set_up))
     size = np.max([r / max(float(np.median(r)), 1e-300) for r in each], axis=0)
     rows = np.flatnonzero(size > limit)
     if not rows.size:
@@ -77,7 +77,7 @@ def find(found: Findings) -> Outliers | None:
 
 def _decorrelated(found: Findings) -> Array:
     """r (n,) of the residuals, up to a factor."""
-    v = found.y - found.est.X @ found.est.beta
+    v = found.est.residual - found.est.set_up
     if found.white:
         return v if found.weights is None else v * np.sqrt(found.weights)
     n = v.size
@@ -103,6 +103,7 @@ def _fitted_without(found: Findings, rows: NDArray[np.intp]) -> Findings | None:
             found.y_unit, found.y_scale, noise=found.mode, limit=math.inf,
             weights=None if found.weights is None else found.weights[keep],
             candidates=[replace(c, columns=np.asarray(c.columns)[keep]) for c in found.candidates],
+            known=None if found.known is None else found.known[:, keep],
         )  # fmt: skip
     except ReductionError:
         return None  # these rows carry a coefficient alone
@@ -199,7 +200,7 @@ def robust(found: Findings) -> list[dict[str, Any]]:
 def bisquare(found: Findings) -> tuple[Array, Array, int]:
     """Coefficients of the whitened problem, their covariance, and the number of weights below a half."""
     X = found.est.X
-    columns = np.column_stack([X, found.y])
+    columns = np.column_stack([X, found.y - found.est.set_up])
     if found.white:
         Z = columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
     else:
