@@ -239,3 +239,20 @@ def test_no_verdict_rests_on_noise_being_white() -> None:
         stated += [abs(c.estimate - v) > c.k * c.u for c, v in zip(own, p.truth, strict=True)]
     wrong = [verdicts.count(v) / len(verdicts) for v in ("pass", "fail")]
     assert max(wrong) <= 0.05 and np.mean(stated) > 0.1
+
+
+def test_weights_hold_in_the_mean_of_their_prior() -> None:
+    """By calculation, noise known: absent effects too often, small ones too rarely, 95 % in the mean of the prior.  Of
+    an effect so large that it is always seen, or so small a widening that it does not matter, 95 % by itself.
+    """
+    spec = importlib.util.spec_from_file_location("price", Path(bench.__file__).with_name("price_of_choice.py"))
+    assert spec is not None and spec.loader is not None
+    price: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(price)
+    held, mean = price.single(2.0, np.array([0.0, 2.0, 10.0]))
+    assert mean == pytest.approx(0.95, abs=2e-4)
+    assert held[0] > 0.97 and held[1] < 0.93 and held[2] == pytest.approx(0.95, abs=1e-3)
+    assert price.single(1.0001, np.array([0.0, 2.0]))[0] == pytest.approx([0.95, 0.95], abs=1e-3)
+    held, mean = price.scatter(6, np.array([0.0, 2.0, 10.0]))
+    assert mean == pytest.approx(0.95, abs=2e-4)
+    assert 0.975 < held[0] < 0.985 and held[1:] == pytest.approx([0.939, 0.948], abs=2e-3)

@@ -17,6 +17,7 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 
 Array = NDArray[np.float64]
 DOUBT = 0.05  # probability from which on a verdict must hold if the noise is slow drift, too
+RESOLVED = 1e-8  # of a variance: what is left of it beside a known part is lost in rounding below
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals
 
 
@@ -51,8 +52,8 @@ class Mixture:
         known = np.einsum("qi,ij,qj->q", J, self.known, J)
         least = sd**2 - np.einsum("qi,gij,qj,g->q", J, self.known_each, J, self.weight)
         k = np.minimum(half / np.maximum(sd, 1e-300), NORMAL)
-        own, own_half = np.maximum(sd**2 - known, least), np.maximum(half**2 - k**2 * known, k**2 * least)
-        return np.sqrt(np.maximum(own, 0.0)), np.sqrt(np.maximum(own_half, 0.0))
+        least = np.maximum(least, RESOLVED * sd**2)
+        return np.sqrt(np.maximum(sd**2 - known, least)), np.sqrt(np.maximum(half**2 - k**2 * known, k**2 * least))
 
     def _each(self, J: Array) -> tuple[Array, Array]:
         """Standard deviations (g, q) of the combinations and their degrees of freedom, those of the noise or, where a

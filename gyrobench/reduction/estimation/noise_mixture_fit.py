@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
-from gyrobench.reduction.estimation.mixture import LIGHT, Mixture, equivalent_dof
+from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
 from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 from gyrobench.reduction.estimation.uncertainty import NORMAL
@@ -181,7 +181,8 @@ def fit(
     u = np.minimum(sd, half / NORMAL)
     if mixture.known_each is not None:
         covariance -= np.einsum("g,gpq->pq", mixture.weight, mixture.known_each)
-        sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        np.fill_diagonal(covariance, np.maximum(np.diag(covariance), RESOLVED * np.diag(mixture.known_each[0])))
+        sd = np.maximum(np.sqrt(np.diag(covariance)), 1e-300)
     covariance = covariance * np.outer(u / sd, u / sd)
     probability = mixture.outside(eye, np.abs(beta[keep]))
 
