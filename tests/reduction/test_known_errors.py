@@ -122,3 +122,13 @@ def test_intervals_hold_where_the_errors_are_of_the_stated_size() -> None:
         found = with_set_up(line(y + 0.01 * rng.normal(size=N)), lambda _: stated)
         held += np.abs(found.value / DPH - [0.3, -0.2]) <= combined(found, stated)[2]
     assert np.all(held >= 182) and np.all(held <= 197)
+
+
+def test_an_error_relative_to_the_reading_stays_outside() -> None:
+    """A scale factor stated to 20 %: its error is the drift itself with its noise, and a covariance with it would find
+    the factor in that noise and move the constant.  The estimates are those without it.
+    """
+    y = X @ [0.3, -0.2] + 0.01 * np.random.default_rng(1).normal(size=N)
+    plain = line(y)
+    found = with_set_up(plain, lambda _: [Effect("scale factor", 0.2, "1", -DPH * y)])
+    np.testing.assert_array_equal(found.value, plain.value)

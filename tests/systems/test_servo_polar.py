@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rate, gyro, held, latitude
+from stated import FAINT
 
 from gyrobench import frames
 from gyrobench.engine.session import RunError, Session, run
@@ -244,7 +245,13 @@ def test_encoder_harmonics_shift_as_predicted(polar: Session, day: Any) -> None:
     plain = {k.name: k.estimate for k in reduced(day, route="combination").coefficients}
     size = a * W50 / (g * c) / DPH
     for phase, name, sign in ((0.0, "D_S", 1.0), (math.pi / 2.0, "D_O", -1.0)):
-        values = {**DAY50, **QUIET, "table.encoder_amplitude[1]": a, "table.encoder_phase[1]": phase, "u_angle1": a}
+        values = {
+            **DAY50,
+            **QUIET,
+            "table.encoder_amplitude[1]": a,
+            "table.encoder_phase[1]": phase,
+            "u_angle1": a * FAINT,
+        }
         result = load_system(NAME).reduce(polar.run({**values, "route": "combination"}))
         shift = {k.name: k.estimate - plain[k.name] for k in result.coefficients}
         assert shift[name] == pytest.approx(sign * size, rel=0.02)

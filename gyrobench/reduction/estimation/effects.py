@@ -6,7 +6,7 @@
 A correction is linear in the error, as the budget is; what the data are wrong by is taken from them and the fit made
 again, noise model included, so a known error neither biases the coefficients nor widens their intervals.  An error of
 which only the standard uncertainty is stated is in the covariance of the data (known_errors): what it leaves in the
-residuals is not taken for noise, which would count it a second time.
+residuals is not taken for noise, which would count it a second time.  (Not one that is relative to the reading.)
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ UNSTATED = (
     "the mounts, or declare type_b = none."
 )
 TOUCHED = 0.1  # of what the mounts differ by: least change of a coefficient that rests on them alike
+#: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
+#: of the data, which a covariance would take for a sight of it
+RELATIVE = "1"
 SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
 PHASES = ("phase 0°", "phase 90°")  # of a wobble
 PREDICTED = "Predicted shifts by simulated errors"  # title of the table
@@ -94,7 +97,8 @@ def with_set_up(
     remount: Remount | None = None,
 ) -> Findings:  # fmt: skip
     """Return the fit of the data less the errors that ``text`` states, :data:`FORM`, with those that have a standard
-    uncertainty only in the covariance of the data; effects_of: the test's sources, remount: another.
+    uncertainty only in the covariance of the data, but for :data:`RELATIVE` ones; effects_of: the test's sources,
+    remount: another.
 
     elsewhere: sources of another channel, whose corrections are left to it.  The same fit where nothing is stated.
     Raises ReductionError for text of another form, and for a source or unit that the test does not have.
@@ -102,7 +106,7 @@ def with_set_up(
     effects = [*effects_of(found), *(remounts(found, remount) if remount else [])]
     taken = _corrections(effects, text, elsewhere)
     errors = {n: row for e in effects if e.names for n, row in zip(e.names, np.atleast_2d(e.error), strict=True)}  # type: ignore[arg-type]
-    rows = [(e, np.atleast_2d(e.error)) for e in effects if e.error is not None]
+    rows = [(e, np.atleast_2d(e.error)) for e in effects if e.error is not None and e.unit != RELATIVE]
     known = [_standard_sizes(e, len(error), taken)[:, None] * error for e, error in rows]
     every = np.vstack([np.zeros((0, found.y.size)), *known])
     every = every[np.any(every, axis=1)]
