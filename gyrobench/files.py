@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import functools
 import hashlib
 import os
@@ -77,11 +78,27 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+#: failures of the machine: disk, open files
+MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.EROFS)
+
+
+class DamagedFmuError(GyrobenchError):
+    """An FMU that cannot be unzipped."""
+
+
 def unzip_fmu(path: Path, folder: Path) -> None:
-    """Unzip what a run needs of an FMU: all but its sources and its documentation, which are most of its files."""
+    """Unzip what a run needs of an FMU: all but its sources and its documentation, which are most of its files.
+
+    Raises DamagedFmuError, and OSError for a failure of the machine.
+    """
     from fmpy import extract
 
-    extract(str(path), str(folder), include=lambda name: not name.startswith(("sources/", "documentation/")))
+    try:
+        extract(str(path), str(folder), include=lambda name: not name.startswith(("sources/", "documentation/")))
+    except Exception as error:  # of the zip archive, of names and compressed data in it, or FMPy's own
+        if isinstance(error, OSError) and error.errno in MACHINE:
+            raise
+        raise DamagedFmuError(f"{path}: cannot be unzipped, the file is damaged: {error}") from None
 
 
 class FolderInUseError(GyrobenchError):

@@ -13,6 +13,7 @@ import io
 import json
 import random
 import shutil
+import tempfile
 import traceback
 import zipfile
 from collections.abc import Callable, Mapping
@@ -396,9 +397,15 @@ def _archived(path: Path, names: tuple[str, ...], read: Callable[[Path], object]
 
 
 def _fmu(folder: Path) -> Callable[[random.Random], object]:
+    from gyrobench.files import unzip_fmu
     from gyrobench.workflow.inputs import check_fmu_files
 
-    return _archived(_gyro(folder), ("modelDescription.xml",), lambda p: check_fmu_files({"gyro": str(p)}))
+    def read(fmu: Path) -> None:
+        check_fmu_files({"gyro": str(fmu)})
+        with tempfile.TemporaryDirectory(dir=folder) as unzipped:
+            unzip_fmu(fmu, Path(unzipped))
+
+    return _archived(_gyro(folder), ("modelDescription.xml",), read)
 
 
 def _ssp(folder: Path) -> Callable[[random.Random], object]:

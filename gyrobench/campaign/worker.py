@@ -8,7 +8,6 @@ campaign.
 from __future__ import annotations
 
 import contextlib
-import errno
 import logging
 import tempfile
 import threading
@@ -29,7 +28,7 @@ from gyrobench.campaign.rows import result_columns
 from gyrobench.engine import engine_library
 from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import temporary_folder
+from gyrobench.files import MACHINE, temporary_folder
 from gyrobench.packaging import compiler
 from gyrobench.record.record import Record
 from gyrobench.result import Result
@@ -41,8 +40,6 @@ from gyrobench.workflow.run_execution import RunRequest, execute_run
 from gyrobench.workflow.user_errors import PostRunError, user_message
 
 SESSIONS = 8  # loaded at a time
-#: failures of the machine, not of a run
-MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.EROFS)
 
 
 class MachineError(GyrobenchError):

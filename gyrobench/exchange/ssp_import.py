@@ -24,6 +24,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from gyrobench.bench import Bench
+from gyrobench.errors import GyrobenchError
 from gyrobench.exchange.gains import is_gain
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, Value, as_kind, bound_values, transformation
@@ -272,7 +273,9 @@ def open_archive(path: Path) -> tuple[Path, ET.Element]:
     try:
         folder = _unpack(path)
         return folder, ET.parse(folder / "SystemStructure.ssd").getroot()
-    except (OSError, zipfile.BadZipFile, ET.ParseError) as error:
+    except GyrobenchError:
+        raise
+    except Exception as error:  # of the file, the zip archive, its compressed data, the XML
         raise InvalidConfigurationError(path.name, [f"not an SSP archive: {error}"]) from None
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
+BUILT = TESTS.parent / "fmus"  # where the FMUs belong that the attacks are made from
 #: share of the inputs; the others read in some ms, these in some tenths of a second
 RARE = {"numbers": 0.01, "ssp": 0.05}
 
@@ -50,7 +51,8 @@ def attacked(job: tuple[str, int, int]) -> tuple[str, int, float, float, list[st
 def tree(*folders: Path) -> set[tuple[str, float]]:
     """Return the files of folders (of the home folder its first level) with their times."""
     files = [f for folder in folders for f in (folder.iterdir() if folder == Path.home() else folder.rglob("*"))]
-    return {(str(f), f.lstat().st_mtime) for f in files if "__pycache__" not in str(f) and "/.git/" not in str(f)}
+    passed = ("__pycache__", "/.git/", str(BUILT))
+    return {(str(f), f.lstat().st_mtime) for f in files if not any(p in str(f) for p in passed)}
 
 
 def main() -> int:
