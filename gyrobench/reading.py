@@ -76,5 +76,5 @@ def _within(read: Callable[[Any], Any], text: Any, name: object, kind: str, erro
         return read(text)
     except RecursionError:
         raise error(f"{name}: {kind} of too many levels") from None
-    except (ValueError, ET.ParseError) as cause:  # tomllib's and json's own errors are ValueErrors
+    except (ValueError, LookupError, ET.ParseError) as cause:  # of tomllib, of json; of XML in an unknown encoding
         raise error(f"{name}: not {'an' if kind == 'XML' else 'a'} {kind} file: {shorten(str(cause), 200)}") from None

@@ -43,6 +43,8 @@ def test_xml() -> None:
         reading.xml(b"<a>" * 300 + b"</a>" * 300, "x", UsageError)
     with pytest.raises(UsageError, match="x: not an XML file: mismatched tag"):
         reading.xml(b"<a></b>", "x", UsageError)
+    with pytest.raises(UsageError, match="x: not an XML file: unknown encoding: ut1e15f-8"):
+        reading.xml(b'<?xml version="1.0" encoding="ut1e15f-8"?><a/>', "x", UsageError)
 
 
 def test_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,6 +52,8 @@ REFUSED = [
     ([*PLATFORM, "--step", "0"], "step = 0.0 s: must be > 0"),
     ([*BENCH, "--part", "estimator=estimator_kalman_ar", "--set", "estimator.phi=[1.2,0.3,0.1]"], "not stationary"),
     ([*BENCH, "--part", "estimator=estimator_sage_husa", "--set", "estimator.b=1.5"], "parameter b = 1.5 "),
+    (["run", "table_position_test", "--set", "mounts=0 inf"], "angles in deg with spaces between are expected"),
+    (["run", "table_position_test", "--set", f"positions=[{10**400}]"], "a number is expected, or a text with number"),
     (["run", "nothing.ssp"], "nothing.ssp refuses to run:\n  - no such file"),
     (["run", "vertical_gyro", "--set", "phases=erection rst"], "'rst' is none of erection"),
     (["run", "stabilizer_sdf", "--set", "J0=0kg.m2"], "J0 = 0 kg.m2: must be > 0"),

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from gyrobench import reading
 from gyrobench.bench import Bench
-from gyrobench.errors import GyrobenchError
 from gyrobench.exchange.gains import is_gain
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, Value, as_kind, bound_values, transformation
@@ -34,6 +34,7 @@ from gyrobench.system.system import InvalidConfigurationError, Slot, System
 
 ANY = Socket("FMU", "any FMU: its own inputs and outputs", ())
 FMU = "application/x-fmu-sharedlibrary"
+STRUCTURE = "SystemStructure.ssd"
 
 Place = tuple[str, ...]  # names of the systems and the component, from the outermost
 Node = tuple[Place, str]  # connector of a component or of a system
@@ -272,8 +273,8 @@ def open_archive(path: Path) -> tuple[Path, ET.Element]:
         raise InvalidConfigurationError(path.name, ["no such file"])
     try:
         folder = _unpack(path)
-        return folder, ET.parse(folder / "SystemStructure.ssd").getroot()
-    except GyrobenchError:
+        return folder, reading.xml((folder / STRUCTURE).read_bytes(), STRUCTURE, ArchiveError)
+    except InvalidConfigurationError:
         raise
     except Exception as error:  # of the file, the zip archive, its compressed data, the XML
         raise InvalidConfigurationError(path.name, [f"not an SSP archive: {error}"]) from None

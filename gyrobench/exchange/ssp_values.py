@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.errors import GyrobenchError
 
 SSP = "http://ssp-standard.org/SSP1/"
@@ -120,10 +120,7 @@ def _read(binding: ET.Element, folder: Path, inline: str, what: str) -> ET.Eleme
     file = (folder / source).resolve()
     if not file.is_relative_to(folder.resolve()) or not file.is_file():
         raise ArchiveError(f"{what} {source}: no such file in the archive")
-    try:
-        return ET.parse(file).getroot()
-    except ET.ParseError as error:
-        raise ArchiveError(f"{what} {source}: {error}") from None
+    return reading.xml(file.read_bytes(), f"{what} {source}", ArchiveError)
 
 
 def bound_values(element: ET.Element, folder: Path, ssd_units: ET.Element | None) -> Iterator[tuple[str, Value, Units]]:

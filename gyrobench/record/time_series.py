@@ -12,6 +12,7 @@ Memory: blocks of BLOCK bytes and the windows, whatever the length of the file.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -64,8 +65,10 @@ def read_blocks(file: Path, head: Head, columns: Sequence[Column]) -> Iterator[d
             rows += batch.num_rows
             yield {n: places[n][1].to_si(_floats(batch.column(c))) for n, c in taken.items()}
     except pa.ArrowInvalid as error:
-        problems = _not_numbers(file, head, taken)
-        raise DataError(file, problems or [str(error)]) from None
+        with contextlib.suppress(pa.ArrowInvalid):  # not of its cells
+            problems = _not_numbers(file, head, taken)
+        ended = file.stat().st_size < BLOCK and not rows  # a header without an end of its line
+        raise DataError(file, problems or ["no rows below the header" if ended else str(error)]) from None
     if wrong:
         many = f"{len(wrong)} rows have" if len(wrong) > 1 else "a row has"
         raise DataError(file, [f"{many} not the {len(head.names)} cells of the header; the first: '{wrong[0][:80]}'"])

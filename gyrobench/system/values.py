@@ -82,7 +82,7 @@ def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
         return str(value)
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(f"{name} = {value!r}: a number is expected, or a text with number and unit") from None
     if not math.isfinite(number):
         raise InvalidValueError(f"{name} = {number}: must be finite")

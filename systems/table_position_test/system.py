@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -124,11 +125,12 @@ class TablePositionTest(System):
 
     def azimuths(self) -> list[float]:
         """Return the mounts of the reference, rad."""
-        try:
-            return [math.radians(float(x)) for x in str(self["mounts"]).split()]
-        except ValueError:
-            text = f"mounts = {self['mounts']!r}: angles in deg with spaces between are expected, as in '0 30 180'"
-            raise InvalidValueError(text) from None
+        with contextlib.suppress(ValueError):
+            angles = [math.radians(float(x)) for x in str(self["mounts"]).split()]
+            if all(map(math.isfinite, angles)):
+                return angles
+        text = f"mounts = {self['mounts']!r}: angles in deg with spaces between are expected, as in '0 30 180'"
+        raise InvalidValueError(text)
 
     def program(self) -> Program | None:
         """Return the program of the file, if one is given."""

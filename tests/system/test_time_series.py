@@ -164,6 +164,9 @@ def test_what_is_wrong_is_said_once_with_its_count(tmp_path: Path) -> None:
         fixed(tmp_path, [",".join(r) + (",9" if k < 3 else "") for k, r in enumerate(rows)])
     with pytest.raises(DataError, match=r"time does not increase in 1 rows; the first: 1 s after 1\.25 s"):
         fixed(tmp_path, [",".join(r) for r in (*rows[:4], rows[5], rows[4], *rows[6:])])
+    (tmp_path / "series.csv").write_text(f"{HEAD}# window = 2s\ntime [s],current [mA]", encoding="utf-8")
+    with pytest.raises(DataError, match="no rows below the header"):
+        load("fixed_position").read_measured(tmp_path / "series.csv", {})
     with pytest.raises(DataError, match="column 'current': no unit"):
         fixed(tmp_path, [",".join(r) for r in rows], "time [s],current")
     with pytest.raises(DataError, match="no window is complete"):
