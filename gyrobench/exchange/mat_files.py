@@ -7,7 +7,10 @@ each, ``data_1`` holds what is constant and ``data_2`` a row or column for each 
 
 from __future__ import annotations
 
+import pickle
 import struct
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -36,23 +39,20 @@ def is_mat(begin: bytes) -> bool:
 
 def read_mat(file: Path) -> tuple[dict[str, Array], dict[str, float]]:
     """Return columns, and values that are constant, by name.  Raises DataError."""
-    from scipy.io import loadmat, whosmat
-
     if file.stat().st_size > 8 * LARGEST:
         raise DataError(file, [f"larger than {8 * LARGEST >> 20} MB; save the series that a record needs as Parquet"])
-    try:
-        if 8 * sum(int(np.prod([float(n) for n in shape])) for _, shape, _ in whosmat(str(file))) > MOST:
-            raise DataError(
-                file, [f"arrays of more than {MOST >> 20} MB; save the series that a record needs as Parquet"]
-            )
-        content = loadmat(str(file), chars_as_strings=False)
-    except DataError:
-        raise
-    except Exception as error:  # of any kind, where the file is damaged
-        raise DataError(
-            file, [f"not a MATLAB file that can be read: {str(error)[:200] or type(error).__name__}"]
-        ) from None
-    content = {n: v for n, v in content.items() if not n.startswith("__")}
+    reader = [sys.executable, "-P", str(Path(__file__).with_name("mat_contents.py")), str(file), str(MOST)]
+    done = subprocess.run(reader, capture_output=True, check=False)
+    if done.returncode == 3:
+        raise DataError(file, [f"arrays of more than {MOST >> 20} MB; save the series that a record needs as Parquet"])
+    if done.returncode != 0:
+        said = (
+            done.stderr.decode(errors="replace").strip()
+            if done.returncode == 1
+            else "it ended the program that read it"
+        )
+        raise DataError(file, [f"not a MATLAB file that can be read: {said.rpartition(chr(10))[2]}"])
+    content = pickle.loads(done.stdout)
     if all(n in content for n in LAYOUT):
         return _trajectory(file, content)
     return _arrays(content), {}

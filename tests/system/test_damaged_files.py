@@ -1,4 +1,4 @@
-"""Archives whose compressed data are damaged: the directory of the archive can be read, a file in it cannot."""
+"""Damaged files: archives whose directory can be read and a file in them cannot; arrays that end their reader."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.io import savemat
 
 from gyrobench.engine.session import Session
+from gyrobench.exchange.mat_files import read_mat
 from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.files import DamagedFmuError
 from gyrobench.packaging import build
 from gyrobench.packaging.compiler import PLATFORMS, this_platform
+from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 Command = Callable[..., tuple[int, str, str]]
@@ -47,3 +51,15 @@ def test_an_archive_of_a_system_with_damaged_data_is_refused(tmp_path: Path) -> 
     export_ssp(load_system("open_loop_drift"), tmp_path / "system.ssp")
     with pytest.raises(InvalidConfigurationError, match="not an SSP archive: Error -3 while decompressing"):
         read_ssp(damage(tmp_path / "system.ssp", ".ssd"), 1e-3)
+
+
+def test_a_mat_file_that_ends_its_reader_is_refused(tmp_path: Path) -> None:
+    """The class of an array changed: scipy's reader takes what is not there (signal 11) in its own process."""
+    savemat(tmp_path / "a.mat", {"time": np.arange(4.0), "s": {"a": np.arange(4.0)}})
+    content = bytearray((tmp_path / "a.mat").read_bytes())
+    assert content[144] == 6  # double
+    content[144] = 5  # an object
+    (tmp_path / "b.mat").write_bytes(content)
+    assert set(read_mat(tmp_path / "a.mat")[0]) == {"time", "s.a"}
+    with pytest.raises(DataError, match="not a MATLAB file that can be read"):
+        read_mat(tmp_path / "b.mat")
