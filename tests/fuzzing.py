@@ -354,7 +354,7 @@ def _other(folder: Path) -> Callable[[random.Random], object]:
     outputs = {n: ("sampler", Bound(n, n.partition(".")[2], 0, "Real")) for n in names}
 
     def one(rng: random.Random) -> None:
-        name = rng.choice(list(files))
+        [name] = rng.choices(list(files), [1 if n.endswith(".mat") else 5 for n in files])  # a process for each .mat
         (folder / name).write_bytes(changed(files[name], rng))
         result = open_result(folder / name)
         reader = ResultReader(system, result, find_series(result, outputs, set(names), {"sampler"})[0], 0.5)
