@@ -41,17 +41,16 @@ def read_mat(file: Path) -> tuple[dict[str, Array], dict[str, float]]:
     """Return columns, and values that are constant, by name.  Raises DataError."""
     if file.stat().st_size > 8 * LARGEST:
         raise DataError(file, [f"larger than {8 * LARGEST >> 20} MB; save the series that a record needs as Parquet"])
+    from gyrobench.exchange.mat_contents import TOO_LARGE  # of scipy.io
+
     reader = [sys.executable, "-P", str(Path(__file__).with_name("mat_contents.py")), str(file), str(MOST)]
     done = subprocess.run(reader, capture_output=True, check=False)
-    if done.returncode == 3:
+    if done.returncode == TOO_LARGE:
         raise DataError(file, [f"arrays of more than {MOST >> 20} MB; save the series that a record needs as Parquet"])
     if done.returncode != 0:
-        said = (
-            done.stderr.decode(errors="replace").strip()
-            if done.returncode == 1
-            else "it ended the program that read it"
-        )
-        raise DataError(file, [f"not a MATLAB file that can be read: {said.rpartition(chr(10))[2]}"])
+        said = done.stderr.decode(errors="replace").split("\n") if done.returncode == 1 else []
+        why = next(filter(None, reversed(said)), "it ended the program that read it")
+        raise DataError(file, [f"not a MATLAB file that can be read: {why}"])
     content = pickle.loads(done.stdout)
     if all(n in content for n in LAYOUT):
         return _trajectory(file, content)

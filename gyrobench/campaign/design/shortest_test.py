@@ -245,7 +245,9 @@ def _settled(
             plan = plan_search.with_dwell(search, plan.places, plan.weights, between)
     if rounds == 1:
         return plan.duration, plan, trial, search
-    raise DesignError(f"{len(plan.places)} visits: no dwell found at which the reduction states what is wanted")
+    raise DesignError(
+        f"{len(plan.places)} visits: no dwell found at which the reduction states what is wanted; want a little less or more"
+    )
 
 
 def _calibrated(wanted: Mapping[str, Want], trial: Trial) -> list[Want]:
