@@ -245,9 +245,8 @@ def _settled(
             plan = plan_search.with_dwell(search, plan.places, plan.weights, between)
     if rounds == 1:
         return plan.duration, plan, trial, search
-    raise DesignError(
-        f"{len(plan.places)} visits: no dwell found at which the reduction states what is wanted; want a little less or more"
-    )
+    why = "no dwell found at which the reduction states what is wanted; ask for a little more or less"
+    raise DesignError(f"{len(plan.places)} visits: {why}")
 
 
 def _calibrated(wanted: Mapping[str, Want], trial: Trial) -> list[Want]:
