@@ -67,7 +67,9 @@ def _square(p: Mapping[str, Any]) -> dict[str, float]:
 
 def _axis(p: Mapping[str, Any]) -> dict[str, float]:
     tilt = p.get("table.tilt", (0.0, 0.0))
-    return {"table axis off the pole, about east": tilt[0], "table axis off the pole, about p × east": tilt[1]}
+    about = ("off the pole, about east", "off the pole, about p × east", "off the vertical, about east",
+             "off the vertical, about north")  # fmt: skip
+    return {f"table axis {where}": x for where, x in zip(about, (*tilt, *tilt), strict=True)}
 
 
 def _servo_axis(p: Mapping[str, Any], phase: int) -> dict[str, float]:

@@ -18,21 +18,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench import units
+from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import nuisances, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, with_set_up
+from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -48,6 +48,8 @@ from .truth import NAMES, true_values
 Array = NDArray[np.float64]
 DPH, ARCSEC, MA = units.factor("deg/h"), units.factor("arcsec"), 1e-3
 NO_QUANTUM = 1e-10  # A, below this readings are not quantized but rounded
+LEVEL = np.eye(3)  # table axes in (E, N, U)
+SMALL = 1e-5  # rad, step of the geometric perturbations
 MEANINGS = {
     "I_0": ("bias: mean current at the reading 0", "uA"),
     "κ": ("scale-factor error: mean current over reading, less 1", "ppm"),
@@ -71,6 +73,11 @@ class Setup(SiteSetup):
     full: float = 0.0
     pulses: Pulses | None = None
     u_drift: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_wobble: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
     u_scale_factor: float = 0.0
     u_current: float = 0.0
     u_time: float = 0.0
@@ -94,7 +101,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         raise ReductionError(f"no readings of {', '.join(missing)}")
     face = np.broadcast_to(np.asarray(ON_TABLE), (x.size, 3, 3))
     turning = window_regressors.Turning(a0, a1, t0, t1, face)
-    rate = window_regressors.axis_rate(turning, np.eye(3), setup.latitude, setup.earth_rate)
+    rate = window_regressors.axis_rate(turning, LEVEL, setup.latitude, setup.earth_rate)
     full = setup.largest / setup.k
     X = design(x, std, full)
     line = np.linspace(-full, full, 201)
@@ -104,7 +111,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
         [_quantity(setup, n) for n in NAMES], X, rate / setup.k - x, t0, t1, groups, "input current less reading", "µA",
         1e-6, candidates=nuisances.common(windows) if setup.nuisances else (),
     )  # fmt: skip
-    found = with_set_up(found, lambda f: _effects(setup, f, rate), setup.corrections)
+    found = with_set_up(found, lambda f: _effects(setup, f, turning, rate), setup.corrections)
     result = linear_result(
         found,
         system="rebalance_loop_test",
@@ -119,7 +126,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
             f"Nonlinearities are given at the largest rate, {setup.largest / DPH:.6g} °/h, I = {full / MA:.6g} mA.",
             "The drift rate of the gyro is in the bias.",
         ],
-        effects=_effects(setup, found, rate),
+        effects=_effects(setup, found, turning, rate),
         **setup.reported(),
         random="noise of the loop, random drift",
     )
@@ -160,9 +167,33 @@ def _quantity(s: Setup, name: str) -> Quantity:
     return Quantity.of(name, meaning, unit, (s.truth or {}).get(name))
 
 
-def _effects(s: Setup, found: Findings, rate: Array) -> list[Effect]:
+def _effects(s: Setup, found: Findings, turning: window_regressors.Turning, rate: Array) -> list[Effect]:
     one = np.ones_like(rate)
+    along_o, along_s = np.eye(3)[1:]
+
+    def geometry(base: Array, turned: window_regressors.Turning) -> Array:
+        there = window_regressors.axis_rate(turned, base, s.latitude, s.earth_rate)
+        return found.error((there - rate) / s.k) / SMALL
+
+    def axis(direction: Array) -> Array:  # the reduction believes the axis to be where it is not
+        return -geometry(LEVEL @ frames.rotation(direction, SMALL).T, turning)
+
+    def mount(direction: Array) -> Array:
+        return geometry(LEVEL, replace(turning, face=frames.rotation(direction, SMALL) @ turning.face))
+
+    def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+        return np.array([geometry(LEVEL, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
+
+    cone = window_regressors.wobbles(turning, LEVEL, s.site, (), SMALL)
+    wobbling = np.array([found.error(-rates[:, 0] / s.k) for rates, _ in cone])
     return [
+        Effect("table axis off the vertical, about east", s.u_axis, "rad", axis(LEVEL[0])),
+        Effect("table axis off the vertical, about north", s.u_axis, "rad", axis(LEVEL[1])),
+        Effect("input axis towards output axis", s.u_mount, "rad", mount(along_s)),
+        Effect("input axis towards spin axis", s.u_mount, "rad", mount(-along_o)),
+        Effect("wobble of the table axis, twice a turn", s.u_wobble, "rad", wobbling, "", PHASES),
+        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder", SINES),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder", SINES),
         Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-rate / s.k), "relative, where it is stated"),
         Effect("drift rate of the gyro", s.u_drift, "rad/s", found.error(one / s.k)),
         Effect("offset of the current reading", s.u_current, "A", found.error(-one)),

@@ -50,7 +50,16 @@ class RebalanceLoopTest(RebalanceTest):
         | NUISANCES
         | CORRECTIONS
         | {"u_drift": Option(0.0, "rad/s", "standard uncertainty of the drift rate of the gyro", 0.0)}
-        | type_b("scale_factor", "current", "time")
+        | type_b(
+            "mount",
+            "wobble",
+            "angle1",
+            "angle2",
+            "scale_factor",
+            "current",
+            "time",
+            axis="standard uncertainty of the table axis against the vertical",
+        )
     )
     measured_data = MEASURED
     assumed = TableTest.assumed  # errors of the pulses are what the test finds

@@ -17,6 +17,7 @@ from gyrobench.system.system import load_system
 
 NAME = "rebalance_loop_test"
 QUICK: dict[str, Any] = {"gate": 0.2, "rest": 20, "readings": 6, "settle": 1.5}
+STILL = {"gyro.pickoff": 0.0, "gyro.white": 0.0, "gyro.markov": 0.0}
 I, F_Q = 3.6 / 17.2, 1e6  # noqa: E741  A, Hz
 ARCSEC = math.pi / 648000.0
 
@@ -61,6 +62,39 @@ def test_errors_of_the_pulses_come_back(pwm: Session, seed: int) -> None:
         assert c.truth == pytest.approx(truth, abs=1e-6 * abs(truth) + 1e-9), name
         assert abs(c.estimate - truth) < 4.0 * c.u, name
     assert abs(value(result, "I_0")) > 20.0 * result["I_0"].u and result["I_0"].u < 10.0  # uA: 5e-5 of full scale
+
+
+def test_encoder_error_is_predicted_corrected_and_in_u(pwm: Session) -> None:
+    """a sin(θ + f) is read too much.  All ways begin near θ = 0 and are short: there the readings turn too quickly by
+    the part a cos f, for 20″ and f = 0.5 rad 9.696e-5 * 0.8776 = 85.1 ppm, and so much too large is κ.
+    """
+    wrong = {**STILL, "table.encoder_amplitude": [20.0 * ARCSEC, 0.0], "table.encoder_phase": [0.5, 0.0]}
+    plain, off = run(pwm, STILL), run(pwm, wrong)
+    shift = value(off, "κ") - value(plain, "κ")
+    assert shift == pytest.approx(85.1, rel=0.02)
+    predicted = next(t for t in off.tables if t["title"] == "Predicted shifts by simulated errors")
+    row = next(r for r in predicted["rows"] if r[0] == "κ")
+    assert shift == pytest.approx(row[-3], rel=0.01) and row[-1] == "ppm"
+
+    sine, cosine = 20.0 * math.cos(0.5), 20.0 * math.sin(0.5)
+    text = "; ".join(f"angle error, once a turn ({n}) = {x:.6f}(0.1) arcsec"
+                     for n, x in (("sine", sine), ("cosine", cosine)))  # fmt: skip
+    back = run(pwm, {**wrong, "corrections": text})
+    assert value(back, "κ") == pytest.approx(value(plain, "κ"), abs=0.5 * plain["κ"].u)
+    assert back["κ"].u == pytest.approx(math.hypot(plain["κ"].u, 0.1 * ARCSEC * 1e6), rel=0.02)
+    stated = run(pwm, {**wrong, "u_angle1": 20.0 * ARCSEC})
+    assert abs(stated["κ"].z or 9.0) < 2.0 and stated["κ"].u == pytest.approx(97.0, rel=0.3)
+
+
+def test_tilt_of_the_table_is_a_bias(pwm: Session) -> None:
+    """3000″ about east: the axis sees cos φ sin 3000″ of the Earth rate less, 15.041 * 0.6978 * 0.014544 = 0.15265
+    deg/h, over k = 17.2 deg/h/mA 8.875 uA, and so much is in the bias; sin φ (1 - cos) is 0.7 % of it.
+    """
+    plain, off = run(pwm, STILL), run(pwm, {**STILL, "table.tilt": [3000.0 * ARCSEC, 0.0]})
+    shift = value(off, "I_0") - value(plain, "I_0")
+    assert abs(shift) == pytest.approx(8.875, rel=0.02)
+    predicted = next(t for t in off.tables if t["title"] == "Predicted shifts by simulated errors")
+    assert shift == pytest.approx(next(r for r in predicted["rows"] if r[0] == "I_0")[-3], rel=0.02)
 
 
 def test_resolution_is_two_clocks(pwm: Session) -> None:
