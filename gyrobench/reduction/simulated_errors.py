@@ -31,7 +31,7 @@ def simulated_errors(run: RunDocument) -> dict[str, float]:
     if run.measured:
         return {}
     p = run.parameters
-    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p) | _square(p)
+    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p) | _square(p) | _bias(p)
     for row in run.plan:
         if row.mode == "servo":
             found |= _servo_axis(p, row.phase)
@@ -63,6 +63,12 @@ def _square(p: Mapping[str, Any]) -> dict[str, float]:
         "table axes out of the right angle": float(p.get("table.squareness", 0.0)),
         "right angle of the table axes": float(p.get("inner.tilt", (0.0, 0.0))[0]),
     }
+
+
+def _bias(p: Mapping[str, Any]) -> dict[str, float]:
+    """Return the biases of a rate gyro, which a heading from one position holds."""
+    bias = p.get("gyro.bias", ())
+    return {f"bias of the gyro along {n}": x for n, x in zip("xy", bias, strict=False)} if np.ndim(bias) else {}
 
 
 def _axis(p: Mapping[str, Any]) -> dict[str, float]:

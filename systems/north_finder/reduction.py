@@ -66,6 +66,7 @@ class Setup(SiteSetup):
     u_level: float = 0.0
     u_accelerometer: float = 0.0
     u_bias: float = 0.0
+    unbiased: bool = False  # the gyro is simulated without bias, or it is declared that there is none
 
     @property
     def place(self) -> Place:
@@ -284,7 +285,17 @@ def _judged(result: DriftTestResult, s: Setup, p: Problem) -> DriftTestResult:
     if s.finder and s.finder["status"] != 1.0:
         words = {2.0: "is ill-conditioned", 3.0: "contradicts the latitude", 4.0: "is of a moving base"}
         reasons.append(f"The finder says that the heading {words.get(s.finder['status'], 'is not there')}.")
-    return uncertainty.withhold(result, reasons)
+    uncertainty.withhold(result, reasons)
+    if s.method == "strapdown" and not s.u_bias and not s.unbiased:
+        turned = math.degrees(0.1 * DPH / s.place.north)
+        text = (
+            f"One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to {turned:.2g}°. It is "
+            "not in u. State u_bias, or take the method strapdown two."
+        )
+        uncertainty.withhold(result, [text], ["pass"])
+        if not any(text in w for w in result.warnings):
+            result.warnings.insert(0, text)
+    return result
 
 
 def setup_of(record: Record, specification: Specification | None = None) -> Setup:
@@ -296,6 +307,7 @@ def setup_of(record: Record, specification: Specification | None = None) -> Setu
         run, specification, method=method_of(run), rough=float(run.options.get("rough", 0.0)),
         finder=_last(record), truth=_truth(run), time=time, settle=float(o.get("settle", 0.0)),
         density=float(o.get("density", 0.0)) or float(run.parameters.get("gyro.white_y", 0.0)),
+        unbiased=run.type_b == "none" or not np.any(run.parameters.get("gyro.bias", 1.0)),
     )  # fmt: skip
 
 

@@ -346,3 +346,33 @@ def test_budget_is_what_an_error_does(
     shift = math.radians(heading_of(method, w, stated)["ψ"].estimate - base["ψ"].estimate)
     assert math.radians(line.sensitivity) * size == pytest.approx(shift, rel=0.02, abs=1e-9)
     assert line.contribution == pytest.approx(abs(line.sensitivity) * size, rel=1e-9)
+
+
+def test_one_position_says_that_the_bias_is_in_the_heading(sessions: Callable[[str], Session]) -> None:
+    """w_x = -A sin psi, w_y = A cos psi: biases b_x, b_y turn the heading by -(b_x cos psi + b_y sin psi)/A; 0.1 deg/h
+    of 10.4956 deg/h are 0.546 deg.
+    """
+    heading, bias = 0.6, np.array([0.1, 0.1]) * DPH
+    values = {**QUIET, "heading": heading, "latitude": math.radians(45.75), "gyro.bias": bias.tolist()}
+    record = run(sessions, "strapdown", **values)
+    result = from_record(record)
+    said = [w for w in result.warnings if "leaves the bias of the gyro in the heading" in w]
+    assert len(said) == 1 and "0.1 °/h turn by up to 0.55°" in said[0] and "u_bias" in said[0]
+    turned = -math.degrees((bias[0] * math.cos(heading) + bias[1] * math.sin(heading)) / (10.4956 * DPH))
+    assert abs(turned) > 0.7
+    assert result["ψ"].estimate - math.degrees(heading) == pytest.approx(turned, rel=0.01)
+    predicted = next(t for t in result.tables if t["title"] == "Predicted shifts by simulated errors")
+    assert next(r for r in predicted["rows"] if r[0] == "ψ")[-3] == pytest.approx(turned, rel=0.02)
+    record.run.options["u_bias"] = 0.1 * DPH
+    stated = from_record(record)
+    assert not any("leaves the bias" in w for w in stated.warnings) and stated["ψ"].u == pytest.approx(0.546, rel=0.02)
+    two = from_record(run(sessions, "strapdown two", **values))
+    assert not any("leaves the bias" in w for w in two.warnings)
+
+
+def test_one_position_without_statement_passes_nothing() -> None:
+    w = windows("strapdown", 1.1, 0.8, noise=1e-10)
+    told: dict[str, Any] = {"specification": {"ψ": (0.0, 90.0)}}
+    assert heading_of("strapdown", w, 0.8, **told).verdict == "inconclusive"
+    for known in ({"u_bias": 1e-9}, {"unbiased": True}):
+        assert heading_of("strapdown", w, 0.8, **told, **known).verdict == "pass"
