@@ -289,8 +289,8 @@ def _judged(result: DriftTestResult, s: Setup, p: Problem) -> DriftTestResult:
     if s.method == "strapdown" and not s.u_bias and not s.unbiased:
         turned = math.degrees(0.1 * DPH / s.place.north)
         text = (
-            f"One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to {turned:.2g}°. It is "
-            "not in u. State u_bias, or take the method strapdown two."
+            f"One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to {turned:.2g}°. It "
+            "is not in u. State u_bias, or take the method strapdown two."
         )
         uncertainty.withhold(result, [text], ["pass"])
         if not any(text in w for w in result.warnings):
