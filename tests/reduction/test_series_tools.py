@@ -260,13 +260,33 @@ def test_one_at_a_time_groups_family_and_refusals() -> None:
 
 
 # ------------------------------------------------------------------- correlation time of long records
-def test_filtered_likelihood_is_that_of_the_tridiagonal_factors() -> None:
+def test_likelihood_of_a_steady_filter_is_that_of_the_tridiagonal_factors() -> None:
     """s < 0: means over the sampling interval.  Values before the filter is steady: r^2k = 1e-18."""
     x = 3.0 + signal.lfilter([1.0], [1.0, -0.95], np.random.default_rng(19).normal(size=19_000))
     found = _Likelihood(x, True)
-    for phi, s in ((0.95, 0.0), (0.95, 1.0), (0.5, 30.0), (0.999, 5.0), (0.2, 1e4), (0.97, -0.01)):
-        expected = found.mixed(phi, s)  # shorter than LONG: by factors
-        assert found.filtered(phi, s, settling(phi, s)) == pytest.approx(expected, rel=1e-11)
+    for phi, s in ((0.95, 0.0), (0.95, 1.0), (0.5, 30.0), (0.99, 5.0), (0.2, 1e4), (0.97, -0.01)):
+        m = settling(phi, s)
+        assert 20 * m < x.size
+        sums, state = found.exact(phi, s, m)
+        assert sums + found.steady(phi, s, m, *state) == pytest.approx(found.exact(phi, s, x.size)[0], rel=1e-10)
+
+
+def test_likelihood_of_a_long_record_by_a_filter_run_through_it() -> None:
+    """Kalman filter sample by sample, 25,000 of them; without its steady state mixed() agrees to the rounding."""
+    y = signal.lfilter([1.0], [1.0, -0.95], np.random.default_rng(20).normal(size=25_000))
+    phi, s, P, a, b, log, squares = 0.9, 0.7, 1.0, 0.0, 0.0, 0.0, np.zeros(3)
+    for reading in y.tolist():
+        F = P + s
+        v, u = reading - a, 1.0 - b
+        log += math.log(F)
+        squares += np.array([v * v, u * v, u * u]) / F
+        a, b, P = phi * (a + P / F * v), phi * (b + P / F * u), phi * phi * P * s / F + 1.0 - phi * phi
+    rest = squares[0] - squares[1] ** 2 / squares[2]
+    expected = -0.5 * (log + math.log(squares[2]) + (y.size - 1) * math.log(rest))
+    assert _Likelihood(y, True).mixed(phi, s) == pytest.approx((expected, rest / (y.size - 1)), rel=1e-12)
+
+
+def test_values_until_a_filter_is_steady() -> None:
     # q = 3/4, s = 1: P^2 = 3/4, r = 1/2/(1.866025) = 0.267949, 2 + 41.45/(2 1.316958) = 17.7
     assert settling(0.5, 1.0) == 18
     assert settling(0.9999999, 1e5) > 19_000 and settling(0.9, -0.8) == 0

@@ -15,10 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import optimize, signal
+from scipy import fft, optimize, signal
 from scipy.linalg import lapack
 
 from gyrobench.reduction.estimation import noise
@@ -29,7 +30,7 @@ GAIN = 3.0  # of log likelihood against white noise, for two more parameters
 SHORTEST, LONGEST = 0.2, 10.0  # correlation time sought: of samples, of the record
 WHITE = (-9.0, 12.0)  # ln of the variance of the white part over that of the process
 FEWEST = 50
-LONG, HEAD = 20_000, 20  # the likelihood is filtered from so many samples on, if the filter is steady after a 20th
+LONG, PART = 20_000, 20  # from so many samples on the filter's steady state is used, if it is steady after a 20th
 
 
 @dataclass(frozen=True)
@@ -79,50 +80,63 @@ class _Likelihood:
 
     def mixed(self, phi: float, s: float) -> tuple[float, float]:
         """Return the likelihood and the variance of the process, white noise of variance s over it."""
-        n, q = self.n, 1.0 - phi * phi
-        if n >= LONG and 0 < HEAD * (head := settling(phi, s)) <= n:
-            return self.filtered(phi, s, head)
+        n = self.n
+        m = settling(phi, s) if n >= LONG else 0
+        m = m if 0 < PART * m <= n else n
+        sums, state = self.exact(phi, s, m)
+        if m < n:
+            sums = sums + self.steady(phi, s, m, *state)
+        log, square, cross, ones = sums.tolist()
+        rest = square - cross * cross / ones
+        return -0.5 * (log + math.log(ones) + (n - 1) * math.log(rest)), rest / (n - 1)
+
+    def exact(self, phi: float, s: float, m: int) -> tuple[Array, Array]:
+        """Return ln|V|, y' V^-1 y, 1' V^-1 y, 1' V^-1 1 of the first m values, and the values of the process that y and
+        a record of ones make expect at the last of them."""
         # V = T^-1 + s with the tridiagonal T of the process alone: V^-1 = T (1 + s T)^-1, |V| = |1 + s T|/|T|
-        diagonal = np.full(n, (1.0 + phi * phi) / q)
+        q, both = 1.0 - phi * phi, self.both[:m]
+        diagonal = np.full(m, (1.0 + phi * phi) / q)
         diagonal[[0, -1]] = 1.0 / q
-        d, e, _ = lapack.dpttrf(1.0 + s * diagonal, np.full(n - 1, -s * phi / q))
-        z, _ = lapack.dpttrs(d, e, self.both)
+        d, e, _ = lapack.dpttrf(1.0 + s * diagonal, np.full(m - 1, -s * phi / q))
+        z, _ = lapack.dpttrs(d, e, both)
         turned = diagonal[:, None] * z
         turned[1:] -= phi / q * z[:-1]
         turned[:-1] -= phi / q * z[1:]
-        (square, cross), (_, ones) = self.both.T @ turned
-        log = float(np.log(d).sum()) + (n - 1) * math.log(q)
-        rest = float(square - cross * cross / ones)
-        return -0.5 * (log + math.log(float(ones)) + (self.n - 1) * math.log(rest)), rest / (self.n - 1)
+        (square, cross), (_, ones) = both.T @ turned
+        log = float(np.log(d).sum()) + (m - 1) * math.log(q)
+        return np.array([log, square, cross, ones]), both[-1] - s * turned[-1]
 
-    def filtered(self, phi: float, s: float, head: int) -> tuple[float, float]:
-        """Return what :meth:`mixed` does, from the innovations v of a Kalman filter of variance F: |V| = product of F,
-        y' V^-1 y = sum of v^2/F.
+    def steady(self, phi: float, s: float, m: int, last: float, one: float) -> Array:
+        """Return what the values from m on add to the sums of :meth:`exact`: the steady Kalman filter's innovations v
+        of variance F, |V| = product of F, y' V^-1 y = sum of v^2/F.  last, one: the values expected at m - 1.
 
-        After ``head`` values F is constant to rounding, the filter a difference equation, and the innovations of the
-        record of ones approach their limit as r^k: a tenth of the time of the tridiagonal factors.
+            v_k = y_k + (r - phi) w_(k-1),   w_k = r w_(k-1) + y_k,   r = phi s/F
+
+        r^2m is below the rounding: 2m values on, w is that of a filter at rest before the record, of which the sums
+        A_j of y_k y_(k+j) give all squares: y_k w_(k-1) has the sum G = A_1 + r A_2 + r^2 A_3 + ..., w^2 the sum W with
+        (1 - r^2) W = A_0 + 2 r G - r^2 w_(n-1)^2.  So n is in the time of the sums A_j alone.
         """
-        n, y = self.n, self.y
-        P, a, a1, log, square, cross, ones = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for reading in y[:head].tolist():
-            F = P + s
-            K, v, v1 = P / F, reading - a, 1.0 - a1
-            log += math.log(F)
-            square, cross, ones = square + v * v / F, cross + v * v1 / F, ones + v1 * v1 / F
-            a, a1 = phi * (a + K * v), phi * (a1 + K * v1)
-            P = phi * phi * P * s / F + 1.0 - phi * phi
-        F = P + s
+        n, y, far = self.n, self.y, 3 * m
+        F = steady_variance(phi, s) + s
         r = phi * s / F
-        # a' = r a + phi K y and v = y - a: v_k = r v_(k-1) + y_k - phi y_(k-1), from v = y - a at k = head
-        v = signal.lfilter([1.0, -phi], [1.0, -r], y[head:], zi=[-a])[0]
-        limit = (1.0 - phi) / (1.0 - r)
-        fading = (1.0 - a1 - limit) * r ** np.arange(min(n - head, 2 * head))  # r^(2 head) is below the rounding
-        log += (n - head) * math.log(F)
-        square += float(v @ v) / F
-        cross += (limit * float(v.sum()) + float(fading @ v[: fading.size])) / F
-        ones += ((n - head) * limit**2 + 2.0 * limit * float(fading.sum()) + float(fading @ fading)) / F
-        rest = square - cross * cross / ones
-        return -0.5 * (log + math.log(ones) + (n - 1) * math.log(rest)), rest / (n - 1)
+        powers = r ** np.arange(2 * m)
+        limit = (1.0 - phi) / (1.0 - r)  # of the innovations of ones
+        v = signal.lfilter([1.0, -phi], [1.0, -r], y[m:far], zi=[-phi * last])[0]
+        v1 = limit + (1.0 - phi * one - limit) * powers
+        rested = signal.lfilter([1.0, -phi], [1.0, -r], y[:far])
+        A, w = self.lagged, float(powers @ y[: n - 1 - 2 * m : -1])  # w_(n-1)
+        G = float(powers @ A[1 : 2 * m + 1])
+        W = (A[0] + 2.0 * r * G - r * r * w * w) / (1.0 - r * r)
+        squares = A[0] + 2.0 * (r - phi) * G + (r - phi) ** 2 * (W - w * w) - float(rested @ rested)
+        total = (1.0 - phi) * (self.sums[3] - r * w) / (1.0 - r) + phi * w - float(rested.sum())
+        added = float(v @ v) + squares, float(v1 @ v) + limit * total, float(v1 @ v1) + (n - far) * limit**2
+        return np.array([(n - m) * math.log(F), *(x / F for x in added)])
+
+    @cached_property
+    def lagged(self) -> Array:
+        """Sums of y_k y_(k+j), j = 0 to a tenth of n."""
+        transform = fft.rfft(self.y, fft.next_fast_len(self.n + self.n // 10 + 1, real=True))
+        return np.asarray(fft.irfft(np.abs(transform) ** 2)[: self.n // 10 + 1])
 
     def best(self, u: float) -> tuple[float, float, float]:
         """Return the likelihood at the best share of white noise, the variances of process and white; u = ln(tau/dt).
@@ -150,18 +164,25 @@ class _Likelihood:
         return -float(found.fun), unit * variance, share * variance
 
 
-def settling(phi: float, s: float) -> int:
-    """Return the values after which the filter of process and white noise is steady to rounding; 0: not found so.
+def steady_variance(phi: float, s: float) -> float:
+    """Return the limit P of the variance of the predicted process, white noise of variance s over it; nan: none.
 
-    Its variance P has the limit P^2 - q (1 - s) P - q s = 0, q = 1 - phi^2; it comes near as r^2k, r = phi s/(P + s).
+    P^2 - q (1 - s) P - q s = 0, q = 1 - phi^2.
     """
     q = 1.0 - phi * phi
     half = 0.5 * q * (1.0 - s)
     square = half * half + q * s
     if square <= 0.0:
-        return 0
-    P = half + math.sqrt(square) if half > 0.0 else q * s / (math.sqrt(square) - half)
-    r = abs(phi * s / (P + s))
+        return math.nan
+    return half + math.sqrt(square) if half > 0.0 else q * s / (math.sqrt(square) - half)
+
+
+def settling(phi: float, s: float) -> int:
+    """Return the values after which the filter of process and white noise is steady to rounding; 0: not found so.
+
+    Its variance comes near the limit P as r^2k, r = phi s/(P + s).
+    """
+    r = abs(phi * s / (steady_variance(phi, s) + s)) if s else 0.0
     return 0 if not r < 1.0 else 2 if r < 1e-9 else 2 + math.ceil(math.log(1e-18) / (2.0 * math.log(r)))
 
 
