@@ -5,25 +5,25 @@ Over two pieces of equal length T of a phase the angle x obeys, exactly,
     y = x(T) - 2 x(0) + x(-T) = 1/J <M + M_h - D w - M_C sgn w>        <f> = integral of (T - |t|) f(t)
 
 so that no rate has to be differentiated: y is linear in K_t/J (or K/J), 1/J, D/J and M_C/J, with the readings of the
-current (or of the voltage) and of the angle in <>.  White random torque correlates neighbouring y by 1/4; its density
-follows from the residuals, the rounding of the counts is known.  Voltages are fitted window by window, the winding and
-the lag from steps of torque.  [MOTOR-TEST; own design]
+current (or of the voltage) and of the angle in <>.  White random torque correlates neighbouring y by 1/4, errors of the
+angles by -2/3: the size of both follows from the residuals by restricted maximum likelihood, that of the angles at
+least the rounding of the counts.  The noise of a meter follows from its readings alone.  Voltages are fitted window by
+window, the winding and the lag from steps of torque.  [MOTOR-TEST; own design]
 
-Not modelled: errors of the regressors (noise of a mean current is a ten-thousandth of it), cogging and torque ripple,
-which average out over the ways of the runs where these are whole periods.
+Not modelled: cogging and torque ripple, which average out over the ways of the runs where these are whole periods, and
+errors of the scale that last longer than a window.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import integrate, optimize, stats
+from scipy import integrate, linalg, optimize, stats
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
@@ -50,11 +50,13 @@ EDGE = 0.9  # of the largest voltage: at its limit; of the change: the voltage h
 class Window:
     """Two pieces of a phase, from -T to T: samples in the middle of time, SI.
 
-    phase: number of the phase, neighbours in it overlap by T.  motor, hung: demanded and known torque.  rate: at each
-    sample, linear in time.  weight: (T - |t|) times the sampling interval, halved at the ends.
+    phase: number of the phase; place: that of the window's middle in it, in pieces, neighbours overlap by T.  motor,
+    hung: demanded and known torque.  rate: at each sample, linear in time.  weight: (T - |t|) times the sampling
+    interval.
     """
 
     phase: int
+    place: int
     y: float
     rate: Array
     turned: float  # <w>, from the angles
@@ -80,7 +82,8 @@ class Solution:
     covariance: Array
     dof: int
     residual: Array
-    torque_density: float = 0.0
+    torque_density: float = 0.0  # N.m/sqrt(Hz)
+    angle_error: float = 0.0  # rad, standard deviation
 
     def of(self, f: Callable[[Array], float]) -> tuple[float, float]:
         """Return a function of the values and its u: half of the 95 % interval over 1.96."""
@@ -119,7 +122,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
 
     quantum = float(p.get("reader.quantum", QUANTUM))
     if wound:
-        mechanics = solve(windows, quantum, lambda w: w.integral(w.current), ())
+        mechanics = solve(windows, quantum, _wound)
         electric = _voltages(windows)
         R, K_e = float(electric.value[0]), float(electric.value[1])
         add("K_t", "torque constant", "N·m/A", mechanics.of(lambda v: v[0] / v[1]), math.hypot(u_M, u_I),
@@ -134,8 +137,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
                           no_value=NO_LIMIT)  # fmt: skip
         first = 2
     else:
-        start = float(np.median([abs(w.voltage).max() for w in driven]))
-        mechanics = solve(windows, quantum, _square_law, (0.0, start))
+        mechanics = solve(windows, quantum, _square_law, 0.0)
         add("K", "torque over the square of the voltage", "N·m/kV²", mechanics.of(lambda v: v[0] / v[2]),
             math.hypot(u_M, 2.0 * u_U), "drive.motor_K", 1e-6)  # fmt: skip
         add("K_e", "back EMF constant", "V·s/rad", mechanics.of(lambda v: v[1]), u_U, "drive.motor_K_e")
@@ -186,8 +188,8 @@ def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window
         r = mechanics.residual[np.array(of)] / PIECE**2
         rows.append([name, int(r.size), float(np.sqrt(np.mean(r**2))) if r.size else None])
     caption = (
-        f"Windows of {2.0 * PIECE:g} s. Random torque on the axis: {mechanics.torque_density:.2g} N·m/√Hz, from the "
-        "residuals."
+        f"Windows of {2.0 * PIECE:g} s. From the residuals: random torque on the axis {mechanics.torque_density:.2g} "
+        f"N·m/√Hz, standard deviation of an angle {mechanics.angle_error * 648000.0 / math.pi:.2g}″."
     )
     columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
     found.tables.append({"title": "Windows", "caption": caption, "columns": columns, "rows": rows})
@@ -201,7 +203,7 @@ def cut(gate: Gate) -> list[Window]:
     found = []
     offset = np.arange(-n, n + 1)
     weight = (n - np.abs(offset)) * dt * dt
-    for middle in range(n, x.size - n, n):
+    for place, middle in enumerate(range(n, x.size - n, n)):
         part = slice(middle - n, middle + n + 1)
         before, after = x[middle] - x[middle - n], x[middle + n] - x[middle]
         ends = (1.5 * before - 0.5 * after) / PIECE, (1.5 * after - 0.5 * before) / PIECE
@@ -211,87 +213,124 @@ def cut(gate: Gate) -> list[Window]:
         right, left = (float(v) for v in halves)
         torque = [gate.amplitude if gate.kind == "torque" and gate.axis == k else 0.0 for k in (1, 2)]
         found.append(
-            Window(gate.row.phase, float(after - before), np.linspace(*ends, offset.size), right - left,
+            Window(gate.row.phase, place, float(after - before), np.linspace(*ends, offset.size), right - left,
                    gate[VOLTAGE][part], gate[CURRENT][part], weight, *torque)
         )  # fmt: skip
     return found
 
 
-@dataclass(frozen=True)
-class Block:
-    """The windows of one phase: what random torque (density 1, J = 1) and the rounding of counts make of their y."""
-
-    rows: slice
-    white: Array
-    rounding: Array
-
-    def inverse(self, density: float) -> Array:
-        return np.asarray(np.linalg.inv(density * self.white + self.rounding))
-
-
-def blocks(windows: Sequence[Window], quantum: float) -> list[Block]:
-    """Return the windows phase by phase; between phases there is no correlation."""
-    phase = np.array([w.phase for w in windows])
-    starts = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), phase.size]
-    found = []
-    for a, b in pairwise(starts):
-        bands = [np.eye(b - a, k=d) + np.eye(b - a, k=-d) for d in (1, 2)]
-        white = PIECE**3 / 6.0 * (4.0 * np.eye(b - a) + bands[0])
-        rounding = quantum**2 / 12.0 * (6.0 * np.eye(b - a) - 4.0 * bands[0] + bands[1])
-        found.append(Block(slice(a, b), white, rounding))
+def bands(windows: Sequence[Window]) -> Array:
+    """Return the covariances of y as (2, 3, n), lower bands: random torque (density 1, J = 1) and errors of the angles
+    (1 rad), y = e(T) - 2 e(0) + e(-T).  Windows of different phases have nothing in common.
+    """
+    torque, angle = PIECE**3 / 6.0 * np.array([4.0, 1.0, 0.0, 0.0]), np.array([6.0, -4.0, 1.0, 0.0])
+    found = np.zeros((2, 3, len(windows)))
+    for d in range(3):
+        apart = np.array([min(b.place - a.place, 3) if a.phase == b.phase else 3 for a, b in _pairs(windows, d)], int)
+        found[:, d, : apart.size] = torque[apart], angle[apart]
     return found
 
 
-def _square_law(w: Window, K_e: float) -> tuple[float, float]:
-    """Return <V |V|> and its derivative by K_e."""
+def meter_bands(windows: Sequence[Window], slope: Array) -> Array:
+    """Return the covariance (3, n), lower bands, of <slope e> for errors e of the readings of a meter, of variance 1.
+
+    slope: (n, samples of a window).  Neighbours share the readings of a piece.
+    """
+    of = slope * windows[0].weight
+    m = of.shape[1] // 2
+    found = np.zeros((3, len(windows)))
+    found[0] = np.sum(of**2, axis=1)
+    next_to = np.array([a.phase == b.phase and b.place == a.place + 1 for a, b in _pairs(windows, 1)], bool)
+    found[1, :-1] = np.where(next_to, np.sum(of[:-1, m:] * of[1:, : m + 1], axis=1), 0.0)
+    return found
+
+
+def _pairs(windows: Sequence[Window], d: int) -> Iterator[tuple[Window, Window]]:
+    return zip(windows[: len(windows) - d], windows[d:], strict=True)
+
+
+def reading_noise(readings: Sequence[Array]) -> float:
+    """Return the standard deviation of the readings of a meter: that of their second differences over sqrt(6)."""
+    return math.sqrt(float(np.mean([np.mean(np.diff(r, 2) ** 2) for r in readings])) / 6.0)
+
+
+def _wound(w: Window, _: float, __: float) -> tuple[float, float, Array]:
+    """Return <i>, which does not depend on K_e, and its slopes by the readings."""
+    return w.integral(w.current), 0.0, np.ones(w.current.size)
+
+
+def _square_law(w: Window, K_e: float, noise: float) -> tuple[float, float, Array]:
+    """Return <V |V|>, its derivative by K_e and its slopes by the readings.
+
+    Normal errors of standard deviation s make of V |V| in the mean (V2 + s2) erf(V/(s sqrt 2)) + s V sqrt(2/pi)
+    exp(-V2/(2 s2)): s2 sgn V more where |V| is large.  It is taken out, with the V of the window's mean.
+    """
     V = w.voltage - K_e * w.rate
-    return w.integral(V * np.abs(V)), -2.0 * w.integral(np.abs(V) * w.rate)
+    mean, more = float(np.mean(V)), 0.0
+    if noise > 0.0:
+        r = mean / (noise * math.sqrt(2.0))
+        more = (mean**2 + noise**2) * math.erf(r) - mean * abs(mean)
+        more += noise * mean * math.sqrt(2.0 / math.pi) * math.exp(-r * r)
+    return w.integral(V * np.abs(V) - more), -2.0 * w.integral(np.abs(V) * w.rate), 2.0 * np.abs(V)
 
 
-def solve(windows: Sequence[Window], quantum: float, torque: Callable[..., Any], search: Sequence[float]) -> Solution:
+def solve(windows: Sequence[Window], quantum: float, torque: Callable[..., Any], K_e: float | None = None) -> Solution:
     """Return K/J, (K_e,) 1/J, D/J, M_C/J by generalized least squares.
 
-    torque: the regressor of the motor; with a search it depends on K_e, from which the first value begins, and gives
-    its derivative too.
+    torque: the regressor of the motor, its derivative by K_e and its slopes by the readings of the meter, for a window
+    and K_e.  K_e: from which it is sought; None: not at all.  quantum: rad, of the angle.
     """
     y = np.array([w.y for w in windows])
     others = np.array([[w.hung * PIECE**2, -w.turned, -w.sense * PIECE**2] for w in windows])
-    parts = blocks(windows, quantum)
-    K_e = search[0] if search else 0.0
-    density, value, residual, covariance = 1e-6, np.zeros(0), y, np.zeros((0, 0))
+    parts = bands(windows)
+    noise = reading_noise([w.current if K_e is None else w.voltage for w in windows])
+    value, covariance, sizes, X, target = np.zeros(0), np.zeros((0, 0)), np.zeros(2), others, y
     for _ in range(30):
-        if search:
-            of, slope = np.array([torque(w, K_e) for w in windows]).T
-            size = (
-                value[0] if value.size else float(np.linalg.lstsq(np.column_stack([of, others]), y, rcond=None)[0][0])
-            )
-            X = np.column_stack([of, size * slope, others])
-            target = y + size * slope * K_e
-        else:
-            X, target = np.column_stack([[torque(w) for w in windows], others]), y
-        weighted = np.vstack([p.inverse(density) @ X[p.rows] for p in parts])
-        covariance = np.linalg.inv(X.T @ weighted)
-        last, value = value, covariance @ weighted.T @ target
-        residual = target - X @ value
-        dof = y.size - value.size
-        density = _density(residual, parts, dof)
-        if search:
+        of, by_K_e, slope = (np.array(v) for v in zip(*(torque(w, K_e, noise) for w in windows), strict=True))
+        X = np.column_stack([of, others])
+        size = float(value[0] if value.size else np.linalg.lstsq(X, y, rcond=None)[0][0])
+        if K_e is not None:
+            X, target = np.insert(X, 1, size * by_K_e, axis=1), y + size * by_K_e * K_e
+        read = (size * noise) ** 2 * meter_bands(windows, slope)
+        sizes = restricted(X, target, parts, read, quantum**2 / 12.0)
+        last, (value, covariance, _) = value, weighted(X, target, np.tensordot(sizes, parts, 1) + read)
+        if K_e is not None:
             K_e = float(value[1])
         if last.size and np.all(np.abs(value - last) < 1e-4 * np.sqrt(np.diag(covariance))):
             break
-    J = 1.0 / float(value[2 if search else 1])
-    return Solution(value, covariance, dof, residual, J * math.sqrt(density))
+    J = 1.0 / float(value[-3])
+    residual = target - X @ value
+    return Solution(value, covariance, y.size - value.size, residual, J * math.sqrt(sizes[0]), math.sqrt(sizes[1]))
 
 
-def _density(residual: Array, parts: Sequence[Block], dof: int) -> float:
-    """Return the density of the random torque (over J2) for which the residuals are as large as they should be."""
+def weighted(X: Array, y: Array, V: Array) -> tuple[Array, Array, float]:
+    """Return the generalized least squares estimate for the covariance V (lower bands), its covariance, and -2 ln of
+    the restricted likelihood of V."""
+    factor = linalg.cholesky_banded(V, lower=True)
+    white = linalg.solve_banded((V.shape[0] - 1, 0), factor, np.column_stack([X, y]))
+    A, z = white[:, :-1], white[:, -1]
+    information = A.T @ A
+    covariance = np.linalg.inv(information)
+    value = covariance @ (A.T @ z)
+    log = 2.0 * float(np.log(factor[0]).sum()) + float(np.linalg.slogdet(information)[1])
+    return value, covariance, log + float(np.sum((z - A @ value) ** 2))
 
-    def excess(logarithm: float) -> float:
-        of = ((residual[p.rows], p.inverse(math.exp(logarithm))) for p in parts)
-        return sum(float(r @ W @ r) for r, W in of) / dof - 1.0
 
-    low, high = -60.0, 10.0
-    return math.exp(low) if excess(low) < 0.0 else math.exp(float(optimize.brentq(excess, low, high, xtol=1e-3)))
+def restricted(X: Array, y: Array, parts: Array, known: Array, least: float) -> Array:
+    """Return the squared density of the random torque (over J2) and the variance of an angle of largest restricted
+    likelihood, beside a known covariance.  least: of the variance of an angle."""
+    largest = float(np.mean(y**2)) / parts[:, 0, 0]
+    bounds = np.log([[1e-12 * largest[0], largest[0]], [least, max(largest[1], 2.0 * least)]])
+
+    def minus(logarithms: Array) -> float:
+        return weighted(X, y, np.tensordot(np.exp(logarithms), parts, 1) + known)[2]
+
+    rest = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    start = np.clip(np.log(0.5 * float(np.mean(rest**2)) / parts[:, 0, 0]), *bounds.T)
+    found = optimize.minimize(
+        minus, start, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-3, "fatol": 1e-4, "maxiter": 400}
+    )
+    return np.asarray(np.exp(found.x))
 
 
 def _linear(X: Array, y: Array) -> Solution:
