@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
+import math
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy import integrate
 
 import gyrobench as gb
 from gyrobench.system.system import load_system
 
 NAME = "table_motor_test"
+reduction: Any = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
 DC, AC = {"drive": "motor_dc"}, {"drive": "motor_square_law"}
 
 
@@ -128,3 +132,67 @@ def test_a_voltage_that_does_not_come_to_its_limit_tells_no_inductance() -> None
     test.set("drive.motor_U_max", 1000.0)
     result = test.run(seed=1, check_step=False).result
     assert "take a larger torque" in result["L"].no_value and abs(result["R"].z or 9.0) < 4.0
+
+
+# ------------------------------------------------------------------------- noise of torque, angle and meters
+J, K_T, DENSITY, ANGLE_ERROR, METER = 2.5, 3.0, 2e-4, 4e-7, 1e-3
+SAMPLES, PIECES, PHASES = 20, 60, 8  # of a piece, of a phase, of the record
+
+
+def windows(rng: np.random.Generator) -> list[Any]:
+    """Phases of one torque each: half motor, half hung; random torque integrated in fine steps, angles with errors."""
+    T, m = reduction.PIECE, SAMPLES
+    dt = T / m
+    offset = np.arange(-m, m + 1)
+    found = []
+    for phase in range(PHASES):
+        motor, hung = ((4.0, -2.0, 2.0, -4.0)[phase // 2], 0.0) if phase % 2 else (0.0, (1.0, -1.0)[phase // 2 % 2])
+        rate = rng.uniform(0.2, 1.0) * rng.choice([-1.0, 1.0])
+        known = motor + hung - 0.03 * rate - 0.1 * math.copysign(1.0, rate)
+        kicks = DENSITY / math.sqrt(dt) * rng.normal(size=PIECES * m) / J * dt
+        x = np.concatenate([[0.0], np.cumsum(np.cumsum(kicks))]) * dt  # in the middle of what a kick does to the angle
+        x[::m] += ANGLE_ERROR * rng.normal(size=PIECES + 1)
+        current = motor / K_T + METER * rng.normal(size=PIECES * m + 1)
+        for place, k in enumerate(range(m, PIECES * m, m)):
+            y = float(x[k + m] - 2.0 * x[k] + x[k - m]) + known * T**2 / J
+            part = current[k - m : k + m + 1]
+            found.append(
+                reduction.Window(phase, place, y, np.full(2 * m + 1, rate), rate * T**2, part, part,
+                                 (m - np.abs(offset)) * dt * dt, motor, hung)
+            )  # fmt: skip
+    return found
+
+
+def test_u_is_the_scatter_of_the_errors_where_angles_and_meter_are_the_noise() -> None:
+    """Random torque makes 2 T3/3 (2e-4/2.5)2, the angles 6 (4e-7)2, the ammeter 2 T3/3 2.5e-3 s (3 1e-3/2.5)2 of the
+    variance of y: 5.3e-13, 9.6e-13 and 3.0e-13.  With angles that err by their rounding alone, 3.8e-13, and all the rest
+    taken for torque u is 1.3 to 1.5 times as large.
+    """
+    rng, truth = np.random.default_rng(3), np.array([K_T, 1.0, 0.03, 0.1]) / J
+    found = [reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound) for _ in range(60)]
+    z = np.array([(f.value - truth) / np.sqrt(np.diag(f.covariance)) for f in found])
+    assert np.sqrt(np.mean(z**2, axis=0)) == pytest.approx(np.ones(4), abs=0.25)
+    assert np.mean([f.torque_density for f in found]) == pytest.approx(DENSITY, rel=0.05)
+    assert np.mean([f.angle_error for f in found]) == pytest.approx(ANGLE_ERROR, rel=0.05)
+
+
+def test_an_angle_errs_by_its_rounding_at_least() -> None:
+    """Angles without errors: what is estimated is q/sqrt(12), not less."""
+    ideal = windows(np.random.default_rng(4))
+    found = reduction.solve(ideal, 10.0 * ANGLE_ERROR * math.sqrt(12.0), reduction._wound)
+    assert found.angle_error == pytest.approx(10.0 * ANGLE_ERROR)
+
+
+@pytest.mark.parametrize("voltage", [0.0, 0.05, -0.3, 2.0])
+def test_noise_of_a_voltmeter_is_not_in_the_mean_of_the_square(voltage: float) -> None:
+    """Mean of V |V| over normal errors of 0.2 V, by quadrature: the regressor is V |V| of what is measured."""
+    s, m = 0.2, SAMPLES
+    normal = lambda e: math.exp(-0.5 * (e / s) ** 2) / (s * math.sqrt(2.0 * math.pi))  # noqa: E731
+    mean, _ = integrate.quad(lambda e: (voltage + e) * abs(voltage + e) * normal(e), -2.0, 2.0, points=[-voltage])
+    weight = np.full(2 * m + 1, 1.0)
+    none = np.zeros(2 * m + 1)
+    w = reduction.Window(1, 0, 0.0, none, 0.0, np.full(2 * m + 1, voltage), none, weight, 1.0, 0.0)
+    without, _, slope = reduction._square_law(w, 0.0, 0.0)
+    taken, _, _ = reduction._square_law(w, 0.0, s)
+    assert without - taken == pytest.approx(weight.sum() * (mean - voltage * abs(voltage)), abs=1e-9)
+    assert slope == pytest.approx(2.0 * abs(voltage))
