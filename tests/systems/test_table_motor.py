@@ -165,8 +165,8 @@ def windows(rng: np.random.Generator) -> list[Any]:
 
 def test_u_is_the_scatter_of_the_errors_where_angles_and_meter_are_the_noise() -> None:
     """Random torque makes 2 T3/3 (2e-4/2.5)2, the angles 6 (4e-7)2, the ammeter 2 T3/3 2.5e-3 s (3 1e-3/2.5)2 of the
-    variance of y: 5.3e-13, 9.6e-13 and 3.0e-13.  With angles that err by their rounding alone, 3.8e-13, and all the rest
-    taken for torque u is 1.3 to 1.5 times as large.
+    variance of y: 5.3e-13, 9.6e-13 and 3.0e-13.  With angles that err by their rounding alone, 3.8e-13, and all
+    the rest taken for torque u is 1.3 to 1.5 times as large.
     """
     rng, truth = np.random.default_rng(3), np.array([K_T, 1.0, 0.03, 0.1]) / J
     found = [reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound) for _ in range(60)]
