@@ -26,12 +26,13 @@ def simulated_errors(run: RunDocument) -> dict[str, float]:
 
     Angle readings of the orders 1 and 2 (positive where too much is read), the axis off the pole, the gyro turned on
     the table, the axes of a table with two out of the right angle; of a table that a gyro holds, its axis in each phase
-    and its unbalance over the stiffness of its servo.
+    and its unbalance over the stiffness of its servo; of a head with a horizontal axis, that axis, its positions and
+    the accelerometer turned in its mount.
     """
     if run.measured:
         return {}
     p = run.parameters
-    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p) | _square(p) | _bias(p)
+    found = _angles(p) | _axis(p) | _mount(p) | _unbalance(p) | _square(p) | _bias(p) | _head(p)
     for row in run.plan:
         if row.mode == "servo":
             found |= _servo_axis(p, row.phase)
@@ -73,9 +74,10 @@ def _bias(p: Mapping[str, Any]) -> dict[str, float]:
 
 def _axis(p: Mapping[str, Any]) -> dict[str, float]:
     tilt = p.get("table.tilt", (0.0, 0.0))
+    # the last: of an axis that lies east, with the first axis of the table on the pole
     about = ("off the pole, about east", "off the pole, about p × east", "off the vertical, about east",
-             "off the vertical, about north")  # fmt: skip
-    return {f"table axis {where}": x for where, x in zip(about, (*tilt, *tilt), strict=True)}
+             "off the vertical, about north", "towards the pole")  # fmt: skip
+    return {f"table axis {where}": x for where, x in zip(about, (*tilt, *tilt, tilt[1]), strict=True)}
 
 
 def _servo_axis(p: Mapping[str, Any], phase: int) -> dict[str, float]:
@@ -110,12 +112,33 @@ def servo_stiffness(p: Mapping[str, Any]) -> float | None:
     return 2.0 * J / period**2 * (2.0 + 2.0 * b - 3.0 * pole - pole**3) / (1.0 - b)
 
 
+def _turned(mount: Any) -> tuple[float, float, float]:
+    """Return the small angles about its own axes by which an instrument is turned; mount: its axes in rows."""
+    m = np.reshape(mount, (3, 3))
+    # rows are the axes of the instrument: the transpose turns them
+    x, y, z = 0.5 * np.array([m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]])
+    return x, y, z
+
+
 def _mount(p: Mapping[str, Any]) -> dict[str, float]:
     if "gyro.mount" not in p:
         return {}
-    m = np.reshape(p["gyro.mount"], (3, 3))
-    # rows are the gyro axes: the transpose turns them
-    x, y, z = 0.5 * np.array([m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]])
+    x, y, z = _turned(p["gyro.mount"])
     turned = {f"gyro turned about its {n} axis": v for n, v in zip(("input", "output", "spin"), (x, y, z), strict=True)}
     turned |= {f"gyro turned about its {n} axis": v for n, v in zip("xyz", (x, y, z), strict=True)}
     return turned | {"input axis towards output axis": z, "input axis towards spin axis": -y}
+
+
+def _head(p: Mapping[str, Any]) -> dict[str, float]:
+    """Return the errors of a head with a horizontal axis, whose positions are nominal angles, and of what it turns."""
+    if "accelerometer.mount" not in p or "table.error" not in p:
+        return {}
+    names = ("input", "output", "pendulum")
+    turned = {
+        f"accelerometer turned about its {n} axis": x
+        for n, x in zip(names, _turned(p["accelerometer.mount"]), strict=True)
+    }
+    n = int(p["table.positions"])
+    places = {f"positions of the head ({round(360.0 * k / n, 2):g}°)": float(p["table.error"][k]) for k in range(n)}
+    # turned about the first of its axes, which is level, the third goes down
+    return turned | places | {"axis of the head above the horizon": -float(p.get("table.tilt", (0.0, 0.0))[0])}

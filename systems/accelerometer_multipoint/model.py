@@ -40,6 +40,10 @@ class Setup(setups.Setup):
     u_current: float = 0.0
     u_gravity: float = 0.0
     u_angle: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
 
     @property
     def gamma(self) -> float:

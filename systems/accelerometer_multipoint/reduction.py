@@ -6,8 +6,9 @@ All readings of one visit of a position are one datum (an error of the position 
 both mounts, by Gauss-Newton in the two theta_0, all else being linear; the closed formulas of each mount stand beside
 it.  k are multiples of g0 = 9.80665 m/s2 (per g0^n).  [TEST-ACC-MULTI; Hu 1981, eq. 3-38..3-46]
 
-Not modelled: a tilt of the axis of the head (k4, k5 times the tilt in k1, and half its square), a change of the
-coefficients during the test, a mount error other than theta_0.
+A tilt of the axis of the head and a mount error other than theta_0 are in the budget (budget.py), to first order.
+
+Not modelled: their squares, a change of the coefficients during the test.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -32,6 +33,7 @@ from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import closed
+from .budget import effects
 from .geometry import zero_angle
 from .model import Model, Setup, Visits, visits
 from .refusals import four_positions, position_problems, record_problems, setup_problems, zero_problems
@@ -100,14 +102,19 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     )  # fmt: skip
     start = np.concatenate([np.zeros(C.shape[1]), [zeros[m] for m in model.mounts]])
     found = linear.derive(_quantities(setup, model, book), lambda b: start + b)
+
+    def sources(f: Findings) -> list[Effect]:
+        return effects(f, model, v, zeros, k, setup)
+
+    found = with_set_up(found, sources, setup.corrections)
     _f_tests(found, v)
     result = linear_result(
         found, system="accelerometer_multipoint", title="Multi-position test of a pendulous accelerometer",
         method=f"{closed.spacing(v.angle)[0]} positions about a horizontal axis, {_mounts(v)}; least squares over all "
         "positions [TEST-ACC-MULTI]",
         sources=SOURCES, equation=_equation(model), conventions=_conventions(setup, model),
-        effects=_effects(found, model, v, zeros, setup), specification=setup.specification, site=setup.site,
-        instrument=setup.instrument, simulated=setup.truth is not None, no_closed=why,
+        effects=sources(found), specification=setup.specification, site=setup.site,
+        instrument=setup.instrument, simulated=setup.truth is not None, no_closed=why, errors=setup.errors,
         closed_caption="From the same data; where both mounts give a coefficient, the mean of the two",
         tables=_tables(fits), harmonics=_harmonics(v, four, linear), repeatability=_repeatability(found, v),
         warnings=_warnings(model, setup), random="noise of the accelerometer and scatter of the positions",
@@ -172,29 +179,6 @@ def _quantities(s: Setup, model: Model, book: Mapping[str, float]) -> list[Quant
         meaning = f"zero of the head and error of the input axis, mount {m}"
         out.append(Quantity(f"θ₀ {m}", meaning, "″", ARCSEC, (s.zeros or {}).get(m), book.get(f"θ₀ {m}")))
     return out
-
-
-def _effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float], s: Setup) -> list[Effect]:
-    terms = len(model.terms)
-    step = 1e-4
-    stretched = np.zeros_like(found.X)
-    stretched[:, :terms] = (
-        model.columns(v, zeros, s.gamma * (1.0 + step)) - model.columns(v, zeros, s.gamma * (1.0 - step))
-    ) / (2.0 * step * s.gravity)
-    slope = found.X[:, terms:].sum(axis=1)  # of the data per rad of angle
-    station = np.rint(np.mod(v.angle + closed.EQUAL, 2.0 * math.pi) / (10.0 * closed.EQUAL)).astype(int)
-    alone = np.array([found.error(np.where(station == p, slope, 0.0)) for p in np.unique(station)])
-    offset = found.error(s.scale / G0)
-    return [
-        Effect("scale λ", s.u_scale, "1", found.error(v.y), "relative"),
-        Effect("zero of the current meter", s.u_current, "A", offset),
-        Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
-        Effect("gravity", s.u_gravity, "m/s²", found.error(dX=stretched)),
-        Effect(
-            "positions of the head", s.u_angle, "rad", alone,
-            "independent, the same in each turn and mount",
-        ),
-    ]  # fmt: skip
 
 
 def _f_tests(found: Findings, v: Visits) -> None:

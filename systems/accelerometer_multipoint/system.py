@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
 from gyrobench.system.families.table_test import Array, TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -42,20 +42,36 @@ class AccelerometerMultipoint(TableTest):
         table -> accelerometer: f
         accelerometer -> sampler: i_read=x saturated=flag
     """
-    options = SITE | {
-        "points": Option(24, int, "positions a turn: 4, or 7 to 24", 4, STATIONS),
-        "mounts": Option("both", str, "a (gives k5), b (gives k4) or both"),
-        "turns": Option(1, int, "turns in each mount", 1, 24),
-        "visits": Option("", str, "positions in place of these, 'a 0deg 10s; a 45deg; b 90deg': mount, angle, dwell"),
-        "settle": Option(2.0, "s", "wait before averaging, in each position", 0.0),
-        "dwell": Option(10.0, "s", "time averaged in each position"),
-        "readings": Option(1, int, "windows in which that time is recorded", 1, 100),
-        "scale": Option(0.0, "m/s2/A", "scale λ for the reduction; 0: the parameter scale of the accelerometer", 0.0),
-        "u_scale": Option(0.0, "1", "relative standard uncertainty of λ", 0.0),
-        "u_current": Option(0.0, "A", "standard uncertainty of the zero of the current meter", 0.0),
-        "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
-        "u_angle": Option(0.0, "rad", "standard uncertainty of a position of the head that comes back each turn", 0.0),
-    }
+    options = (
+        SITE
+        | CORRECTIONS
+        | {
+            "points": Option(24, int, "positions a turn: 4, or 7 to 24", 4, STATIONS),
+            "mounts": Option("both", str, "a (gives k5), b (gives k4) or both"),
+            "turns": Option(1, int, "turns in each mount", 1, 24),
+            "visits": Option(
+                "", str, "positions in place of these, 'a 0deg 10s; a 45deg; b 90deg': mount, angle, dwell"
+            ),
+            "settle": Option(2.0, "s", "wait before averaging, in each position", 0.0),
+            "dwell": Option(10.0, "s", "time averaged in each position"),
+            "readings": Option(1, int, "windows in which that time is recorded", 1, 100),
+            "scale": Option(
+                0.0, "m/s2/A", "scale λ for the reduction; 0: the parameter scale of the accelerometer", 0.0
+            ),
+            "u_scale": Option(0.0, "1", "relative standard uncertainty of λ", 0.0),
+            "u_current": Option(0.0, "A", "standard uncertainty of the zero of the current meter", 0.0),
+            "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
+            "u_angle": Option(
+                0.0, "rad", "standard uncertainty of a position of the head that comes back each turn", 0.0
+            ),
+        }
+        | type_b(
+            "angle1",
+            "angle2",
+            axis="standard uncertainty of the axis of the head against the horizon",
+            mount="standard uncertainty of the accelerometer about each of its axes in the mount",
+        )
+    )
     noises = (
         "accelerometer.turn_on", "accelerometer.markov", "accelerometer.white", "accelerometer.meter", "table.repeat",
     )  # fmt: skip

@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift as drift_model
-from gyrobench import units
+from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -46,21 +46,28 @@ __all__ = ["PickoffSetup", "ReductionError", "from_record", "reduce"]
 
 Array = NDArray[np.float64]
 DPH, ARCSEC, ARCMIN = units.factor("deg/h"), units.factor("arcsec"), units.factor("arcmin")
+EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
+SMALL = 1e-5  # rad, step of the sensitivities to the angle readings
 NEGLIGIBLE = 0.3  # of what white noise leaves in the mean drift of a test
 TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is estimated
 
 
 @dataclass(frozen=True)
 class PickoffSetup(Setup):
-    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_*: relative.
-    site: as the report shows it.
+    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_gain,
+    u_angle, u_voltage: relative.  site: as the report shows it.
     """
 
     gain: float
     drift: float
+    earth_rate: float = frames.EARTH_RATE
     u_gain: float = 0.0
     u_angle: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
     u_voltage: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
     site: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -110,7 +117,10 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
     def derived(b: Array) -> list[float]:
         return [b[0], b[0] / s.gain, *([-b[1] / b[0]] if both else [])]
 
-    found = linear.derive(wanted, derived)
+    def sources(f: Findings) -> list[Effect]:
+        return _effects(f, s, both, angle, dt)
+
+    found = with_set_up(linear.derive(wanted, derived), sources, s.corrections)
     found.f_test(
         "square and cube of the angle",
         np.column_stack([np.diff((angle / span) ** p) / dt for p in (2, 3)]),
@@ -118,7 +128,8 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
     )  # fmt: skip
     bound = s.drift * duration
     away = t - centre
-    moved = linear.value[1] * away + linear.value[2] * away**2 / 2.0 if both else np.zeros_like(t)
+    line_and_drift = found.est.beta
+    moved = line_and_drift[1] * away + line_and_drift[2] * away**2 / 2.0 if both else np.zeros_like(t)
     levels = Levels.of(angle, seen, t, u, moved, 2 if both else 0)
     result = linear_result(
         found, system="pickoff_scale_factor", title="Pickoff scale factor of a gyro",
@@ -128,10 +139,11 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
                  "GYRO-DYN-1; Hu 1981, eq. 2-50..2-56"],
         equation="u = u_0 + S c(alpha)" + (" - S omega_d (t - t_m) + r (t - t_m)^2\\/2" if both else "")
         + ', quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
-        conventions=_conventions(s, both), effects=_effects(found, s, both), specification=s.specification,
+        conventions=_conventions(s, both), effects=sources(found), specification=s.specification,
         site=s.site, instrument=s.instrument, simulated=s.truth is not None,
         closed_caption="The closed formula is the line of Hu 1981 through the readings, without drift",
         tables=[levels.table()], warnings=_warnings(both, bound, span), random="pickoff noise and random drift",
+        errors=s.errors,
     )  # fmt: skip
     dense = np.linspace(angle.min(), angle.max(), 61)
     result.series.insert(0, levels.series(dense, float_angle(dense, s.gain)))
@@ -150,16 +162,36 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
     return result
 
 
-def _effects(found: Findings, s: PickoffSetup, both: bool) -> list[Effect]:
-    slope = float(found.value[0])
+def _effects(found: Findings, s: PickoffSetup, both: bool, angle: Array, dt: Array) -> list[Effect]:
+    """All sources with their sensitivities; angle (n,) of the readings, dt (n-1,) between them.
+
+    An encoder that is off once a turn is off in proportion to a small angle, so the sine is an error of the scale.  The
+    axis of the table and the input axis see Earth rate as they lean towards the pole: a constant drift.
+    """
+    slope = float(found.est.beta[0])
     only = np.zeros(found.value.size)
     only[1] = -found.value[1]  # K_sg = S/gain
     wrong = np.zeros_like(found.X)
     wrong[:, 0] = found.X[:, 0]
+
+    def misread(n: int) -> Array:  # readings that are too large by sin n angle, and by cos n angle
+        out = []
+        for f in (np.sin, np.cos):
+            dX = np.zeros_like(found.X)
+            shifted = float_angle(angle + SMALL * f(n * angle), s.gain) - float_angle(angle, s.gain)
+            dX[:, 0] = np.diff(shifted) / dt / SMALL
+            out.append(found.error(dX=dX))
+        return np.array(out)
+
+    earth = found.error(slope * s.earth_rate)
     effects = [
         Effect("gain H/C", s.u_gain, "1", None, "relative", values=only),
         Effect("angle scale of the table", s.u_angle, "1", found.error(dX=wrong), "relative"),
+        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "encoder", SINES),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "encoder", SINES),
         Effect("voltmeter", s.u_voltage, "1", found.error(found.y), "relative"),
+        Effect("table axis towards the pole", s.u_axis, "rad", earth, EARTH_ONLY),
+        Effect("input axis towards output axis", s.u_mount, "rad", earth, EARTH_ONLY),
     ]
     if not both:
         note = "not told from the slope by angles gone over once; bound taken as two standard uncertainties"
@@ -231,6 +263,7 @@ def setup_of(record: Record, specification: Specification | None = None) -> Pick
         specification,
         gain=gain,
         drift=float(options["drift"]),
+        earth_rate=site.earth_rate,
         truth=truth,
         site={} if run.measured else site.shown(),
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
 from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
@@ -31,18 +31,30 @@ class PickoffScaleFactor(OpenLoopTest):
     spec = ("TEST-PICKOFF", "GYRO-DYN-1")
     reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
-    options = SITE | {
-        "range": Option("20arcmin", "rad", "the table goes from -range to +range", 0.0),
-        "points": Option(11, int, "angles", 2, 49),
-        "both_ways": Option(True, bool, "back over the same angles, which tells the drift from the slope"),
-        "settle": Option(0.03, "s", "wait before averaging, at each angle", 0.0),
-        "dwell": Option(0.1, "s", "time averaged at each angle"),
-        "drift": Option("2deg/h", "rad/s", "largest drift to be expected of the gyro", 0.0),
-        "gain": Option(0.0, "1", "angle of the float per angle of the case, H/C; 0: from the gyro's parameters", 0.0),
-        "u_gain": Option(0.0, "1", "relative standard uncertainty of that gain", 0.0),
-        "u_angle": Option(0.0, "1", "relative standard uncertainty of the angle scale of the table", 0.0),
-        "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
-    }
+    options = (
+        SITE
+        | CORRECTIONS
+        | {
+            "range": Option("20arcmin", "rad", "the table goes from -range to +range", 0.0),
+            "points": Option(11, int, "angles", 2, 49),
+            "both_ways": Option(True, bool, "back over the same angles, which tells the drift from the slope"),
+            "settle": Option(0.03, "s", "wait before averaging, at each angle", 0.0),
+            "dwell": Option(0.1, "s", "time averaged at each angle"),
+            "drift": Option("2deg/h", "rad/s", "largest drift to be expected of the gyro", 0.0),
+            "gain": Option(
+                0.0, "1", "angle of the float per angle of the case, H/C; 0: from the gyro's parameters", 0.0
+            ),
+            "u_gain": Option(0.0, "1", "relative standard uncertainty of that gain", 0.0),
+            "u_angle": Option(0.0, "1", "relative standard uncertainty of the angle scale of the table", 0.0),
+            "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
+        }
+        | type_b(
+            "angle1",
+            "angle2",
+            axis="standard uncertainty of the right angle between table axis and pole",
+            mount="standard uncertainty of the input axis against the table axis",
+        )
+    )
     step = 1e-4  # s: the rate of a move of 0.2 s reaches the gyro as held values, wrong by acceleration step2/4 at most
     measured_data = MEASURED
     channels = ("table.angle", "gyro.u", "gyro.drift")

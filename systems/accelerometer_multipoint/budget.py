@@ -1,0 +1,96 @@
+"""Budget of the multi-position test: what errors of head, mount, meter and gravity do to the data, to first order.
+
+With the axis of the head (table axis z) up by delta, and the accelerometer turned about its axes by small angles,
+
+    Y = gamma delta in mount a, Z = gamma delta in mount b, 0 else
+    about x:  Y + r Z, Z - r Y        about y:  X - r Z, Z + r X        about z:  X + r Y, Y - r X
+
+(X, Y, Z) = -f/g0 change the terms k4 X Y and k5 X Z; a turn about the axis of the head is theta_0 besides, which is
+estimated, and one across it changes X in second order only.  [ACC; derived]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.frames import G0
+from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.findings import Findings
+
+from . import closed
+from .geometry import specific_force
+from .model import Model, Setup, Visits
+
+Array = NDArray[np.float64]
+STEP = 1e-4
+
+
+def effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float], k: Array, s: Setup) -> list[Effect]:
+    """Return all sources with their sensitivities; sizes come from ``s`` and may be 0.  k: coefficients of the model's
+    terms; what a mount alone or four positions do not see is taken as 0.
+    """
+    terms = len(model.terms)
+    stretched = np.zeros_like(found.X)
+    stretched[:, :terms] = (
+        model.columns(v, zeros, s.gamma * (1.0 + STEP)) - model.columns(v, zeros, s.gamma * (1.0 - STEP))
+    ) / (2.0 * STEP * s.gravity)
+    slope = found.X[:, terms:].sum(axis=1)  # of the data per rad of angle
+    offset = found.error(s.scale / G0)
+    stations, at = np.unique(_stations(v.angle), return_inverse=True)
+    alone = np.array([found.error(np.where(at == p, slope, 0.0)) for p in range(stations.size)])
+    axis, turned = _mounted(model, v, zeros, k, s.gamma, slope)
+
+    def misread(n: int) -> Array:  # the head stands short of what it reads
+        return np.array([found.error(-slope * f(n * v.angle)) for f in (np.sin, np.cos)])
+
+    return [
+        Effect("scale λ", s.u_scale, "1", found.error(v.y), "relative"),
+        Effect("zero of the current meter", s.u_current, "A", offset),
+        Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
+        Effect("gravity", s.u_gravity, "m/s²", found.error(dX=stretched)),
+        Effect(
+            "positions of the head", s.u_angle, "rad", alone, "independent, the same in each turn and mount",
+            tuple(f"{x:g}°" for x in stations.tolist()),
+        ),
+        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "of the readings of the head", SINES),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "of the readings of the head", SINES),
+        Effect("axis of the head above the horizon", s.u_axis, "rad", found.error(axis)),
+        *(
+            Effect(f"accelerometer turned about its {n} axis", s.u_mount, "rad", found.error(row))
+            for n, row in zip(("input", "output", "pendulum"), turned, strict=True)
+        ),
+    ]  # fmt: skip
+
+
+def _stations(angle: Array) -> Array:
+    """Return the positions (n,) within a turn, degrees, neighbours to closed.EQUAL the same."""
+    step = 10.0 * closed.EQUAL
+    turn: Array = np.mod(angle + closed.EQUAL, 2.0 * math.pi)
+    out: Array = np.round(np.rint(turn / step) * math.degrees(step), 2)
+    return out
+
+
+def _mounted(
+    model: Model, v: Visits, zeros: Mapping[str, float], k: Array, gamma: float, slope: Array
+) -> tuple[Array, Array]:
+    """Return what the data are wrong by per rad of the axis above the horizon (n,), and of the accelerometer turned
+    about each of its axes (3, n).
+    """
+    of = dict(zip(model.terms, k.tolist(), strict=True))
+    k4, k5 = of.get("k4", 0.0), of.get("k5", 0.0)
+    axis, turned = np.zeros_like(v.y), np.zeros((3, v.y.size))
+    for m in model.mounts:
+        mine = v.mount == m
+        X, Y, Z = specific_force(m, v.angle[mine] + zeros[m], gamma)
+        across, own = (k4, 2) if m == "a" else (k5, 1)  # own: the axis across the head that lies in the plane of X
+        axis[mine] = across * gamma * X
+        turned[0, mine] = k4 * X * Z - k5 * X * Y
+        # about the axis that lies along the axis of the head: the angle; about the other, X and it share the plane
+        turned[own, mine] = (-k4 if m == "a" else k5) * X**2
+        sense = -1.0  # both axes lie against the axis of the head: a turn about them is one back
+        turned[3 - own, mine] = sense * slope[mine]
+    return axis, turned
