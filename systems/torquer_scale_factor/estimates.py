@@ -14,11 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench import units
 from gyrobench.reduction.estimation import regression
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.quantity import Quantity
 
 from .precession import Precession
 
 Array = NDArray[np.float64]
+DPH, KU, UNIT = units.factor("deg/h"), units.factor("deg/h/mA"), "°/h/mA"
 Number = tuple[float, float, float]  # value, standard uncertainty of type A, degrees of freedom
 
 
@@ -42,6 +46,14 @@ class Estimates:
     p: float | None
     gain: Array
     cofactor: Array
+    reported: Findings | None = None  # K, K_LS, K_1, K_3/K_1, worst departure and drift as one fit
+
+
+QUANTITIES = [
+    *(Quantity(n, "", UNIT, KU) for n in ("K", "K_LS", "K_1")),
+    *(Quantity(n, "", "%", 0.01) for n in ("K_3/K_1", "linearity")),
+    Quantity("drift", "", "°/h", DPH),
+]
 
 
 def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> Estimates:
@@ -88,6 +100,14 @@ def of_windows(i: Array, found: Precession) -> Estimates:
     def of(value: float, row: Array) -> Number:
         return value, *found.u(row)
 
+    def reported(b: Array) -> Array:
+        at, constant = b[:n], b[n : 2 * n]
+        K_1, K_3 = cubic @ at
+        middle = float(np.mean(at))
+        return np.array(
+            [middle, float(line[0] @ at), K_1, K_3 / K_1, float(at[k]) / middle - 1.0, float(steady @ constant)]
+        )
+
     ratio = float(beta[1] / beta[0])
     u_3, dof_3 = found.u(cubic[1])
     p = 2.0 * float(special.stdtr(min(dof_3, 1e9), -abs(float(beta[1])) / u_3)) if u_3 > 1e-12 * mean else None
@@ -106,6 +126,7 @@ def of_windows(i: Array, found: Precession) -> Estimates:
         p=p,
         gain=gain,
         cofactor=found.est.covariance[:n, :n],
+        reported=found.fit.derive(QUANTITIES, reported) if found.fit else None,
     )
 
 

@@ -12,7 +12,7 @@ Not modelled: change of the drift between the two senses of a current other than
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,11 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench import frames, units
 from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.mixture import equivalent_dof
-from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.window_checks import ReductionError
+
+from .budget import Sizes, effects
 
 Array = NDArray[np.float64]
 DEGREE = 4
@@ -32,11 +36,13 @@ DEGREE = 4
 
 @dataclass(frozen=True)
 class Precession:
-    """K (n,) of the n currents and their drifts o (n,), SI, with the fit they come from."""
+    """K (n,) of the n currents and their drifts o (n,), SI, with the fit they come from and its sources of type B."""
 
     K: Array
     drift: Array
     est: noise_mixture_fit.Estimate
+    fit: Findings | None = None
+    effects: Sequence[Effect] = ()
 
     def weights(self, columns: Array, of: Array | slice) -> Array:
         """(q, n) W of generalized least squares W values = c of ``values = columns c``, under their covariance."""
@@ -56,8 +62,13 @@ class Precession:
         return u, float(equivalent_dof(np.array([half / u if u > 0.0 else NORMAL]))[0])
 
 
-def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array) -> Precession:
-    """phases: number of a phase -> number of its current in ``currents`` (A).  Raises ReductionError."""
+def precession(
+    windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array, sizes: Sizes | None = None,
+    corrections: str = "", earth_rate: float = frames.EARTH_RATE,
+) -> Precession:  # fmt: skip
+    """phases: number of a phase -> number of its current in ``currents`` (A).  sizes, corrections: errors of the set-up
+    (budget.py, gyrobench.reduction.estimation.effects).  Raises ReductionError.
+    """
     phase = np.asarray(windows["phase"]).astype(int)
     mine = np.isin(phase, list(phases))
     t0, t1, a0, a1, i = (
@@ -71,13 +82,14 @@ def precession(windows: Mapping[str, Array], phases: Mapping[int, int], currents
     shape = np.column_stack([_mean_legendre(j, start, end) for j in range(1, DEGREE + 1)])
     X = np.column_stack([own * i[:, None], own, shape])
     names = [f"K at {c * 1e3:g} mA" for c in currents] + [f"drift at {c * 1e3:g} mA" for c in currents]
-    try:
-        est = noise_mixture_fit.fit(
-            X, (a1 - a0) / (t1 - t0), [*names, *(f"P{j}" for j in range(1, DEGREE + 1))], t0, t1, readings=True
-        )
-    except RegressionError as error:
-        raise ReductionError(str(error)) from None
-    return Precession(est.beta[:n], est.beta[n : 2 * n], est)
+    names += [f"P{j}" for j in range(1, DEGREE + 1)]
+    found = fit(names, X, (a1 - a0) / (t1 - t0), t0, t1, [], "rate", "°/h", units.factor("deg/h"), noise="readings")
+
+    def sources(f: Findings) -> Sequence[Effect]:
+        return effects(f, n, a0, a1, sizes or Sizes(), earth_rate)
+
+    found = with_set_up(found, sources, corrections)
+    return Precession(found.est.beta[:n], found.est.beta[n : 2 * n], found.est, found, sources(found))
 
 
 def _mean_legendre(j: int, start: Array, end: Array) -> Array:

@@ -17,8 +17,8 @@ two senses otherwise than as noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -29,25 +29,33 @@ from gyrobench import units
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import regression, uncertainty
+from gyrobench.reduction.estimation.effects import Effect, correction_table, simulated_table, standard_changes
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.fit_result import budget_lines, changes_by_source
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
 from . import marks, row_checks
-from .estimates import Estimates, Number, of_table, of_windows
+from .budget import AMMETER, Sizes
+from .estimates import DPH, KU, UNIT, Estimates, Number, of_table, of_windows
 from .precession import Precession, precession
 
 Array = NDArray[np.float64]
-DPH, MA, KU = units.factor("deg/h"), 1e-3, units.factor("deg/h/mA")
-UNIT = "°/h/mA"
+MA = 1e-3
+RANDOM = "random drift, angle readings and current, with the linearity error"
 
 
 @dataclass(frozen=True)
 class TorquerSetup:
-    """u_current: relative standard uncertainty of the ammeter.  limits: surface units.  truth: printed name -> value in
-    the printed unit.
+    """u_current, u_time: relative standard uncertainties of ammeter and time base, for a table of rates (those of a run
+    are in its Precession).  errors: of a simulated set-up.  limits: surface units.  truth: printed name -> value in the
+    printed unit.
     """
 
     u_current: float = 0.0
+    u_time: float = 0.0
+    errors: Mapping[str, float] | None = None
     specification: Specification | None = None
     instrument: str = ""
     simulated: bool = False
@@ -118,7 +126,9 @@ def reduce(
     book = of_table(i, marked, half, theta)
     e = book if found is None else of_windows(i, found)
     mean, k, u_mean = e.mean[0], e.worst_at, e.mean[1]
-    make = _Maker(s)
+    sources = found.effects if found else ()
+    by_source = [standard_changes(e.reported, x) for x in sources] if e.reported else []
+    make = _Maker(s, np.vstack([np.zeros((1, 6)), *by_source]) if e.reported else None)
     coefficients = [
         make("K", "scale factor, mean of the K_n of all currents", UNIT, e.mean, 1.0 / KU, True),
         make("K_LS", "scale factor, weighted least squares", UNIT, e.line, 1.0 / KU, True),
@@ -176,8 +186,10 @@ def reduce(
         ],
         residual_std=e.scatter / KU,
         residual_unit=UNIT,
-        budget=_budget(s, mean, u_mean),
-        tables=[_table(i, plus, minus, marked, half, book.mean[0]), *_windows_table(i, found)],
+        budget=budget_lines(e.reported, sources, RANDOM) if e.reported else _budget(s, mean, u_mean),
+        type_b=changes_by_source(e.reported, sources, by_source) if e.reported else [],
+        tables=[*_set_up_tables(e.reported, sources, s.errors), _table(i, plus, minus, marked, half, book.mean[0]),
+                *_windows_table(i, found)],
         warnings=warnings,
         summary=[
             f"Scale factor K = {mean / KU:.3f} °/h/mA from {n} currents, {i.min() / MA:g} to {full / MA:g} mA.",
@@ -205,6 +217,14 @@ def _noise(e: Estimates, found: Precession | None) -> dict[str, Any]:
     }
 
 
+def _set_up_tables(
+    reported: Findings | None, sources: Sequence[Effect], errors: Mapping[str, float] | None
+) -> list[dict[str, Any]]:
+    if reported is None:
+        return []
+    return [*correction_table(reported), *simulated_table(reported, sources, errors)]
+
+
 def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
     if found is None:
         return []
@@ -220,17 +240,23 @@ def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
 
 
 class _Maker:
-    """Coefficients in surface units from an estimate with its type A uncertainty and degrees of freedom."""
+    """Coefficients in surface units from an estimate with its type A uncertainty and degrees of freedom.
 
-    def __init__(self, setup: TorquerSetup) -> None:
-        self.setup = setup
+    changes (m, 6): by the sources of type B of a run, SI, in the order in which the coefficients are made.
+    """
+
+    def __init__(self, setup: TorquerSetup, changes: Array | None) -> None:
+        self.setup, self.changes, self.made = setup, changes, 0
 
     def __call__(
         self, name: str, meaning: str, unit: str, number: Number, size: float, scale: bool = False
     ) -> Coefficient:
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
-        b = [abs(value) * self.setup.u_current] if scale else []
+        b = [abs(value) * self.setup.u_current, abs(value) * self.setup.u_time] if scale else []
+        if self.changes is not None:
+            b = (self.changes[:, self.made] * size).tolist()
+        self.made += 1
         u, U = uncertainty.combine_uncertainties(u_a, half_a, b)
         limit = (self.setup.specification or {}).get(name)
         t = value / u_a if u_a > 0.0 else None
@@ -251,7 +277,9 @@ def _budget(s: TorquerSetup, mean: float, u_mean: float) -> list[BudgetLine]:
         BudgetLine("scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", "type A, with the linearity error in it")
     ]
     if s.u_current > 0.0:
-        lines.append(BudgetLine("ammeter", s.u_current, "1", size, UNIT, size * s.u_current, UNIT, "K", "relative"))
+        lines.append(BudgetLine(AMMETER, s.u_current, "1", size, UNIT, size * s.u_current, UNIT, "K", "relative"))
+    if s.u_time > 0.0:
+        lines.append(BudgetLine("time base", s.u_time, "1", size, UNIT, size * s.u_time, UNIT, "K", "relative"))
     return lines
 
 
@@ -295,11 +323,20 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     plan = record.run.plan
     rows = record.windows if measured else marks.rows(record.windows, plan)
     truth, found = None, None
+    corrections = str(options.get("corrections", ""))
+    if measured and corrections.strip():
+        raise ReductionError("corrections: a table of rates has no angles to correct; correct its currents and rates")
     if not measured and not problems(rows):
-        found = precession(record.windows, marks.senses(plan), np.asarray(rows["current"]))
+        sizes = Sizes(**run_metadata.sizes(options, [f.name for f in fields(Sizes)]))
+        site = run_metadata.Site.of(record.run)
+        found = precession(
+            record.windows, marks.senses(plan), np.asarray(rows["current"]), sizes, corrections, site.earth_rate
+        )
         truth = truth_of(record.run.parameters, np.asarray(rows["current"]))
     setup = TorquerSetup(
         u_current=float(options.get("u_current", 0.0)),
+        u_time=float(options.get("u_time", 0.0)),
+        errors=simulated_errors(record.run),
         specification=specification,
         instrument=record.run.instrument,
         simulated=truth is not None,

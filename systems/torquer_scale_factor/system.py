@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
 from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, Array, TableTest, on_table
 from gyrobench.system.part_values import PartValues
@@ -42,15 +42,27 @@ class TorquerScaleFactor(TableTest):
         source.i_read -> sampler.x
         gyro.saturated -> sampler.flag
     """
-    options = SITE | {
-        "currents": Option("1 5 10 20 40 60 80 100", str, "magnitudes of the currents, mA"),
-        "range": Option("10deg", "rad", "angle turned with each current up to 20 mA", 0.0),
-        "range_large": Option("100deg", "rad", "angle turned with each larger current", 0.0),
-        "k": Option("17.2deg/h/mA", "rad/s/A", "scale factor expected, for the times of the plan", 0.0),
-        "slew": Option(0.1, "A/s", "rate at which the current is changed", 0.0, sets="source.slew"),
-        "windows": Option(20, int, "readings of the angle over each range", 5, 500),
-        "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
-    }
+    options = (
+        SITE
+        | CORRECTIONS
+        | {
+            "currents": Option("1 5 10 20 40 60 80 100", str, "magnitudes of the currents, mA"),
+            "range": Option("10deg", "rad", "angle turned with each current up to 20 mA", 0.0),
+            "range_large": Option("100deg", "rad", "angle turned with each larger current", 0.0),
+            "k": Option("17.2deg/h/mA", "rad/s/A", "scale factor expected, for the times of the plan", 0.0),
+            "slew": Option(0.1, "A/s", "rate at which the current is changed", 0.0, sets="source.slew"),
+            "windows": Option(20, int, "readings of the angle over each range", 5, 500),
+            "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
+            "u_zero": Option(0.0, "A", "standard uncertainty of the zero of the ammeter", 0.0),
+        }
+        | type_b(
+            "angle1",
+            "angle2",
+            "time",
+            axis="standard uncertainty of the right angle between table axis and pole",
+            mount="standard uncertainty of the input axis against the table axis",
+        )
+    )
     noises = (*SDF_NOISES, "table.rumble", "source.meter")
     measured_data = MEASURED
     channels = ("table.angle", "source.i", "gyro.u", "table.motor")

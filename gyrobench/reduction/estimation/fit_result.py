@@ -111,8 +111,8 @@ def linear_result(
         allan=fit.allan(),
         psd=fit.psd(),
         harmonics=list(harmonics),
-        budget=_budget(fit, effects, random),
-        type_b=_type_b(fit, effects, by_source),
+        budget=budget_lines(fit, effects, random),
+        type_b=changes_by_source(fit, effects, by_source),
         repeatability=dict(repeatability or {}),
         tables=[
             *correction_table(fit),
@@ -203,7 +203,8 @@ def _judge_slow_drift(fit: Findings, coefficients: list[Coefficient], contributi
     ]
 
 
-def _budget(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
+def budget_lines(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
+    """Return the lines of the budget of each value: ``random``, of type A, then every source that has a size."""
     lines = []
     note = "Type A, from the residuals" + ("" if fit.white else " under the estimated noise model")
     sources = [(e.unit, *row) for e in effects for row in budget_rows(fit, e)]
@@ -218,8 +219,8 @@ def _budget(fit: Findings, effects: Sequence[Effect], random: str) -> list[Budge
     return lines
 
 
-def _type_b(fit: Findings, effects: Sequence[Effect], changes: Sequence[Array]) -> list[dict[str, Any]]:
-    """What one standard uncertainty of each source does to all estimates together: its independent parts in rows."""
+def changes_by_source(fit: Findings, effects: Sequence[Effect], changes: Sequence[Array]) -> list[dict[str, Any]]:
+    """Return what one standard uncertainty of each source does to all estimates: its independent parts in rows."""
     scale = np.array([q.scale for q in fit.quantities])
     pairs = zip(effects, changes, strict=True)
     return [{"source": e.source, "changes": (c / scale).tolist()} for e, c in pairs if np.any(c)]

@@ -1,0 +1,73 @@
+"""Budget of a run of the torquer test: what ammeter, encoder, axes and time base do to its rates, to first order.
+
+    theta' = K i + omega_d - omega_E (p . I) + noise,       p . I = u + r cos theta + s sin theta
+
+with the table axis leaning by u towards the pole p, the input axis by r towards the output axis (on the pole at angle
+0) and by s towards the spin axis, which the table turns with it.  Both senses see the same Earth rate, so it is a
+drift; an encoder that is off by e(theta) gives e(theta_2) - e(theta_1) over an angle that both senses turn, which is in
+the scale factor: 30 arcsec once a turn are up to 1.5e-4 of it over 10 degrees.  [TEST-TORQUER; derived]
+
+Not in the budget: e in the polynomial of the drift over the angle, second order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import frames
+from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.findings import Findings
+
+Array = NDArray[np.float64]
+AMMETER, ZERO = "ammeter", "zero of the ammeter"
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Standard uncertainties of type B, SI, the options of the same names; u_current, u_time: relative."""
+
+    u_current: float = 0.0
+    u_zero: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_time: float = 0.0
+
+
+def effects(
+    found: Findings, currents: int, start: Array, end: Array, sizes: Sizes, earth_rate: float = frames.EARTH_RATE
+) -> Sequence[Effect]:
+    """Return all sources of a fit to windows; start, end (n,): table angle, rad.
+
+    currents: their number; the first columns of the fit are the current of each, then the constant of each.
+    """
+    length = found.t_end - found.t_start
+
+    def mean(integral: Array) -> Array:
+        return integral / np.where(end == start, 1.0, end - start)
+
+    def read(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+        return np.array([found.error((f(n * end) - f(n * start)) / length) for f in (np.sin, np.cos)])
+
+    def design(columns: slice, source: slice) -> Array:
+        dX = np.zeros_like(found.X)
+        dX[:, columns] = found.X[:, source]
+        return found.error(dX=dX)
+
+    K, constant = slice(0, currents), slice(currents, 2 * currents)
+    along_o, along_s = mean(np.sin(end) - np.sin(start)), mean(np.cos(start) - np.cos(end))
+    return [
+        Effect(AMMETER, sizes.u_current, "1", design(K, K), "relative"),
+        Effect(ZERO, sizes.u_zero, "A", design(K, constant)),
+        Effect("angle error, once a turn", sizes.u_angle1, "rad", read(1), "encoder", SINES),
+        Effect("angle error, twice a turn", sizes.u_angle2, "rad", read(2), "encoder", SINES),
+        Effect("table axis towards the pole", sizes.u_axis, "rad", found.error(-earth_rate)),
+        Effect("input axis towards output axis", sizes.u_mount, "rad", found.error(-earth_rate * along_o)),
+        Effect("input axis towards spin axis", sizes.u_mount, "rad", found.error(earth_rate * along_s)),
+        Effect("time base", sizes.u_time, "1", found.error(-found.y), "relative, seconds read too long"),
+    ]
