@@ -2,16 +2,16 @@
 
 Over two pieces of equal length T of a phase the angle x obeys, exactly,
 
-    y = x(T) - 2 x(0) + x(-T) = 1/J <M + M_h - D w - M_C sgn w>        <f> = integral of (T - |t|) f(t)
+    y = x(T) - 2 x(0) + x(-T) = 1/J <M + M_h - D w - M_C sgn w + M_0 - c x>        <f> = integral of (T - |t|) f(t)
 
-so that no rate has to be differentiated: y is linear in K_t/J (or K/J), 1/J, D/J and M_C/J, with the readings of the
-current (or of the voltage) and of the angle in <>.  White random torque correlates neighbouring y by 1/4, errors of the
-angles by -2/3: the size of both follows from the residuals by restricted maximum likelihood, that of the angles at
-least the rounding of the counts.  The noise of a meter follows from its readings alone.  Voltages are fitted window by
-window, the winding and the lag from steps of torque.  [MOTOR-TEST; own design]
+so that no rate has to be differentiated: y is linear in K_t/J (or K/J), 1/J, D/J, M_C/J, M_0/J and c/J, with the
+readings of the current (or of the voltage) and of the angle in <>.  White random torque correlates neighbouring y by
+1/4, errors of the angles by -2/3: the size of both follows from the residuals by restricted maximum likelihood, that of
+the angles at least the rounding of the counts.  The noise of a meter follows from its readings alone.  Voltages are
+fitted window by window, the winding and the lag from steps of torque.  [MOTOR-TEST; own design]
 
 Not modelled: cogging and torque ripple, which average out over the ways of the runs where these are whole periods, and
-errors of the scale that last longer than a window.
+errors of the scale that last longer than a window.  Other torques are sought in what is left (left_out).
 """
 
 from __future__ import annotations
@@ -27,20 +27,22 @@ from scipy import integrate, linalg, optimize, stats
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
-from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.estimation.uncertainty import NORMAL, withhold
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Specification
 
+from . import left_out
+
 Array = NDArray[np.float64]
 ANGLE, VOLTAGE, CURRENT = "reader.angle_read", "voltmeter.reading", "ammeter.reading"
 PIECE = 0.05  # s, length T
 SLOW = 0.05  # rad/s: a window with a slower end may have been at rest, where friction is what the load is
 SEEN = 10.0  # standard errors: a current that is read at all
-WOUND = "J w' = K_t i + M_h - D w - M_C \"sgn\"(w), quad U = R i + K_e w + L i'"
-SQUARE_LAW = 'J w\' = K V abs(V) + M_h - D w - M_C "sgn"(w), quad V = U - K_e w'
+WOUND = "J w' = K_t i + M_h - D w - M_C \"sgn\"(w) + M_0 - c x, quad U = R i + K_e w + L i'"
+SQUARE_LAW = 'J w\' = K V abs(V) + M_h - D w - M_C "sgn"(w) + M_0 - c x, quad V = U - K_e w'
 QUANTUM = 2.0 * math.pi / 7.2e6
 NO_LIMIT = "the voltage does not come to its limit in the steps: take a larger torque"
 EDGE = 0.9  # of the largest voltage: at its limit; of the change: the voltage has begun to move
@@ -51,13 +53,14 @@ class Window:
     """Two pieces of a phase, from -T to T: samples in the middle of time, SI.
 
     phase: number of the phase; place: that of the window's middle in it, in pieces, neighbours overlap by T.  motor,
-    hung: demanded and known torque.  rate: at each sample, linear in time.  weight: (T - |t|) times the sampling
-    interval.
+    hung: demanded and known torque.  angle, rate: at each sample, the rate linear in time.  weight: (T - |t|) times the
+    sampling interval.
     """
 
     phase: int
     place: int
     y: float
+    angle: Array
     rate: Array
     turned: float  # <w>, from the angles
     voltage: Array
@@ -84,6 +87,7 @@ class Solution:
     residual: Array
     torque_density: float = 0.0  # N.m/sqrt(Hz)
     angle_error: float = 0.0  # rad, standard deviation
+    left_out: Sequence[left_out.Sought] = ()
 
     def of(self, f: Callable[[Array], float]) -> tuple[float, float]:
         """Return a function of the values and its u: half of the 95 % interval over 1.96."""
@@ -101,7 +105,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     steps = [g for g in found.gates if g.label.startswith("step")]
     windows = [w for g in runs for w in cut(g)]
     driven = [w for w in windows if w.motor]
-    if len({w.hung for w in windows}) < 3 or len(driven) < 4:
+    if len({w.hung for w in windows}) < 3 or len(driven) < 4 or len({w.sense for w in windows}) < 2:
         raise ReductionError(
             "the table must turn under the motor and under the hung torque to either side; there are "
             f"{len(windows)} windows of {2.0 * PIECE:g} s in which it turns faster than {SLOW:g} rad/s"
@@ -154,6 +158,9 @@ def from_record(record: Record, specification: Specification | None = None) -> L
     add("J", "inertia of table and load", "kg·m²", mechanics.of(lambda v: 1.0 / v[one]), u_M, "body.axis_J")
     add("D", "viscous drag", "N·m·s/rad", mechanics.of(lambda v: v[first] / v[one]), u_M, "body.axis_viscous")
     add("M_C", "Coulomb friction", "N·m", mechanics.of(lambda v: v[first + 1] / v[one]), u_M, "body.axis_friction")
+    add("M_0", "constant torque, at the angle 0", "N·m", mechanics.of(lambda v: v[first + 2] / v[one]), u_M, "")
+    add("c", "torque per angle, of cables", "N·m/rad", mechanics.of(lambda v: v[first + 3] / v[one]), u_M,
+        "body.axis_cable")  # fmt: skip
     add_table(found, mechanics, windows)
     silent = [f"u_{n}" for n in ("hung", "voltage", "current")[: 2 + wound] if not float(o.get(f"u_{n}", 0.0))]
     if silent:
@@ -176,11 +183,13 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         "Winding: {R}, {L}." if wound else "The root shaper is off by {U_0} at null.",
         "The axis has an inertia of {J} and Coulomb friction of {M_C}.",
     )
-    return result
+    said = left_out.sentence(mechanics.left_out)
+    result.warnings[:0] = [said] if said else []
+    return withhold(result, [said] if said else [])
 
 
 def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window]) -> None:
-    """Add how many windows there are of each kind, and what they leave."""
+    """Add how many windows there are of each kind, and what they leave; the torques sought in it."""
     kinds = {"motor": [w.motor != 0.0 for w in windows], "hung torque": [w.hung != 0.0 for w in windows]}
     kinds["coasting"] = [not a and not b for a, b in zip(*kinds.values(), strict=True)]
     rows: list[list[Any]] = []
@@ -193,6 +202,14 @@ def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window
     )
     columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
     found.tables.append({"title": "Windows", "caption": caption, "columns": columns, "rows": rows})
+    found.tables.append(
+        {
+            "title": "Torques left out",
+            "caption": "Each as if it were in the model, with the p of chance; the model has none of them.",
+            "columns": ["torque", "size", "u", "unit", "p"],
+            "rows": [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out],
+        }
+    )
 
 
 def cut(gate: Gate) -> list[Window]:
@@ -213,8 +230,8 @@ def cut(gate: Gate) -> list[Window]:
         right, left = (float(v) for v in halves)
         torque = [gate.amplitude if gate.kind == "torque" and gate.axis == k else 0.0 for k in (1, 2)]
         found.append(
-            Window(gate.row.phase, place, float(after - before), np.linspace(*ends, offset.size), right - left,
-                   gate[VOLTAGE][part], gate[CURRENT][part], weight, *torque)
+            Window(gate.row.phase, place, float(after - before), x[part], np.linspace(*ends, offset.size),
+                   right - left, gate[VOLTAGE][part], gate[CURRENT][part], weight, *torque)
         )  # fmt: skip
     return found
 
@@ -275,13 +292,15 @@ def _square_law(w: Window, K_e: float, noise: float) -> tuple[float, float, Arra
 
 
 def solve(windows: Sequence[Window], quantum: float, torque: Callable[..., Any], K_e: float | None = None) -> Solution:
-    """Return K/J, (K_e,) 1/J, D/J, M_C/J by generalized least squares.
+    """Return K/J, (K_e,) 1/J, D/J, M_C/J, M_0/J, c/J by generalized least squares.
 
     torque: the regressor of the motor, its derivative by K_e and its slopes by the readings of the meter, for a window
     and K_e.  K_e: from which it is sought; None: not at all.  quantum: rad, of the angle.
     """
     y = np.array([w.y for w in windows])
-    others = np.array([[w.hung * PIECE**2, -w.turned, -w.sense * PIECE**2] for w in windows])
+    others = np.array(
+        [[w.hung * PIECE**2, -w.turned, -w.sense * PIECE**2, PIECE**2, -w.integral(w.angle)] for w in windows]
+    )
     parts = bands(windows)
     noise = reading_noise([w.current if K_e is None else w.voltage for w in windows])
     value, covariance, sizes, X, target = np.zeros(0), np.zeros((0, 0)), np.zeros(2), others, y
@@ -298,9 +317,13 @@ def solve(windows: Sequence[Window], quantum: float, torque: Callable[..., Any],
             K_e = float(value[1])
         if last.size and np.all(np.abs(value - last) < 1e-4 * np.sqrt(np.diag(covariance))):
             break
-    J = 1.0 / float(value[-3])
+    J = 1.0 / float(value[-5])
     residual = target - X @ value
-    return Solution(value, covariance, y.size - value.size, residual, J * math.sqrt(sizes[0]), math.sqrt(sizes[1]))
+    terms = [np.array([w.weight @ t.columns(w.angle, w.rate) for w in windows]) for t in left_out.TERMS]
+    sought = left_out.seek(X, residual, np.tensordot(sizes, parts, 1) + read, J, terms)
+    return Solution(
+        value, covariance, y.size - value.size, residual, J * math.sqrt(sizes[0]), math.sqrt(sizes[1]), sought
+    )
 
 
 def weighted(X: Array, y: Array, V: Array) -> tuple[Array, Array, float]:
