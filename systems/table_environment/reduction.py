@@ -21,12 +21,15 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.fit_result import Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
+from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
+from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 
 from . import budgets
 from .budgets import Line, Total
+from .set_up import effects
 
 DPH = units.factor("deg/h")
 ARCSEC = units.factor("arcsec")
@@ -60,10 +63,16 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     quantities += [Quantity.of(n, c[1], c[2], true.get(n)) for n, c in CAUSES.items()]
     group = Group("at rest", np.arange(t0.size), ((t0 + t1) / 2.0 - t0[0]) / 3600.0, "time", "h")
     weighed = run.options.get("nuisances") != "none"
+    sizes = run_metadata.sizes(run.options, ("u_mount", "u_scale_factor", "u_current", "u_scales"))
     found = fit(
         quantities, np.column_stack([np.ones(t0.size), *columns]), -k * w["mean"], t0, t1, [group], "drift rate", "°/h",
         DPH, candidates=[nuisances.trend(t0, t1)] if weighed else (),
     )  # fmt: skip
+
+    def sources(f: Findings) -> list[Effect]:
+        return effects(f, w, k, site, [c for c, *_ in CAUSES.values()], sizes)
+
+    found = with_set_up(found, sources, str(run.options.get("corrections", "")))
     result = linear_result(
         found,
         system=run.system,
@@ -83,6 +92,8 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         site=site.shown(),
         instrument=run.instrument,
         no_closed="",
+        effects=sources(found),
+        errors=simulated_errors(run),
     )  # fmt: skip
     _budgets(result, run)
     return run_metadata.finish(result, record)

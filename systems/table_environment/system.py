@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from gyrobench import units
 from gyrobench.attitudes import parse
-from gyrobench.system.families.option_groups import NUISANCES, SITE, TORQUER
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.table_test import sampled, surroundings
 from gyrobench.system.part_values import PartValues
@@ -75,7 +75,10 @@ class TableEnvironment(RebalanceTest):
         }
         | TORQUER
         | NUISANCES
+        | CORRECTIONS
+        | type_b("mount", "scale_factor", "current")
         | {
+            "u_scales": Option(0.0, "1", "relative standard uncertainty of the scale of each recorded cause", 0.0),
             "u_tilt": Option("0.6arcsec", "rad", "surroundings of the later tests: tilt", 0.0),
             "u_rate": Option("2e-5arcsec/s", "rad/s", "rate of tilting", 0.0),
             "u_temperature": Option("10mK", "K", "mean temperature", 0.0),
