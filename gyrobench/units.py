@@ -19,7 +19,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from gyrobench.errors import GyrobenchError
@@ -43,7 +43,7 @@ class Unit:
     offset: float
     exponents: tuple[Fraction, ...]
 
-    @property
+    @cached_property
     def dimension(self) -> str:
         """The SI unit of the same dimension, spelled out: ``kg.m2/s``."""
         up = [_power(b, e) for b, e in zip(BASE, self.exponents, strict=True) if e > 0]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import hashlib
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +18,7 @@ from gyrobench.system.values import InvalidValueError, flatten, nest, parse
 from gyrobench.system.wiring import Assembly, follow_factors
 
 Starts = dict[str, list[tuple[Bound, Any]]]  # by slot, in the FMU's own units
+_KINDS: dict[str, type] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
 
 
 def slot_seed(seed: int, slot: str) -> int:
@@ -49,10 +52,12 @@ def defaults(assembly: Assembly) -> dict[str, Any]:
 
 def _si(name: str, value: Any, bound: Bound) -> Any:
     """A given value as SI number of the parameter's type."""
-    kind = {"Real": float, "Integer": int, "Boolean": bool, "String": str}[bound.kind]
-    return parse(name, value, _si_unit(bound.unit), kind)
+    if type(value) is float and bound.kind == "Real" and math.isfinite(value):
+        return value  # the thousands of numbers of a plan
+    return parse(name, value, _si_unit(bound.unit), _KINDS[bound.kind])
 
 
+@functools.cache
 def _si_unit(name: str) -> str:
     """Return the SI unit of a unit's dimension: the unit itself where it is one, "1" where it is not known."""
     try:

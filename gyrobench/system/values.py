@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -31,22 +32,27 @@ def flatten(name: str, value: Any) -> dict[str, Any]:
     return found
 
 
+@functools.lru_cache(maxsize=1 << 16)  # every run of a system asks for the same thousands of names
+def _place(key: str) -> tuple[str, tuple[int, ...]]:
+    """``"faces[1,2]"`` -> ``("faces", (1, 2))``; a scalar has no index."""
+    name, bracket, index = key.partition("[")
+    return (name, tuple(map(int, index[:-1].split(",")))) if bracket else (key, ())
+
+
 def nest(values: Mapping[str, Any]) -> dict[str, Any]:
     """The inverse of :func:`flatten`: ``{"a[1]": 1, "a[2]": 2, "b": 3}`` -> ``{"a": [1, 2], "b": 3}``"""
     nested: dict[str, Any] = {}
     arrays: dict[str, dict[int, Any]] = {}  # index -> value, or the same of the next index
     for key, value in values.items():
-        name, bracket, index = key.partition("[")
-        if not bracket:
+        name, index = _place(key)
+        if not index:
             nested[name] = value
             continue
         cells = arrays.setdefault(name, {})
         nested.setdefault(name, None)  # its place
-        if "," in index:
-            *outer, index = index.split(",")
-            for i in outer:
-                cells = cells.setdefault(int(i), {})
-        cells[int(index[:-1])] = value
+        for i in index[:-1]:
+            cells = cells.setdefault(i, {})
+        cells[index[-1]] = value
 
     def build(cells: dict[int, Any]) -> list[Any]:
         ordered = [cells[k] for k in sorted(cells)]

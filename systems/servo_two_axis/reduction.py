@@ -65,7 +65,8 @@ def from_record(record: Record, specification: Specification | None = None) -> D
     w = {c: np.asarray(record.windows[c], dtype=float)[held] for c in REQUIRED}
     phase = every[held]
     mount = np.array([known[labels[p]] for p in phase.tolist()])
-    seen = track(w, phase, np.array([geometry.base(m, site.latitude) for m in mount.tolist()]))
+    base = {m: geometry.base(m, site.latitude) for m in set(mount.tolist())}
+    seen = track(w, phase, np.array([base[m] for m in mount.tolist()]))
     X = {c: seen.design(site, drift.terms_2dof(c, terms)) for c in "xy"}
     wrong = _problems(record.windows, held, w, run, X, terms, sorted(set(mount.tolist())), site)
     if wrong:

@@ -102,7 +102,8 @@ def held_windows(
     every = np.asarray(windows["phase"]).astype(int)
     rows = np.isin(every, list(labels))
     phase = every[rows]
-    axes = np.array([on_servo_table(labels[p], latitude) for p in phase.tolist()])
+    of_phase = {p: on_servo_table(name, latitude) for p, name in labels.items()}
+    axes = np.array([of_phase[p] for p in phase.tolist()])
     columns = (np.asarray(windows[c], dtype=float)[rows] for c in ("angle_start", "angle_end", "t_start", "t_end"))
     start, end, t0, t1 = columns
     return Held(start, end, t0, t1, axes), phase, rows

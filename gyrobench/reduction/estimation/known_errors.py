@@ -22,13 +22,10 @@ what the noise does is type A.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
-from gyrobench.reduction.estimation.nuisance_states import State
 
 Array = NDArray[np.float64]
 FAINT = 1e-3  # of the residuals' rms: directions of E that are smaller move no weight
@@ -103,20 +100,14 @@ def absorb(moments: tuple[Array, Array, Array, Array], c: int, n: int, variance:
     )  # fmt: skip
 
 
-def pulled(
-    absorbed: Absorbed, each: Sequence[State], parts: Sequence[tuple[Array, ...]], counts: NDArray[np.bool_]
-) -> Array:
+def pulled(absorbed: Absorbed, cofactors: Array, counts: NDArray[np.bool_]) -> Array:
     """Return G K (candidates, c, r) of the candidates that count, G = (X'V^-1 X)^-1 X'V^-1: what the errors do to the
     coefficients.
 
-    each, parts: the combinations of effects, with their (X'V^-1 X)^-1 last; counts (states, models).
+    cofactors (candidates, c, c): (X'V^-1 X)^-1 of each; counts (states, models).
     """
-    pull, c, out = absorbed.pull, absorbed.square.shape[1], []
-    for s, part, models in zip(each, parts, counts, strict=True):
-        inverse, index = np.zeros((int(models.sum()), c, c)), np.array(s.index)
-        inverse[:, index[:, None], index] = part[-1][models]
-        out.append(inverse @ pull[models])
-    return np.concatenate(out)
+    out: Array = cofactors @ absorbed.pull[np.nonzero(counts)[1]]
+    return out
 
 
 def _noise_variance(M: Array, xy: Array, yy: Array, c: int, n: int) -> Array:

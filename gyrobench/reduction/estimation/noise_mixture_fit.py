@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
+from gyrobench.reduction.estimation.normal_equations import NormalEquations
 from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 from gyrobench.reduction.estimation.uncertainty import NORMAL
@@ -130,9 +131,9 @@ def fit(
     T = np.zeros((start.size, start.size))  # back from the columns of both
     T[:p, :p] = np.linalg.inv(R) / scale[:, None]
     T[p:, p:] = np.diag(1.0 / z_scale)
-    likely, unit = _all_in(blocks, M, xy, yy, logdet, n, p, grid.prior)
-    each = list(nuisance_states.states(blocks, z_scale, M, p, likely, unit))
-    parts = [_posterior(s, M, xy, yy, logdet, n, p) for s in each]
+    equations, likely, unit = _all_in(blocks, M, xy, yy, logdet, n, p, grid.prior)
+    each = list(nuisance_states.states(blocks, z_scale, equations.S, np.einsum("gcc->gc", M)[:, p:], likely, unit))
+    parts = [_posterior(s, equations, logdet, n, p) for s in each]
     ll = np.array([part[0] for part in parts]) + np.log(grid.prior)  # (states, models)
     white_only = (grid.share == 0.0) & (grid.reading == 0.0)
     tiny = 1e-12 * np.linalg.norm(y)
@@ -149,16 +150,16 @@ def fit(
     beta = flat @ estimates
     off = estimates - beta
     counts = flat > LIGHT * flat.max()
-    chosen = zip(each, parts, counts.reshape(w.shape), strict=True)
-    covariances = [_covariance(s, part[2], part[3], models, start.size) for s, part, models in chosen]
-    cov_each = T @ np.concatenate(covariances) @ T.T
+    chosen = zip(each, counts.reshape(w.shape), strict=True)
+    cofactors = np.concatenate([equations.cofactors(s.extra, s.precision, models) for s, models in chosen])
+    cov_each = T @ (s2[counts, None, None] * cofactors) @ T.T
     best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
     dof = n - p - each[best].flat
     slow_drift = _slow(grid, t0, t1)
     slow_drift = np.tile(slow_drift, len(each))[counts]
     mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof, slow_drift)
     if stated.size:
-        pulled = T @ known_errors.pulled(absorbed, each, parts, counts.reshape(w.shape))
+        pulled = T @ known_errors.pulled(absorbed, cofactors, counts.reshape(w.shape))
         part = pulled @ pulled.transpose(0, 2, 1)
         # the errors are of known size: what the scatter says of the noise is not of them
         extra = 1.0 - s2[counts] / np.tile(absorbed.variance, len(each))[counts]
@@ -167,7 +168,7 @@ def fit(
             mixture, covariance=cov_each + extra[:, None, None] * part, known=likeliest @ likeliest.T, known_each=part
         )
     evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
-    keep = np.concatenate([np.ones(p, bool), *(np.full(e.block.columns.shape[1], e.joined) for e in evidence)])
+    keep = np.concatenate([np.ones(p, bool), *(_repeated(e.block, e.joined) for e in evidence)])
     mixture = replace(
         mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep],
         known=None if mixture.known is None else mixture.known[np.ix_(keep, keep)],
@@ -186,7 +187,7 @@ def fit(
     covariance = covariance * np.outer(u / sd, u / sd)
     probability = mixture.outside(eye, np.abs(beta[keep]))
 
-    index, at = each[best].index, int(best) * grid.tau.size + int(k)
+    index, at = each[best].index(p), int(best) * grid.tau.size + int(k)
     only = slice(k, k + 1)
     one = grid.tau[only], grid.share[only], grid.reading[only]
     Zk = noise.whiten(t0, t1, both, *one)[0][:, 0, :]
@@ -194,7 +195,8 @@ def fit(
     scatter = Zk[:, -1] - Zk[:, index] @ b[at, index] - Zk[:, c:-1] @ z
     plain = np.sum(Zk[:, c:-1] ** 2, axis=0) > absorbed.variance[k]  # told from the noise: the fit takes it away
     model = float(grid.tau[k]), float(grid.share[k]), float(grid.reading[k])
-    Mk = M[k][np.ix_(index, index)] + np.diag(each[best].precision[k])
+    Mk = M[k][np.ix_(index, index)]
+    Mk[range(p, len(index)), range(p, len(index))] += each[best].precision[k]
     own = noise.whiten_transposed(t0, t1, Zk[:, [*index, *range(c, c + stated.shape[1])]], model).T
     gain = np.zeros((start.size, n))
     gain[index] = np.linalg.solve(Mk, own[: len(index)] - absorbed.taken[k][index] @ own[len(index) :])
@@ -253,50 +255,42 @@ def _listed(grid: noise.NoiseGrid, weight: Array, order: NDArray[np.intp]) -> Ar
 
 def _all_in(
     blocks: Sequence[Block], M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int, prior: Array
-) -> tuple[Array, float]:
-    """Weights (G,) of the noise models with all single effects in the design; standard deviation of unit weight."""
-    single = np.concatenate([np.ones(p, bool), *(np.full(b.columns.shape[1], not b.scatter) for b in blocks)])
-    A, c = M[:, single][:, :, single], xy[:, single]
+) -> tuple[NormalEquations, Array, float]:
+    """Normal equations without the p coefficients; with all single effects in the design: weights (G,) of the noise
+    models and standard deviation of unit weight.
+    """
+    single = np.flatnonzero(np.concatenate([np.empty(0, bool), *(_repeated(b, not b.scatter) for b in blocks)]))
     try:
-        inverse = np.linalg.inv(A)
+        equations = NormalEquations.of(M, xy, yy, p)
+        _, rss, determinant = equations.solve(single.tolist())
     except np.linalg.LinAlgError:
         names = ", ".join(b.name for b in blocks)
         raise RegressionError(
             f"{n} windows cannot tell apart what may be in them beside the coefficients ({names}); set nuisances = "
             "none, or record more"
         ) from None
-    rss = np.maximum(yy - np.einsum("gp,gpq,gq->g", c, inverse, c), 1e-300)
-    m = n - A.shape[1]
-    ll = np.log(prior) - 0.5 * (logdet + np.linalg.slogdet(A)[1] + m * np.log(rss))
+    rss = np.maximum(rss, 1e-300)
+    m = n - p - single.size
+    ll = np.log(prior) - 0.5 * (logdet + determinant + m * np.log(rss))
     likely = np.exp(ll - ll.max())
     likely /= likely.sum()
-    return likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
+    return equations, likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
 
 
-def _posterior(
-    s: State, M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int
-) -> tuple[Array, Array, Array, Array]:
-    """Log likelihood, coefficients (G, all), variance of unit weight and cofactors (G, k, k) of the k in s.index."""
-    index = np.array(s.index)
-    A = M[:, index][:, :, index]
-    np.einsum("gpp->gp", A)[:] += s.precision
-    inverse = np.asarray(np.linalg.inv(A), dtype=float)
-    b: Array = np.zeros(xy.shape)
-    b[:, index] = np.einsum("gpq,gq->gp", inverse, xy[:, index])
-    rss = np.maximum(yy - np.einsum("gp,gp->g", xy, b), 0.0)
+def _repeated(block: Block, value: bool) -> NDArray[np.bool_]:
+    """A value for each column of a block."""
+    return np.full(block.columns.shape[1], value)
+
+
+def _posterior(s: State, equations: NormalEquations, logdet: Array, n: int, p: int) -> tuple[Array, Array, Array]:
+    """Log likelihood (G,), coefficients (G, all) and variance of unit weight (G,) of a combination."""
+    b, rss, determinant = equations.solve(s.extra, s.precision)
+    rss = np.maximum(rss, 0.0)
     m = n - p - s.flat
-    ll = -0.5 * (logdet + np.linalg.slogdet(A)[1] + m * np.log(np.maximum(math.pi * rss, 1e-300)))
+    ll = -0.5 * (logdet + determinant + m * np.log(np.maximum(math.pi * rss, 1e-300)))
     ll += s.log_weight + math.lgamma(m / 2.0)
     s2: Array = rss / m
-    return ll, b, s2, inverse
-
-
-def _covariance(s: State, s2: Array, cofactors: Array, models: NDArray[np.bool_], size: int) -> Array:
-    """Covariance (m, size, size) of the coefficients under those ``models`` (G,) that are true."""
-    index = np.array(s.index)
-    covariance = np.zeros((int(models.sum()), size, size))
-    covariance[:, index[:, None], index] = s2[models, None, None] * cofactors[models]
-    return covariance
+    return ll, b, s2
 
 
 def _evidence(

@@ -50,60 +50,65 @@ class Block:
 
 @dataclass(frozen=True)
 class State:
-    """One combination: indices of its columns among all, and for each noise model (G) the precision of the prior of
-    each column (0: flat), in units of the noise, and the log weight; scatter: standard deviation (G,) of each block.
+    """One combination: numbers of its columns among those of all effects, and for each noise model (G) the precision
+    of the prior of each of them (0: flat), in units of the noise, and the log weight; scatter: standard deviation (G,)
+    of each block.
     """
 
     blocks: tuple[bool, ...]
-    index: list[int]
-    precision: Array  # (G, len(index))
+    extra: list[int]
+    precision: Array  # (G, len(extra))
     log_weight: Array  # (G,)
     flat: int  # columns of single effects
     scatter: dict[int, Array]
 
+    def index(self, p: int) -> list[int]:
+        """Numbers of all its columns, p coefficients before those of the effects."""
+        return [*range(p), *(p + e for e in self.extra)]
 
-def states(blocks: Sequence[Block], scale: Array, M: Array, p: int, likely: Array, sigma: float) -> Iterator[State]:
-    """The combinations of ``blocks``, whose columns, divided by scale (k,), follow p others in the moments M (G, p+k,
-    p+k) of the whitened columns.
+
+def states(
+    blocks: Sequence[Block], scale: Array, S: Array, square: Array, likely: Array, sigma: float
+) -> Iterator[State]:
+    """The combinations of ``blocks``, whose columns are divided by scale (k,).
+
+    S (G, k, k): of the docstring above, of all columns; square (G, k): sums of squares of the whitened columns.
 
     likely (G,), sigma: weights of the noise models and mean standard deviation of unit weight, when all single effects
     are in.  They give the size of the priors, the same for all models: one that followed each model, or the noise left
     by each combination, would favour the quick noises.
     """
-    places, at = [], p
+    models, places, at = len(S), [], 0
     for b in blocks:
         places.append(list(range(at, at + b.columns.shape[1])))
         at += b.columns.shape[1]
     options = [(0.0, *SCATTERS) if b.scatter else (0.0, SIZE) for b in blocks]
     most = len(blocks) if math.prod(len(o) for o in options) <= MOST else 2
-    inside = np.linalg.inv(M[:, :p, :p])
     alone = []  # of each block: log weight of a single effect, standard deviation of a scatter in SCATTERS
     for b, own in zip(blocks, places, strict=True):
         if b.scatter:
-            one = np.median(M[:, own, own] * scale[[o - p for o in own]] ** 2, axis=1)
+            one = np.median(square[:, own] * scale[own] ** 2, axis=1)
             alone.append(math.exp(-0.5 * float(likely @ np.log(one))))
         else:
-            cross = M[:, own, :p]
-            S = M[:, own][:, :, own] - cross @ inside @ cross.transpose(0, 2, 1)
             unit = SIZE * sigma * math.sqrt(2.0 * math.pi)
-            alone.append(0.5 * float(likely @ np.linalg.slogdet(S)[1]) - len(own) * math.log(unit))
+            alone.append(0.5 * float(likely @ np.linalg.slogdet(S[:, own][:, :, own])[1]) - len(own) * math.log(unit))
     for chosen in product(*options):
         if sum(c > 0.0 for c in chosen) > most:
             continue
-        index, flat = list(range(p)), 0
-        precision = [np.zeros((M.shape[0], p))]
-        weight = np.full(M.shape[0], len(blocks) * math.log(0.5))
+        extra: list[int] = []
+        flat, precision = 0, [np.zeros((models, 0))]
+        weight = np.full(models, len(blocks) * math.log(0.5))
         scatter: dict[int, Array] = {}
         for j, (b, size, own) in enumerate(zip(blocks, chosen, places, strict=True)):
             if not size:
                 continue
-            index += own
+            extra += own
             if b.scatter:
-                scatter[j] = np.full(M.shape[0], size * alone[j])
-                precision.append(1.0 / np.square(np.outer(scatter[j], scale[[o - p for o in own]])))
+                scatter[j] = np.full(models, size * alone[j])
+                precision.append(1.0 / np.square(np.outer(scatter[j], scale[own])))
                 weight += 0.5 * np.sum(np.log(precision[-1]), axis=1) + math.log(OCTAVE)
             else:
                 weight += alone[j]
-                precision.append(np.zeros((M.shape[0], len(own))))
+                precision.append(np.zeros((models, len(own))))
                 flat += len(own)
-        yield State(tuple(c > 0.0 for c in chosen), index, np.concatenate(precision, axis=1), weight, flat, scatter)
+        yield State(tuple(c > 0.0 for c in chosen), extra, np.concatenate(precision, axis=1), weight, flat, scatter)

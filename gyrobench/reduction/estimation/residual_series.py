@@ -28,7 +28,8 @@ def stretches(t0: Array, t1: Array, x: Array, tolerance: float = 0.01) -> list[t
     scale = tolerance * float(np.median(length))
     new = (np.abs(t0[1:] - t1[:-1]) > scale) | (np.abs(np.diff(length)) > scale)
     edges = [0, *(np.flatnonzero(new) + 1).tolist(), x.size]
-    return [(float(np.mean(length[a:b])), x[a:b]) for a, b in pairwise(edges)]
+    total = np.add.reduceat(length, edges[:-1]).tolist()
+    return [(s / (b - a), x[a:b]) for s, (a, b) in zip(total, pairwise(edges), strict=True)]
 
 
 def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
@@ -93,12 +94,13 @@ def ljung_box_of_fit(parts: list[Array], lags: int, null: Array | None) -> tuple
 def _portmanteau(x: Array, group: NDArray[np.int_], lags: int) -> Array:
     """Return Q (as of :func:`ljung_box`) of rows x (..., n); pairs across groups are left out."""
     n = x.shape[-1]
-    power = np.maximum(np.sum(x * x, axis=-1), 1e-300)
+    power = np.maximum(np.einsum("...i,...i", x, x), 1e-300)
     q = np.zeros(x.shape[:-1])
     for k in range(1, min(lags, n - 1) + 1):
         pair = group[k:] == group[:-k]
         if pairs := int(np.count_nonzero(pair)):
-            q += (np.sum(x[..., k:] * x[..., :-k] * pair, axis=-1) / power * n) ** 2 / pairs
+            later = x[..., k:] if pairs == pair.size else x[..., k:] * pair
+            q += (np.einsum("...i,...i", later, x[..., :-k]) / power * n) ** 2 / pairs
     out: Array = (n + 2) / n * q
     return out
 
@@ -132,7 +134,9 @@ def normality(x: Array) -> tuple[float, float]:
     """
     x = x[:5000]
     w, p = stats.shapiro(x)
-    light = stats.kurtosis(x) < 0.0 and abs(stats.skew(x)) < 2.0 * math.sqrt(6.0 / x.size)
+    d = x - x.mean()
+    m2, m3, m4 = (float(np.mean(d**k)) for k in (2, 3, 4))  # central moments: kurtosis m4/m2^2 - 3, skewness m3/m2^1.5
+    light = m4 < 3.0 * m2**2 and abs(m3) < 2.0 * math.sqrt(6.0 / x.size) * m2**1.5
     return float(w), 1.0 if light else float(p)
 
 

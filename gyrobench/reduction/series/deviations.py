@@ -18,6 +18,7 @@ which then falls although the instrument does not.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterable, Iterator
@@ -244,6 +245,7 @@ def deviations(
     return total.result()
 
 
+@functools.lru_cache(maxsize=4096)  # records of one plan have the same
 def degrees_of_freedom(kind: str, m: float, count: float, alpha: int) -> float:
     """Return the equivalent ones of ``count`` differences over m cells, noise of S ~ f^alpha, alpha 2, 0, -1, ..."""
     import allantools
