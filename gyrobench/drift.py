@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -166,12 +166,21 @@ def drift(xyz: ArrayLike, coefficients: Mapping[str, float]) -> NDArray[np.float
     return out
 
 
-def quadratic_form(coefficients: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return Q (4, 4) with omega_d = v @ Q @ v, v = (X, Y, Z, 1): :func:`drift` of one point, quickly."""
-    Q = np.zeros((4, 4))
-    for first, second, value in zip(*_factors(tuple(coefficients)), coefficients.values(), strict=True):
-        Q[first, second] += value
-    return Q
+def at_points(coefficients: Mapping[str, float]) -> Callable[[tuple[float, float, float]], float]:
+    """Return :func:`drift` of a single point (X, Y, Z), in plain numbers: thirty times as quick for one."""
+    factors = [
+        (value, first, second)
+        for first, second, value in zip(*_factors(tuple(coefficients)), coefficients.values(), strict=True)
+        if value != 0.0
+    ]
+
+    def rate(at: tuple[float, float, float]) -> float:
+        v, total = (*at, 1.0), 0.0
+        for value, first, second in factors:
+            total += value * v[first] * v[second]
+        return total
+
+    return rate
 
 
 # --------------------------------------------------------------------------------------------- signs

@@ -117,9 +117,8 @@ def test_two_channels_names_and_refusals() -> None:
     assert set(drift.terms_2dof("y", 9)) == {f"Dy_{n}" for n in ("0", "x", "y", "z", "yy", "zz", "xy", "xz", "yz")}
     assert [drift.order(n) for n in drift.NAMES_2DOF["y"]] == [drift.order(n) for n in drift.NAMES]
     assert drift.regressors([2.0, 3.0, 5.0], ("Dy_0", "Dy_x", "Dx_yz", "Dy_zz")).tolist() == [1, 2, 15, 25]
-    v = np.array([2.0, 3.0, 5.0, 1.0])
-    Q = drift.quadratic_form({"Dy_0": 1.0, "Dy_x": 10.0, "Dx_yz": 100.0, "Dy_zz": 1000.0})
-    assert v @ Q @ v == 1.0 + 20.0 + 1500.0 + 25000.0
+    rate = drift.at_points({"Dy_0": 1.0, "Dy_x": 10.0, "Dx_yz": 100.0, "Dy_zz": 1000.0, "Dy_z": 0.0})
+    assert rate((2.0, 3.0, 5.0)) == 1.0 + 20.0 + 1500.0 + 25000.0
     only = drift.from_physical_2dof(0.2, 0.25, {"K_zz": 3e-9, "K_yy": 1e-9})
     assert only.keys() == {"Dy_yz"}
     with pytest.raises(KeyError, match="Dy_x"):

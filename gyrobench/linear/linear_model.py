@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,8 +30,8 @@ from numpy.typing import NDArray
 
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.part_linearization import jacobians
-from gyrobench.linear.sampled_model import Step, sampled_step
+from gyrobench.linear.block import Block, block_of, step_of
+from gyrobench.linear.sampled_model import Step
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
 from gyrobench.system.sockets import socket
@@ -45,37 +44,6 @@ PASSES = 3  # along the wires, to find the operating point
 
 class LinearizationError(GyrobenchError):
     """The system has no linear model; the text says why."""
-
-
-@dataclass
-class Block:
-    """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable".
-
-    within: B in the middle of each internal step, where a part follows an input through the communication step.
-    """
-
-    slot: str
-    inputs: list[str]
-    outputs: list[str]
-    states: list[str]
-    a: Array
-    b: Array
-    c: Array
-    d: Array
-    within: list[Array]
-
-    def held(self, step: float) -> tuple[Array, Array]:
-        """Return exp(A h) and its integral times B: the exact step with the inputs held."""
-        from scipy.linalg import expm
-
-        n, m = self.b.shape
-        ad, bd = np.eye(n), np.zeros((n, m))
-        for b in self.within:
-            augmented = np.zeros((n + m, n + m))
-            augmented[:n, :n], augmented[:n, n:] = self.a, b
-            transition = expm(augmented * (step / len(self.within)))
-            ad, bd = transition[:n, :n] @ ad, transition[:n, :n] @ bd + transition[:n, n:]
-        return ad, bd
 
 
 def operating_point(
@@ -136,7 +104,7 @@ class Linear:
         self.sampled: dict[str, Step] = {}
         for s in self.order:
             try:
-                model = sampled_step(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+                model = step_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
             except ValueError as error:
                 raise LinearizationError(f"{s} works in samples, and {error}") from error
             if model is not None:
@@ -163,20 +131,7 @@ class Linear:
         incoming = list(dict.fromkeys(c.input.variable for c in self.connections if c.target == slot))
         wired = [c.output.variable for c in self.connections if c.source == slot]
         outgoing = list(dict.fromkeys([*wired, *(n.partition(".")[2] for n in self.shown if n.startswith(slot + "."))]))
-        a, b, c, d = jacobians(part, incoming, outgoing)
-        within = self._within(part, incoming, b)
-        return Block(slot, incoming, outgoing, [s.name for s in part.states], a, b, c, d, within)
-
-    def _within(self, part: Component, incoming: list[str], b: Array) -> list[Array]:
-        """Return B in the middle of each internal step; the one of the communication points where it is the same."""
-        now = part.t
-        part.step_end = now + self.step
-        found = []
-        for k in range(round(self.step / part.h)):
-            part.t = now + (k + 0.5) * part.h
-            found.append(jacobians(part, incoming, [])[1])
-        part.t = part.step_end = now
-        return [b] if all(np.array_equal(x, b) for x in found) else found
+        return block_of(part, incoming, outgoing, self.step)
 
     def _late(self, c: Connection, name: str) -> bool:
         """Return whether this connection takes the output ``name`` from the previous step."""

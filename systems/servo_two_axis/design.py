@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,7 +74,7 @@ class TestModel:
     lost: float
     noise: Mapping[str, Noise]
     reading: Mapping[str, float]
-    rates: Callable[[Array], tuple[float, float]]
+    rates: geometry.Rates
     rate: Array
     acceleration: Array
 
@@ -85,7 +85,7 @@ class TestModel:
         known = {c: drift.NAMES_2DOF[c] for c in "xy"}
         beta = {c: np.array([float(p.get(f"gyro.{n}", 0.0)) for n in known[c]]) for c in "xy"}
 
-        def rates(at: Array) -> tuple[float, float]:
+        def rates(at: tuple[float, float, float]) -> tuple[float, float]:
             x, y = (float(drift.regressors(at, known[c]) @ beta[c]) for c in "xy")
             return x, y
 

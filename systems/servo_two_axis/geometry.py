@@ -26,6 +26,7 @@ MOUNTS = {
     5: (EAST, POLE), 6: (EAST, CROSS), 7: (UP, NORTH), 8: (UP, EAST),
     9: (POLE, EAST), 10: (POLE, CROSS), 11: (CROSS, EAST), 12: (CROSS, POLE),
 }  # fmt: skip
+Rates = Callable[[tuple[float, float, float]], tuple[float, float]]
 LEAST = 0.2  # of cos y  [SERVO2-LOCK]
 DAY = 2.0 * math.pi / frames.EARTH_RATE
 
@@ -56,7 +57,7 @@ def swing(mount: int, latitude: float) -> float:
 
 def path(
     mount: int, latitude: float, time: float, points: int = 241, earth_rate: float = frames.EARTH_RATE,
-    rates: Callable[[Array], tuple[float, float]] | None = None,
+    rates: Rates | None = None,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Times (points,), outer and inner angle from 0, of a gyro that starts in ``mount``; the outer unwrapped.
 
@@ -66,30 +67,36 @@ def path(
     t = np.linspace(0.0, time, points)
     rows = base(mount, latitude)
     if rates is None:
-        turned = np.array([rows @ frames.rotation(frames.pole(latitude), -a) @ rows[2] for a in earth_rate * t])
+        p, a, z = frames.pole(latitude), (-earth_rate * t)[:, None], rows[2]
+        turn = z * np.cos(a) + np.cross(p, z) * np.sin(a) + p * (p @ z) * (1.0 - np.cos(a))  # Rodrigues
+        turned = turn @ rows.T
         y = np.arcsin(np.clip(turned[:, 0], -1.0, 1.0))
         return t, np.unwrap(np.arctan2(-turned[:, 1], turned[:, 2])), y
     e1, e2, e3 = (rows @ frames.earth_rate_local(latitude, earth_rate)).tolist()
     d1, d2, d3 = (rows @ -frames.U).tolist()
 
-    def slope(v: Array) -> Array:
-        x, y = v.tolist()  # single numbers: thousands of steps, for which small arrays are ten times slower
+    def slope(x: float, y: float) -> tuple[float, float]:
         cx, sx, cy, sy = math.cos(x), math.sin(x), math.cos(y), math.sin(y)
         down, earth = cx * d3 - sx * d2, cx * e3 - sx * e2  # along the axis that the inner angle turns
-        wx, wy = rates(np.array([cy * d1 - sy * down, cx * d2 + sx * d3, sy * d1 + cy * down]))
-        return np.array([(wx - (cy * e1 - sy * earth)) / cy, wy - (cx * e2 + sx * e3)])
+        wx, wy = rates((cy * d1 - sy * down, cx * d2 + sx * d3, sy * d1 + cy * down))
+        return (wx - (cy * e1 - sy * earth)) / cy, wy - (cx * e2 + sx * e3)
 
-    angles, h = np.zeros((points, 2)), time / (points - 1)
-    for k in range(points - 1):
-        v = angles[k]
-        if abs(math.cos(v[1])) < LEAST:
-            angles[k + 1 :] = v
+    # single numbers: thousands of steps, for which small arrays are ten times slower
+    x = y = 0.0
+    angles, h = [(x, y)], time / (points - 1)
+    while len(angles) < points:
+        if abs(math.cos(y)) < LEAST:
+            angles += [(x, y)] * (points - len(angles))
             break
-        k1 = slope(v)
-        k2 = slope(v + 0.5 * h * k1)
-        k3 = slope(v + 0.5 * h * k2)
-        angles[k + 1] = v + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + slope(v + h * k3))
-    return t, angles[:, 0], angles[:, 1]
+        (x1, y1), half = slope(x, y), 0.5 * h
+        x2, y2 = slope(x + half * x1, y + half * y1)
+        x3, y3 = slope(x + half * x2, y + half * y2)
+        x4, y4 = slope(x + h * x3, y + h * y3)
+        x += h / 6.0 * (x1 + 2.0 * x2 + 2.0 * x3 + x4)
+        y += h / 6.0 * (y1 + 2.0 * y2 + 2.0 * y3 + y4)
+        angles.append((x, y))
+    outer, inner = np.array(angles).T
+    return t, outer, inner
 
 
 def force(mount: int, latitude: float, x: Array, y: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,9 @@ from gyrobench.reduction.estimation import regression
 from gyrobench.system.families.servo_expectation import capture_problems
 
 from . import geometry
+from .geometry import Rates
 
 Array = NDArray[np.float64]
-Rates = Callable[[Array], tuple[float, float]]
 DPH = units.factor("deg/h")
 WARN, MOST, MOST_SINGLE = 100.0, 1e3, 1e4  # of the condition; a single mount is warned of, not refused [SERVO2-RANK]
 TILTED = math.cos(math.radians(30.0))  # least cosine of the gyro's x and y axes to those of the plate
@@ -200,11 +200,10 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
     names = {c: drift.NAMES_2DOF[c] for c in "xy"}
     if found or not all(f"gyro.{n}" in parameters for c in "xy" for n in names[c]):
         return found
-    Qx, Qy = (drift.quadratic_form({n: parameters[f"gyro.{n}"] for n in names[c]}) for c in "xy")
+    x, y = (drift.at_points({n: parameters[f"gyro.{n}"] for n in names[c]}) for c in "xy")
 
-    def rates(at: Array) -> tuple[float, float]:
-        v = np.append(at, 1.0)
-        return float(v @ Qx @ v), float(v @ Qy @ v)
+    def rates(at: tuple[float, float, float]) -> tuple[float, float]:
+        return x(at), y(at)
 
     earth_rate = parameters.get("site.earth_rate", frames.EARTH_RATE)
     for m in dict.fromkeys(mounts):
@@ -227,7 +226,7 @@ def _capture_problems(
     at: dict[str, dict[str, tuple[float, float]]] = {"outer": {}, "inner": {}}
     for m in dict.fromkeys(mounts):
         rows = geometry.base(m, latitude)
-        drifts, earth = rates(rows @ -frames.U), rows @ frames.earth_rate_local(latitude, earth_rate)
+        drifts, earth = rates(tuple((rows @ -frames.U).tolist())), rows @ frames.earth_rate_local(latitude, earth_rate)
         for k, slot in enumerate(at):
             at[slot][f"mount {m}"] = drifts[k], float(earth[k])
     return [p for slot, where in at.items() for p in capture_problems(parameters, where, slot)]

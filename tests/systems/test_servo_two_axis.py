@@ -175,7 +175,7 @@ def test_dynamic_against_quasi_static(table: Session) -> None:
     static = {k: np.array(v) for k, v in noisy.windows.items()}
 
     def rates(at: Any) -> tuple[float, float]:
-        wx, wy = (float(drift.regressors(site.g * at, NAMES[c]) @ true[c]) for c in "xy")
+        wx, wy = (float(drift.regressors(site.g * np.array(at), NAMES[c]) @ true[c]) for c in "xy")
         return wx, wy
 
     for phase, mount in ((2, 2), (4, 4)):

@@ -1,0 +1,107 @@
+"""One part in the linear model of a system: its Jacobians and its step, found once for a point.
+
+Between the runs of a series most parts are what they were: parameters, inputs and states are the same numbers.  What
+was found for the same class, complete state and ports is taken again (:data:`KEPT` of them), to the last bit.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.component import Component
+from gyrobench.linear.part_linearization import jacobians
+from gyrobench.linear.sampled_model import Step, sampled_step
+
+Array = NDArray[np.float64]
+KEPT = 256  # parts at a point
+
+
+@dataclass
+class Block:
+    """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable".
+
+    within: B in the middle of each internal step, where a part follows an input through the communication step.
+    """
+
+    slot: str
+    inputs: list[str]
+    outputs: list[str]
+    states: list[str]
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    within: list[Array]
+    _held: dict[float, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+
+    def held(self, step: float) -> tuple[Array, Array]:
+        """Return exp(A h) and its integral times B: the exact step with the inputs held."""
+        if step not in self._held:
+            self._held[step] = self._transition(step)
+        return self._held[step]
+
+    def _transition(self, step: float) -> tuple[Array, Array]:
+        from scipy.linalg import expm
+
+        n, m = self.b.shape
+        ad, bd = np.eye(n), np.zeros((n, m))
+        for b in self.within:
+            augmented = np.zeros((n + m, n + m))
+            augmented[:n, :n], augmented[:n, n:] = self.a, b
+            transition = expm(augmented * (step / len(self.within)))
+            ad, bd = transition[:n, :n] @ ad, transition[:n, :n] @ bd + transition[:n, n:]
+        return ad, bd
+
+
+class _Point:
+    """A part at its present point; equal to another of the same class, name and complete state."""
+
+    def __init__(self, part: Component) -> None:
+        self.part = part
+        self._key = (type(part), part.instance, hashlib.sha256(repr(part.get_state()).encode()).digest())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Point) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+def block_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> Block:
+    """Return the part, slot = its instance name, linearized at its present point.  Raises ComponentError."""
+    return _block(_Point(part), tuple(inputs), tuple(outputs), step)
+
+
+def step_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
+    """Return, and raise, what :func:`gyrobench.linear.sampled_model.sampled_step` does."""
+    return _step(_Point(part), tuple(inputs), tuple(outputs), step)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> Block:
+    part = point.part
+    a, b, c, d = jacobians(part, inputs, outputs)
+    states = [s.name for s in part.states]
+    return Block(part.instance, [*inputs], [*outputs], states, a, b, c, d, _within(part, inputs, b, step))
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> Step | None:
+    return sampled_step(point.part, [*inputs], [*outputs], step)
+
+
+def _within(part: Component, inputs: tuple[str, ...], b: Array, step: float) -> list[Array]:
+    """Return B in the middle of each internal step; the one of the communication points where it is the same."""
+    now = part.t
+    part.step_end = now + step
+    found = []
+    for k in range(round(step / part.h)):
+        part.t = now + (k + 0.5) * part.h
+        found.append(jacobians(part, inputs, [])[1])
+    part.t = part.step_end = now
+    return [b] if all(np.array_equal(x, b) for x in found) else found
