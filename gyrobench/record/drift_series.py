@@ -36,6 +36,7 @@ BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
 JUMP = 100.0  # spreads of the increments of an angle
+LARGEST = 1e100  # value of a column, and the inverse of the least range: squares are numbers yet
 ROUNDING = 8.0 * float(np.finfo(float).eps)  # of an angle: its differences differ by so much where they are the same
 LONG = 1 << 20  # steps of a gap at most on the grid; of a longer one the rest is left out
 CLOCKS = ("s", "ms", "min", "h")
@@ -143,7 +144,7 @@ class DriftReader:
         self.before = math.nan  # time of the last sample
         self.last_other = dict.fromkeys(self.others, math.nan)
         self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
-        self.beginning = {s.name: np.empty(0) for s in signals}  # first values, rad/s or rad, as they are in the file
+        self.beginning = {s.name: np.empty(0) for s in signals}  # first values, rad/s, or increments, rad
         self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
         self.steps = {name: [math.inf, -math.inf, 0.0] for name in self.angles}  # least, largest; largest angle
 
@@ -268,18 +269,20 @@ class DriftReader:
     def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
         self._extreme(s, value)
         value = value * s.factor if s.factor != 1.0 else value
-        if (kept := self.beginning[s.name]).size < BEGINNING:
-            self.beginning[s.name] = np.append(kept, value[: BEGINNING - kept.size])
-        if s.kind == RATE:
-            return value
-        if s.kind == PER_SAMPLE:
-            return value / self.about.step
+        if s.kind in (RATE, PER_SAMPLE):
+            self._begin(s, value)
+            return value if s.kind == RATE else value / self.about.step
         d = self.angles[s.name].increments(value, follows)
+        self._begin(s, d)
         if (there := d[np.isfinite(d)]).size:
             low, high, size = self.steps[s.name]
             largest = max(size, float(np.max(np.abs(value))))
             self.steps[s.name] = [min(low, float(there.min())), max(high, float(there.max())), largest]
         return d / dt
+
+    def _begin(self, s: Signal, value: Array) -> None:
+        if (kept := self.beginning[s.name]).size < BEGINNING:
+            self.beginning[s.name] = np.append(kept, value[np.isfinite(value)])[:BEGINNING]
 
     def _extreme(self, s: Signal, value: Array) -> None:
         """Count samples that stay at the largest or smallest value: a converter at its limit."""
@@ -370,6 +373,12 @@ class DriftReader:
                 raise DataError(
                     self.table.source, [f"column '{s.name}': all its values are {e[0] * s.factor:.6g} (SI)"]
                 )
+            if max(-e[0], e[1]) > LARGEST or e[1] - e[0] < 1.0 / LARGEST:
+                raise DataError(
+                    self.table.source,
+                    [f"column '{s.name}': values from {e[0]:.6g} to {e[1]:.6g} (SI): squares of them are beyond the "
+                     "numbers of the computer; is the unit right?"],
+                )  # fmt: skip
         for name, (low, high, size) in self.steps.items():
             if high - low <= ROUNDING * size:
                 raise DataError(

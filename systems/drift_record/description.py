@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.record import sampling
-from gyrobench.record.drift_columns import harmonic_names
+from gyrobench.record.drift_columns import ANGLE, harmonic_names
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
@@ -29,6 +29,9 @@ DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
 STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
 WILD = 20.0  # standard deviations
 COUNTS = 3.0  # steps of the values' resolution within which a sample is not called wild
+NOTHING = 1e-9  # of the standard deviation of a rate: rounding
+MORE_DIGITS = "Record more digits."
+FINER_ANGLE = "Read a finer angle, or reduce one row in several: the change within a sample must be larger."
 MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
 
 
@@ -181,6 +184,40 @@ def misfit_text(noise: NoiseCoefficients) -> str:
     return f"An ordinate of the spectrum stands out at {check.line:.4g} Hz (p {_p(check.line_p)}): a line is left."
 
 
+def coarse_text(name: str, run: RunDocument) -> str:
+    """Return that the values of a column are rounded too coarsely; "" where they are not."""
+    column: Mapping[str, Any] = run.series["columns"][name] if run.series else {}
+    if not column or column["white"]:
+        return ""
+    q = column["resolution"]
+    if column["kind"] == "rate":
+        return (
+            f"The values are rounded to {number(q / DPH)} °/h, more than twice the noise of a sample: the error of "
+            "rounding is not white, and N is that of the rounding."
+        )
+    return (
+        f"The angle is rounded to {number(q / ARCSEC)}″, more than 2.5 times its random change within a sample: errors "
+        "of the rounding follow from one another, and the coefficients are off by more than their intervals say."
+    )
+
+
+def explained_text(p: Prepared) -> str:
+    """Return that lines and other columns explain the rate to the rounding of its numbers; "" where they do not."""
+    left, of = float(np.nanstd(p.clean)), float(np.nanstd(p.rate))
+    if p.clean is p.rate or left > NOTHING * of:
+        return ""
+    return (
+        f"Lines or other columns explain all of the rate but {left / of:.1g} of its standard deviation: the "
+        "coefficients are those of what is left of it by rounding."
+    )
+
+
+def doubts(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[str]:
+    """Return why no limit can be judged by the coefficients: the model or the readings are not as assumed."""
+    misfit = misfit_text(noise) if noise.check is not None and noise.check.p <= MISFIT else ""
+    return [text for text in (misfit, coarse_text(p.name, run), explained_text(p)) if text]
+
+
 def _p(p: float) -> str:
     text = write_p(p).text
     return text if text.startswith("<") else f"= {text}"
@@ -214,17 +251,17 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[st
             f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
             "models take the samples as even. Sample by a clock, or resample."
         )
-    if about and about["stuck"].get(p.name, 0) > max(10, 1e-4 * about["samples"]):
+    ends = about["stuck"].get(p.name, 0) if about and column["kind"] != ANGLE and column["white"] else 0
+    if ends > max(10, 1e-4 * about.get("samples", 0)):
         out.append(
-            f"{about['stuck'][p.name]} samples stay at the largest or smallest value of the file: the converter may "
+            f"{ends} samples stay at the largest or smallest value of the file: the converter may "
             "have been at its limit. The coefficients are too small then. Use a larger range."
         )
-    if column and column["kind"] == "rate" and not column["white"]:
-        q = column["resolution"]
-        out.append(
-            f"The values are rounded to {number(q / DPH)} °/h, more than twice the noise of a sample: the error of "
-            "rounding is not white, and N is that of the rounding. Record more digits."
-        )
+    if rounding := coarse_text(p.name, run):
+        out.append(f"{rounding} {MORE_DIGITS if column['kind'] == 'rate' else FINER_ANGLE}")
+    if explained := explained_text(p):
+        remedy = " Leave out what was computed from the rate." if any(r.kept for r in p.regressions) else ""
+        out.append(explained + remedy)
     bandwidth = float(run.options.get("bandwidth") or 0.0)
     means = (run.series or {}).get("samples") == "means"
     if about and bandwidth and not means and (excess := folded(about["step"], bandwidth)).ratio > 1.0:

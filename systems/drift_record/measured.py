@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +25,13 @@ from gyrobench.record.drift_series import DriftReader, Progress, as_dict
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator
-from gyrobench.reduction.series.quantization import quantization
+from gyrobench.reduction.series.quantization import angle_quantization, quantization
 from gyrobench.system.lab_record import TEXTS, measured_run
 from gyrobench.system.system import MeasuredData, System
 
 Array = NDArray[np.float64]
 ATTITUDE = "at rest"
+EXACT = 1e-15  # of an angle: to which decimals of a file are exact
 LONG = 1 << 22  # missing samples from which on a deviation does not reach across a gap
 NUMBERS = ("deviation", "low", "high", "edf", "count", "exponent")  # of a deviation
 TEMPLATE = """\
@@ -89,7 +90,8 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
         (s.name for s in signals), "rad/s")}  # fmt: skip
     run.series = {
         "columns": {
-            s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name])} for s in signals
+            s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name], reader.steps)}
+            for s in signals
         },
         "others": reader.others,
         "unused": [n for n in named(table.head) if n not in si] if data.is_file() else [],
@@ -102,15 +104,21 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     return Record(windows, {}, run)
 
 
-def _rounding(s: Signal, values: Array) -> dict[str, Any]:
-    """Return the step to which values (rad/s or rad) are rounded, 0: none, and whether that is a white error."""
-    counts = values / s.factor
+def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Return the step to which rates (rad/s) or an angle (rad) are rounded, 0: none, and whether that is a white error.
+
+    values: rates, or increments of the angle; angles: least and largest increment and largest value of those that are
+    cumulative, whose rounding in the computer their increments have.
+    """
+    counts, step, largest = values / s.factor, 0.0, angles[s.name][2] if s.name in angles else 0.0
     if s.unit in ("", "1") and s.kind != RATE and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
-        return {"resolution": abs(s.factor), "white": True}  # a cumulative count repeats no value to see its step by
+        step = abs(s.factor)
+    if largest and not step:
+        values = np.rint(values / (EXACT * largest)) * (EXACT * largest)
     try:
-        q = quantization(values)
+        q = quantization(values) if s.kind == RATE else angle_quantization(values, step)
     except SeriesError:
-        return {"resolution": 0.0, "white": True}
+        return {"resolution": step, "white": not step}  # all the same number of counts
     return {"resolution": q.step, "white": q.white}
 
 

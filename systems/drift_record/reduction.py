@@ -96,6 +96,10 @@ def from_record(record: Record, specification: Specification | None = None) -> D
         simulated=not run.measured,
         columns=[_column(a, run, remove) for a in analysed],
     )  # fmt: skip
+    for a in analysed:
+        names = {c.name for c in coefficients if c.name.partition(" ")[2] in ("", a.of.name)}
+        reasons = [of[a.of.name] + text for text in description.doubts(a.of, a.noise, run)]
+        uncertainty.withhold(result, reasons, names=names)
     return run_metadata.finish(result, record)
 
 

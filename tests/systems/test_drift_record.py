@@ -216,7 +216,8 @@ def test_what_is_just_determined_is_said_with_the_figure() -> None:
     assert [getattr(noise, n).just_determined for n in "NBKRQ"] == [False, True, False, False, True]
     meanings = {n: reduction._coefficient(SimpleNamespace(noise=noise), n, False, None, 0.0).meaning for n in "NBKRQ"}
     assert [n for n, words in meanings.items() if words.endswith("; just determined")] == ["B", "Q"]
-    quiet = SimpleNamespace(clean=np.zeros(600), stretch=np.zeros(600), name="rate")
+    none = np.zeros(600)
+    quiet = SimpleNamespace(clean=none, rate=none, stretch=none, name="rate")
     (said,) = description.warnings(quiet, noise, SimpleNamespace(series=None, options={}))
     assert said.startswith("B, Q: just determined, below 4 u: of such estimates at least one interval in four misses")
 

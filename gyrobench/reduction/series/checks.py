@@ -31,7 +31,7 @@ def checked(x: Any, minimum: int = 2, what: str = "series") -> Array:
         first = int(np.flatnonzero(~np.isfinite(out))[0])
         raise SeriesError(f"{what}: value {first + 1} is not a finite number; analyse the stretches between gaps")
     if high - low <= 1e-14 * max(abs(low), abs(high)):
-        raise SeriesError(f"{what}: all values are equal; there is nothing to analyse")
+        raise SeriesError(f"{what}: all values are equal to 1e-14 of their size; there is nothing to analyse")
     return out
 
 

@@ -312,7 +312,7 @@ def slopes(deviation: Deviation) -> NoiseCoefficients:
     lowest line over the upper ends of the deviation.  Terms are read as if alone: where two are of like size, the
     reading is high by up to the square root of two, and the interval does not cover.
     """
-    usable = deviation.edf >= 5.0
+    usable = (deviation.edf >= 5.0) & (deviation.deviation > 0.0)
     tau, dev = deviation.tau[usable], deviation.deviation[usable]
     low, high = deviation.low[usable], deviation.high[usable]
     local = np.diff(np.log(dev)) / np.diff(np.log(tau))
