@@ -14,7 +14,7 @@ from gyrobench.files import write_whole
 from gyrobench.packaging import load_part
 from gyrobench.record.record import Record
 from gyrobench.reduction.noise_coefficients_table import TERMS
-from gyrobench.reduction.series.gyro_noise import gyro_noise
+from gyrobench.reduction.series.gyro_noise import FLICKER_HIGH, FLICKER_LOW, gyro_noise
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 from gyrobench.result import Coefficient, Result
 
@@ -87,6 +87,8 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
         for name, value in gyro_noise(noise, interval, duration).items():
             term = OF.get(name)
             said = f"  # {_words(coefficients[term])}" if term else ""
+            if name == "flicker_tau":
+                said = f"  # flicker from {FLICKER_LOW / value:.2g} to {FLICKER_HIGH / value:.2g} Hz"
             written.setdefault(named(name, channel), f"{named(name, channel)} = {value!r}{said}")
     write_whole(file, ("\n".join([*lines, *written.values()]) + "\n").encode())
 

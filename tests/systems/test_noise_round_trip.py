@@ -17,7 +17,7 @@ from gyrobench.commands.arguments import read_settings
 from gyrobench.engine.session import Session
 from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.deviations import deviations
-from gyrobench.reduction.series.gyro_noise import gyro_noise
+from gyrobench.reduction.series.gyro_noise import gyro_noise, slow_density
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
 from gyrobench.result import Coefficient
 from gyrobench.system.system import load_system
@@ -100,6 +100,23 @@ def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
     assert {n.removeprefix("gyro."): float(x) for n, x in text.items()} == pytest.approx(expected, rel=1e-12)
     head = (tmp_path / "v.toml").read_text().partition("[gyro]")[0]
     assert "# Noise of gyro 7.csv (1500 s)" in head and "# Warning of the reduction: the test line" in head
+
+
+def test_flicker_of_a_fast_record_goes_to_half_its_sampling_rate() -> None:
+    """100 Hz for ten minutes: B2/(2 pi f) from 1/600 to 50 Hz within 1.5 %; with the 1e5 s of slow ones a fifth at 50.
+
+    There w tau_11 = 7.49: 2 0.588 7.49/57.1 + 2 0.441 30.0/898 + 0.007 = 0.19.  A longer record than the 5.7 decades that a gyro has keeps its length: 0.055 4^11 / 1e4 = 23 Hz.
+    """
+    none, some = Estimate(0.0, 0.0, 1e-7, False), Estimate(2e-7, 1e-7, 3e-7, True)
+    noise = NoiseCoefficients(none, some, none, none, none)
+    f = np.geomspace(1.0 / 600.0, 50.0, 40)
+    values = gyro_noise(noise, 0.01, 600.0)
+    assert values["flicker_tau"] == pytest.approx(0.11 * 4.0**11 * 0.01)
+    flicker = slow_density(values, f) * 2.0 * math.pi * f / 4e-14
+    assert flicker == pytest.approx(np.ones(f.size), abs=0.015)
+    slow = slow_density({**values, "flicker_tau": 1e5}, f) * 2.0 * math.pi * f / 4e-14
+    assert slow[-1] == pytest.approx(0.19, abs=0.005) and slow[0] == pytest.approx(1.0, abs=0.015)
+    assert gyro_noise(noise, 0.01, 1e4)["flicker_tau"] == 1e4
 
 
 def test_channels(tmp_path: Path) -> None:

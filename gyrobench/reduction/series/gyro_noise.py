@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
 Array = NDArray[np.float64]
-FLICKER_TAU = 1e5  # s, or the length of the record: flicker ends at 0.46 / tau, below its first frequency
+FLICKER_TAU = 1e5  # s, or the length of the record: flicker begins at 0.46 / tau, below its first frequency
+FLICKER_LOW, FLICKER_HIGH = 0.46, 0.055 * 4.0**11  # over tau: from and to where the PSD is that of flicker
 ANGLE_TAU = 0.2  # of a sample: errors of readings one sample apart are correlated by e^-5 < 1 %
 #: noise of the part that is none of the five terms, or that the record has in them already
 OFF = ("markov", "pickoff")
@@ -20,8 +21,10 @@ OFF = ("markov", "pickoff")
 def gyro_noise(noise: NoiseCoefficients, interval: float, duration: float) -> dict[str, float]:
     """Return parameters of ``floated_gyro`` by name, SI; interval, duration: s, of a sample and of the record.
 
-    A coefficient that the record does not determine is 0.  The noise of a loop's current reading is not taken off N;
-    the angle noise shows in the current where 0.2 interval is above the time constants of the loop.
+    A coefficient that the record does not determine is 0.  Flicker goes to half the sampling rate or, of more samples
+    than 460,000, from the length of the record as far as the gyro has it, 5.7 decades.  The noise of a loop's current
+    reading is not taken off N; the angle noise shows in the current where 0.2 interval is above the time constants of
+    the loop.
     """
 
     def size(e: Estimate) -> float:
@@ -30,7 +33,7 @@ def gyro_noise(noise: NoiseCoefficients, interval: float, duration: float) -> di
     return {
         "white": size(noise.N),
         "flicker": size(noise.B),
-        "flicker_tau": max(FLICKER_TAU, duration),
+        "flicker_tau": max(duration, min(FLICKER_TAU, FLICKER_HIGH * 2.0 * interval)),
         "walk": size(noise.K),
         "ramp": size(noise.R),
         "quantization": size(noise.Q),
