@@ -10,6 +10,7 @@
 #ifndef _WIN32
 #define _POSIX_C_SOURCE 199309L
 #endif
+#include <fenv.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -36,6 +37,7 @@ enum { MORE = 0, DONE = 1, FULL = 2, FAILED = 3 };
 enum { CALL_SET = 1, CALL_STEP = 15, CALL_GET = 16 };   /* the first and the last plus the code of the type; 0: none */
 enum { TIMED_EVERY = 1009, TIMED_FIRST = 504 };
 enum { NO_PROGRESS = 100, ENDED = 101, OUT_OF_RANGE = 102 }; /* beside the statuses of FMI */
+enum { BLOCK = 4096 }; /* steps */
 #define REST 1e-9 /* of a step: a remainder below it counts as done */
 #define EXACT 9007199254740992.0 /* 2^53: a double holds every whole number up to it */
 
@@ -48,7 +50,10 @@ enum { NO_PROGRESS = 100, ENDED = 101, OUT_OF_RANGE = 102 }; /* beside the statu
 enum { REAL = 0, FLOAT64 = 3, FLOAT32 = 4, BOOLEAN3 = 13 };
 
 typedef int (*step2_function)(void *, double, double, int);
-typedef int (*linked_function)(void *, double, double); /* gyrobench_step of instance.h */
+typedef int (*linked_function)(void *, double, double); /* gyrobench_step and gyrobench_quick_step of instance.h */
+typedef int (*finite_function)(void *); /* gyrobench_finite of instance.h */
+typedef int (*get_state_function)(void *, void **); /* frees, too */
+typedef int (*set_state_function)(void *, void *);
 typedef int (*step3_function)(void *, double, double, bool, bool *, bool *, bool *, double *);
 typedef int (*values2_function)(void *, const unsigned int *, size_t, void *);
 typedef int (*values3_function)(void *, const unsigned int *, size_t, void *, size_t);
@@ -75,6 +80,8 @@ typedef struct {
     int64_t fmi3;
     int64_t n_sets, n_gets, n_channel_gets, n_window_gets;
     group *sets, *gets, *channel_gets, *window_gets;
+    void (*quick_step)(void), (*finite)(void), (*get_state)(void), (*set_state)(void), (*free_state)(void); /* linked */
+    void *state;
 } part;
 
 typedef struct {            /* where the run is */
@@ -101,7 +108,7 @@ typedef struct {
     void *const *instances;
     int64_t n_delays;
     const int32_t *delayed, *origin; /* places in `out`: copied before each step */
-    int64_t timed, failed_status;
+    int64_t timed, failed_status, repeated; /* repeated: blocks of the linked form */
 } run;
 
 static inline int call(const group *g, void *component) {
@@ -201,7 +208,8 @@ static inline int failed(run *r, int status) {
     return 1;
 }
 
-/* One step of all parts; laps: when each was done, not NULL in a step that is timed. */
+/* One step of all parts; laps: when each was done, not NULL in a step that is timed; quick: nothing looks whether the
+   numbers are finite. */
 #ifdef LINKED
 EXPORT const int gyrobench_linked = 1;
 #define LAP(i) if (laps) laps[i] = seconds()
@@ -228,8 +236,9 @@ static inline int step_part(run *r, status *at, int64_t i, double t) {
     return MORE;
 }
 
-static inline int step_all(run *r, status *at, void *const instances[], double t, double *laps) {
+static inline int step_all(run *r, status *at, void *const instances[], double t, double *laps, int quick) {
     (void)instances;
+    (void)quick;
     for (int64_t j = 0; j < r->n_delays; j++) r->out[r->delayed[j]] = r->out[r->origin[j]];
     for (int64_t i = 0; i < r->n_parts; i++) {
         if (step_part(r, at, i, t)) return FAILED;
@@ -270,7 +279,7 @@ static double clock_cost(void) {    /* of one call of seconds() */
     return best;
 }
 
-static int loop(run *r, void *const instances[], int64_t k_end) {
+static int loop(run *r, void *const instances[], int64_t k_end, int quick) {
     status *const at = r->at;
     const double cost = clock_cost();
     const int channels = r->channel.n > 0;
@@ -281,7 +290,8 @@ static int loop(run *r, void *const instances[], int64_t k_end) {
         const int timed = until_timed-- == 0;
         double began = timed ? seconds() : 0.0;
         const double t = r->t0 + (double)at->k * r->h;
-        if (timed ? step_all(r, at, instances, t, r->laps) : step_all(r, at, instances, t, NULL)) return FAILED;
+        if (timed ? step_all(r, at, instances, t, r->laps, quick) : step_all(r, at, instances, t, NULL, quick))
+            return FAILED;
         if (timed) {
             until_timed = TIMED_EVERY - 1;
             r->timed++;
@@ -303,8 +313,70 @@ static int loop(run *r, void *const instances[], int64_t k_end) {
     return MORE;
 }
 
+#ifdef LINKED
+/* Whether no number of a block can have been other than finite: one that comes out of finite ones raises a flag of the
+   processor, which stays until it is cleared, and none is there at the end. */
+static int all_finite(const run *r) {
+    if (fetestexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW)) return 0;
+    for (int64_t i = 0; i < r->n_parts; i++)
+        if (!((finite_function)r->parts[i].finite)(r->parts[i].component)) return 0;
+    return 1;
+}
+
+static int keep_states(const run *r) {
+    for (int64_t i = 0; i < r->n_parts; i++) {
+        part *p = &r->parts[i];
+        if (((get_state_function)p->get_state)(p->component, &p->state)) return 0;
+    }
+    return 1;
+}
+
+static void go_back(const run *r) {
+    for (int64_t i = 0; i < r->n_parts; i++) {
+        const part *p = &r->parts[i];
+        ((set_state_function)p->set_state)(p->component, p->state);
+    }
+}
+
+/* The loop in blocks of quick steps.  Where a flag is raised or a step fails, a block is gone through again from its
+   first step with a look at each number: that finds part and step, or that the flag was harmless (a number that no
+   output follows).  After a harmless flag some blocks are checked at once, each time twice as many. */
+static int loop_in_blocks(run *r, void *const instances[], int64_t k_end) {
+    int64_t wary = 1, checked = 0; /* blocks to be checked at once: after the next harmless flag, still now */
+    for (;;) {
+        const int64_t end = k_end - r->at->k < BLOCK ? k_end : r->at->k + BLOCK;
+        const status before = *r->at;
+        const double last = r->last;
+        int code;
+        if (checked > 0 || !keep_states(r)) {
+            checked--;
+            code = loop(r, instances, end, 0);
+        } else {
+            feclearexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
+            code = loop(r, instances, end, 1);
+            if (code == FAILED || !all_finite(r)) {
+                go_back(r);
+                *r->at = before;
+                r->last = last;
+                r->repeated++;
+                code = loop(r, instances, end, 0);
+                checked = wary;
+                wary = 2 * wary;
+            }
+        }
+        if (code != MORE || r->at->k >= k_end) return code;
+    }
+}
+#endif
+
 EXPORT int gyrobench_run(run *r, int64_t k_end) {
-    const int status = loop(r, r->instances, k_end);
+#ifdef LINKED
+    const int status = loop_in_blocks(r, r->instances, k_end);
+    for (int64_t i = 0; i < r->n_parts; i++)
+        if (r->parts[i].state) ((get_state_function)r->parts[i].free_state)(r->instances[i], &r->parts[i].state);
+#else
+    const int status = loop(r, r->instances, k_end, 0);
+#endif
     take_outputs(r->instances, r->out);
     return status;
 }

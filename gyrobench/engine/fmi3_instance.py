@@ -30,7 +30,7 @@ class FmuInstance3(FmuInstance):
     """An FMI 3.0 co-simulation FMU in this process; the differences from FMI 2.0."""
 
     fmi3 = True
-    prefix = "fmi3"
+    prefix, state = "fmi3", "FMUState"
 
     def new_slave(self) -> Any:
         """Return FMPy's class of such FMUs."""

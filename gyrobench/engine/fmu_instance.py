@@ -107,7 +107,7 @@ class FmuInstance:
     """
 
     fmi3 = False
-    prefix = "fmi2"
+    prefix, state = "fmi2", "FMUstate"
 
     def __init__(self, slot: str, description: Any, folder: Path, status: Status | None = None, part: int = 0) -> None:
         self.slot, self.description = slot, description

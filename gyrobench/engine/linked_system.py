@@ -6,6 +6,10 @@ in execution order: copy the inputs from the outputs of others, one assignment e
 engines do with calls for sets and gets, in the same order on the same instances; so states, records and checkpoints
 are the same bit for bit, and a run may change from one form to the other between two steps.
 
+A part looks at the end of each step whether its numbers are finite.  In the linked form the engine does after a block
+of steps, by the flags that the processor raises where infinity or NaN come out of finite numbers (engine.c).  Where one
+is raised, the block is gone through again from its first states with a look at each step, which finds part and time.
+
 The library is small (0.1 s of the compiler) and kept in the cache by its content.  A run is linked where the library is
 in the cache, or where the steps of the plan save the time of the compiler: about 10 ns a part and step.
 """
@@ -70,7 +74,8 @@ def system_text(program: Program) -> str:
         lines = [line for g in p.sets for line in assignments(g, i, source)]
         step = f"((step2_function)r->parts[{i}].step)(instances[{i}], t, r->h, 1)"
         if not checks_inputs(p):
-            step = f"((linked_function)r->parts[{i}].step)(instances[{i}], t, r->h)"
+            function = f"quick ? r->parts[{i}].quick_step : r->parts[{i}].step"
+            step = f"((linked_function)({function}))(instances[{i}], t, r->h)"
         lines += [f"at->part = {i};", f"if (failed(r, {step})) return FAILED;", f"LAP({i});"]
         steps.append("\n".join([f"    /* {p.slot} */", *(f"    {line}" for line in lines)]))
 
@@ -82,7 +87,9 @@ def system_text(program: Program) -> str:
         [
             "/* The wires of a system: see linked_system.py. */",
             HELPER,
-            "static inline int step_all(run *r, status *at, void *const instances[], double t, double *laps) {",
+            "static inline int step_all(run *r, status *at, void *const instances[], double t, double *laps,",
+            "                           int quick) {",
+            "    (void)quick;",
             *pointers,
             "    at->call = CALL_STEP;",
             *steps,

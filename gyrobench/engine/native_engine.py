@@ -51,6 +51,7 @@ class _Part(ctypes.Structure):
         ("fmi3", c_int64),
         *((f"n_{g}", c_int64) for g in ("sets", "gets", "channel_gets", "window_gets")),
         *((g, POINTER(_Group)) for g in ("sets", "gets", "channel_gets", "window_gets")),
+        *((f, c_void_p) for f in ("quick_step", "finite", "get_state", "set_state", "free_state", "state")),
     )
 
 
@@ -83,7 +84,7 @@ class _Run(ctypes.Structure):
         ("n_delays", c_int64),
         ("delayed", c_void_p),
         ("origin", c_void_p),
-        *((n, c_int64) for n in ("timed", "failed_status")),
+        *((n, c_int64) for n in ("timed", "failed_status", "repeated")),
     )
 
 
@@ -107,8 +108,14 @@ class NativeEngine:
         for part, p, instance in zip(parts, program.parts, self.instances, strict=True):
             part.component = instance.component
             part.step, part.fmi3 = instance.pointer("DoStep"), instance.fmi3
-            if self.linked and not checks_inputs(p):
-                part.step = instance.address("gyrobench_step")
+            if self.linked:
+                if not checks_inputs(p):
+                    part.step = instance.address("gyrobench_step")
+                for function in ("quick_step", "finite"):
+                    setattr(part, function, instance.address(f"gyrobench_{function}"))
+                for function in ("get", "set", "free"):
+                    address = instance.pointer(f"{function.capitalize()}{instance.state}")
+                    setattr(part, f"{function}_state", address)
             for name in ("sets", "gets", "channel_gets", "window_gets"):
                 groups: list[VariableGroup] = getattr(p, name)
                 call = "Set" if name == "sets" else "Get"

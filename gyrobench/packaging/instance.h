@@ -111,13 +111,18 @@ static int step(Instance *m, double t, double h) {
     return told(m);
 }
 
-/* linked_step for the linked form of a system; where it fails, doStep tells why. */
+#ifdef CAN_BE_LINKED /* for the linked form of a system; where a step fails, doStep tells why */
 #ifdef _WIN32
-__declspec(dllexport)
+#define LINKED_FORM __declspec(dllexport)
 #elif defined(__GNUC__)
-__attribute__((visibility("default")))
+#define LINKED_FORM __attribute__((visibility("default")))
+#else
+#define LINKED_FORM
 #endif
-int gyrobench_step(void *c, double t, double h) { return linked_step(&((Instance *)c)->part, t, h); }
+LINKED_FORM int gyrobench_step(void *c, double t, double h) { return linked_step(&((Instance *)c)->part, t, h); }
+LINKED_FORM int gyrobench_quick_step(void *c, double t, double h) { return quick_step(&((Instance *)c)->part, t, h); }
+LINKED_FORM int gyrobench_finite(void *c) { return tell_finite(&((Instance *)c)->part); }
+#endif
 
 /* Derivatives of outputs and state derivatives with respect to inputs, states and parameters. */
 static int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,

@@ -5,6 +5,8 @@
  * (gyrobench/engine/reference_engine.py): initial outputs are propagated before and after the end of initialization, a
  * communication step is one or several steps of the system, each at t0 + k STEP.
  */
+#undef CAN_BE_LINKED /* the parts are, here */
+
 typedef struct {
     Vars v;
     double running, dirty, t0, steps;

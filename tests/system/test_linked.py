@@ -9,6 +9,7 @@ import pytest
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine import engine_library, linked_system
+from gyrobench.engine.native_engine import NativeEngine
 from gyrobench.engine.session import RunError, RunInterrupted, Session, run
 from gyrobench.packaging import CompilerError
 from gyrobench.record.record import Record
@@ -59,6 +60,82 @@ def test_a_part_that_fails_tells_why(small: System) -> None:
     assert "gyro: doStep failed at t = " in messages[0]
     assert "stop" in messages[0]
     assert messages[0] == messages[1] == messages[2]
+
+
+@pytest.fixture
+def repeated(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Returns the blocks that the engines of this process went through again, with a look at each number."""
+    counts: list[int] = []
+    close = NativeEngine.close
+
+    def count(engine: NativeEngine) -> None:
+        counts.append(int(engine.run.repeated))
+        close(engine)
+
+    monkeypatch.setattr(NativeEngine, "close", count)
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("ramp", "what"),
+    [(1e308, "drift is inf at t = 1.798 s"), (1.5e308, "b is -inf at t = 0.003 s"), (2e307, "b is -inf at t = 4.")],
+)
+def test_a_number_that_is_not_finite_ends_the_run_at_its_step(
+    small: System, ramp: float, what: str, repeated: list[int], tmp_path: Path
+) -> None:
+    """A double ends at 1.7977e308: the drift of the first, ramp t, there at 1.7977 s; the float angle of the third,
+    H/C = 1 times ramp t2 / 2, at 4.24 s, in the second block of steps.  The float rate of the second at 1 ms is
+    -(1 - 1/e) ramp 1 ms (C/J = 1000 1/s), its derivative at 2 ms -1000 1/s (2 ms - 0.632 ms) ramp = -2.1e308: infinite.
+    """
+    told, records = [], []
+    for engine in ("linked", "native", "reference"):
+        with Session(small, engine=engine, child=False) as session, pytest.raises(RunError) as failed:
+            session.run({**QUICK, "gyro.ramp": ramp}, seed=5, out=tmp_path / engine)
+        told.append(str(failed.value).replace(engine, "ENGINE"))
+        records.append(failed.value.record)
+    assert f"output {what}" in told[0]
+    assert told[0] == told[1] == told[2]
+    linked, native, reference = (r for r in records if r is not None)
+    assert linked.run.steps == native.run.steps == reference.run.steps > (4096 if "4." in what else 0)
+    assert linked.same_data(native)
+    assert linked.same_data(reference)
+    linked_blocks, by_calls = repeated  # the reference engine has no such count
+    assert linked_blocks > by_calls == 0
+
+
+SPILL = """
+    spilled = Discrete(0.0, "1", "1 where a product is beyond what a double holds")
+
+    @sampled(every=1)
+    def spill(self) -> None:
+        self.spilled = 1.0 if self.t * 1e308 * 1e10 > 1e300 else 0.0
+"""
+
+
+def test_a_flag_without_a_number_that_is_not_finite_changes_nothing(
+    small: System, tmp_path: Path, repeated: list[int]
+) -> None:
+    """A product in a comparison overflows in each step: the flag of the processor is raised, no value is infinite."""
+    model = (Bench(standard_folder()).part_folder("site") / "model.py").read_text(encoding="utf-8")
+    folder = tmp_path / "components" / "site"
+    folder.mkdir(parents=True)
+    head = "from gyrobench.component import Discrete, sampled\n"
+    place = "from gyrobench.component.blocks.place import Place\n"
+    assert place in model
+    (folder / "model.py").write_text(model.replace(place, head + place) + SPILL, encoding="utf-8")
+    for room in ("systems", "reports"):
+        (tmp_path / room).mkdir()
+    records = []
+    for engine in ("linked", "native"):
+        with Session(small, engine=engine, child=False, bench=tmp_path) as session:
+            records.append(session.run({**QUICK, "dwell": 8.0}, seed=5))  # four blocks of 4096 steps and more
+    with Session(small, engine="linked", child=False) as session:
+        records.append(session.run({**QUICK, "dwell": 8.0}, seed=5))
+    assert records[0].run.steps > 4 * 4096
+    assert all(r.same_data(records[0]) for r in records)
+    flagged, by_calls, standard = repeated
+    assert flagged > 0
+    assert by_calls == standard == 0
 
 
 def test_a_run_is_continued_in_the_other_form(small: System, tmp_path: Path) -> None:
