@@ -11,7 +11,14 @@ import ctypes
 from pathlib import Path
 from typing import Any
 
-from gyrobench.engine.fmu_instance import ENDED, NO_PROGRESS, FmuCallError, FmuInstance, status_text
+from gyrobench.engine.fmu_instance import (
+    ENDED,
+    NO_PROGRESS,
+    FmuCallError,
+    FmuInstance,
+    status_text,
+    with_signatures,
+)
 from gyrobench.engine.program import VariableGroup, type_code
 from gyrobench.engine.run_board import GET, SET, STEP, Status
 from gyrobench.system.binding import Bound
@@ -36,7 +43,7 @@ class FmuInstance3(FmuInstance):
         """Return FMPy's class of such FMUs."""
         from fmpy.fmi3 import FMU3Slave
 
-        return FMU3Slave
+        return with_signatures(FMU3Slave)
 
     def create(self) -> None:
         """Instantiate; early return is allowed, event mode and intermediate update are not used."""
