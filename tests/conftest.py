@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg" width="1pt" height="1pt" viewBox="0 0 1 1"></svg>'
 CREATED = "GYROBENCH_TEST_CACHE"  # the folder that this session has created, if it has
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # the test processes share the cores
     os.environ.setdefault(threads, "1")
@@ -54,13 +55,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Run a gyrobench command: exit code, standard output, standard error.  Anything but an exit fails the test.
 
-    pages: a run or reduction writes its HTML and PDF too, which takes two seconds.  The step of a run is not checked
-    unless --check-step is among the words, or default_check is true.
+    pages: a run or reduction writes its HTML and PDF too, which takes a second, three quarters of it for the figures;
+    figures false leaves those blank, for the text of a page whose like another test draws.  The step of a run is not
+    checked unless --check-step is among the words, or default_check is true.
     """
 
-    def run(*words: object, pages: bool = False, default_check: bool = False) -> tuple[int, str, str]:
+    def run(
+        *words: object, pages: bool = False, default_check: bool = False, figures: bool = True
+    ) -> tuple[int, str, str]:
         from gyrobench.commands import cli
 
+        if not figures:
+            from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+            monkeypatch.setattr(FigureCanvasSVG, "print_svg", lambda _, file, **__: file.write(BLANK))
         plain = [] if pages or words[0] not in ("run", "reduce") else ["--no-report"]
         if words[0] == "run" and "--check-step" not in words and not default_check:
             plain.append("--no-check-step")

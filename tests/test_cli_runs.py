@@ -76,7 +76,7 @@ def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
 
 
 def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Path) -> None:
-    code, out, err = gyrobench("run", NAME, *TINY, "--json", pages=True)
+    code, out, err = gyrobench("run", NAME, *TINY, "--json", pages=True, figures=False)
     assert code == 0
     (folder,) = (tmp_path / "reports" / "out" / NAME).iterdir()
     assert json.loads(out) == json.loads((folder / "result.json").read_text(encoding="utf-8"))
@@ -104,7 +104,7 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
 
 def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Call, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
-    assert gyrobench(*run, pages=True)[0] == 0
+    assert gyrobench(*run, pages=True, figures=False)[0] == 0
     assert (tmp_path / "r" / "report.html").is_file() and (tmp_path / "r" / "report.pdf").is_file()
     before = (tmp_path / "r" / "result.json").read_bytes()
     code, out, _ = gyrobench(*run, "--no-report", pages=True)
@@ -202,7 +202,7 @@ def test_interrupted_step_check_still_gives_the_report(
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
-    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r", pages=True)
+    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r", pages=True, figures=False)
     assert code == 130
     assert "r/report.html" in out and "the report is without it" in err
     assert json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["step_check"] == {}

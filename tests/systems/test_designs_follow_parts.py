@@ -82,7 +82,7 @@ def test_gimbals_whose_servos_turn_faster() -> None:
 
 def test_precession_of_the_power_stabilizer_follows_a_pickoff_given_with_its_unit() -> None:
     with Session("stabilizer_power_2dof") as s:
-        p = s.run({"gyro.K_sg_y": "20V/rad", "gyro.H": 8.0, "hold": 1.0}, seed=1).run.parameters
+        p = s.prepare({"gyro.K_sg_y": "20V/rad", "gyro.H": 8.0, "hold": 1.0})[2].parameters
     assert (p["stabilizer.k_u"], p["stabilizer.H_g"]) == (20.0, 8.0)
     assert p["stabilizer.k_m"] * p["stabilizer.k_u"] * p["stabilizer.k_i"] * p["stabilizer.ratio"] == 100.0
 
@@ -139,7 +139,7 @@ def test_foreign_platform(foreign: Foreign) -> None:
 def test_gain_set_by_hand_is_told_with_what_comes_out(command: Command, tmp_path: Path, caplog: Any) -> None:
     """A third of the gain: 3.9 Hz instead of 10, told before the run and in the report, and so it is."""
     with Session(ONE) as s:
-        gain = float(s.run({"hold": 10.0}, seed=1).run.parameters["stabilizer.K"])
+        gain = float(s.prepare({"hold": 10.0})[2].parameters["stabilizer.K"])
     out = tmp_path / "run"
     code, _, _ = command("run", ONE, "--set", f"stabilizer.K={gain / 3.0}", "--set", "hold=10", "--out", out)
     assert code == 0
@@ -154,7 +154,7 @@ def test_gain_set_by_hand_is_told_with_what_comes_out(command: Command, tmp_path
 
 def test_another_estimator_in_the_loop_is_named() -> None:
     with Session(ONE, {"estimator": "estimator_kalman_ar"}) as s:
-        notes = s.run({"hold": 10.0}, seed=1).run.notes
+        notes = s.prepare({"hold": 10.0})[2].notes
     assert any("cross at 4.58 Hz" in n and n.endswith("part estimator_kalman_ar in estimator, hold") for n in notes)
 
 

@@ -38,11 +38,14 @@ def short(sessions):
     return {decoupled: reduced(session) for decoupled, session in sessions.items()}
 
 
-def closed(session, azimuth, pitch=0.0):
-    """Unstable poles of the linear model with step and delays."""
-    record = session.run({**SHORT, "hold": 5.0, "azimuth": f"{azimuth}deg", "pitch": f"{pitch}deg", "swing": 0.0,
-                          "load_step": 0.0}, step=1e-3)  # fmt: skip
-    return unstable(record.run.linear.closed.continuous)
+def linear(session, **values):
+    """The linear models that a run would keep; it is not run."""
+    return session.prepare({**SHORT, "pitch": 0.0, "swing": 0.0, "load_step": 0.0, **values})[2].linear
+
+
+def closed(session, azimuth):
+    """Unstable poles of the continuous model."""
+    return unstable(linear(session, azimuth=f"{azimuth}deg").closed.continuous)
 
 
 @pytest.mark.parametrize("azimuth", [40.0, 60.0, 80.0])
@@ -70,8 +73,7 @@ def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
     The margin is that of one linear loop at azimuth 0, where the axes do not couple; the limit is where a pole crosses.
     """
     session = sessions[False]
-    record = session.run({**SHORT, "pitch": 0.0, "azimuth": 0.0, "swing": 0.0, "load_step": 0.0})
-    model = record.run.linear.loops["pitch"].continuous
+    model = linear(session, azimuth=0.0).loops["pitch"].continuous
     span = m.grid(1.0, 100.0)
     margin = m.margins(span, m.model_response(model, span)[:, 0, 0]).phase
     assert margin == pytest.approx(53.6, abs=1.0)  # PLATFORM-1AXIS; dropping H b' and Y2 move it by tenths

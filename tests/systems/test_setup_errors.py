@@ -16,8 +16,11 @@ from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PartInfo, RunDocument, SetupError
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.result import Coefficient, LoopResult
+from gyrobench.system.parameters import defaults, resolve
+from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.setup_errors import setup_errors
 from gyrobench.system.system import load_system
+from gyrobench.system.wiring import Assembly, assemble
 
 Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
@@ -27,14 +30,19 @@ SHORTENED = [w for k, v in SHORT.items() for w in ("--set", f"{k}={v!r}")]
 SOUTH = "site.latitude = −33.86°, while plan and reduction assume 45.75° (option latitude)"
 
 
-def found(name: str, values: Mapping[str, Any], parts: Mapping[str, Any] | None = None) -> dict[str, SetupError]:
-    """Set-up errors of a run with these values, by parameter, as its run.json holds them; nothing is run."""
-    with Session(name, parts, {"gyro": MAPPING} if parts else None) as session:
-        from gyrobench.system.parameters import resolve
+def assembled(name: str, gyro: Path | None = None) -> Assembly:
+    """The FMUs of a system bound and ordered, as a session has them; none is loaded."""
+    system, notes = load_system(name), list[str]()
+    paths, _ = resolve_parts(system, {"gyro": gyro} if gyro else {}, "native", None, notes)
+    return assemble(system, paths, {"gyro": MAPPING} if gyro else None)
 
-        system = session.system.with_values(values)
-        parameters = resolve(session.assembly, system, 1, session.base)[1]
-        return {e.parameter: e for e in setup_errors(session.assembly, system, 1, session.base, parameters)}
+
+def found(name: str, values: Mapping[str, Any], gyro: Path | None = None) -> dict[str, SetupError]:
+    """Set-up errors of a run with these values, by parameter, as its run.json holds them; nothing is run."""
+    assembly = assembled(name, gyro)
+    system, base = assembly.system.with_values(values), defaults(assembly)
+    parameters = resolve(assembly, system, 1, base)[1]
+    return {e.parameter: e for e in setup_errors(assembly, system, 1, base, parameters)}
 
 
 @pytest.mark.parametrize("gyro", ["ours", "vendor"])
@@ -45,7 +53,7 @@ def test_a_site_that_the_test_does_not_know(
     part = ["--part", f"gyro={foreign('vendor_gyro')}", "--map", f"gyro={MAPPING}"] if gyro == "vendor" else []
     folder = tmp_path / "run"
     words = [*SHORTENED, "--set", "site.latitude=-33.86deg", "--set", "gyro.D_I=0.9deg/h/g", *part]
-    code, out, err = command("run", NAME, *words, "--out", folder, pages=True)
+    code, out, err = command("run", NAME, *words, "--out", folder, pages=True, figures=gyro == "ours")
     assert code == 0, err
     told = [line for line in caplog.messages if "set-up error" in line]
     assert told == [f"{NAME}: simulated set-up error: {SOUTH}. To change the whole test: --set latitude=-33.86deg."]
@@ -68,7 +76,7 @@ def test_a_site_that_the_test_does_not_know(
 
 def test_the_same_by_the_option_is_no_error(command: Command, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     code, out, err = command(
-        "run", NAME, *SHORTENED, "--set", "latitude=-33.86deg", "--out", tmp_path / "run", pages=True
+        "run", NAME, *SHORTENED, "--set", "latitude=-33.86deg", "--out", tmp_path / "run", pages=True, figures=False
     )
     assert code == 0 and "set-up error" not in caplog.text + err and "misses" not in out
     run = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))
@@ -85,7 +93,7 @@ def test_a_parameter_that_agrees_with_its_option_is_no_error() -> None:
 def test_parameters_of_an_instrument_and_designs_are_no_errors(foreign: Foreign) -> None:
     values = {"gyro.D_I": "0.9deg/h/g", "gyro.k": "20deg/h/mA"}
     assert not found(NAME, {**values, "rebalance.K_p": 3.0, "table.tilt[1]": "1arcmin"})
-    assert not found(NAME, values, {"gyro": foreign("vendor_gyro")})
+    assert not found(NAME, values, foreign("vendor_gyro"))
 
 
 def test_what_the_method_assumes() -> None:
@@ -117,14 +125,13 @@ def test_every_owned_and_assumed_parameter_exists() -> None:
     for name in Bench(standard_folder()).systems():
         if isinstance(load_test(name), Suite):
             continue
-        with Session(load_system(name)) as session:
-            system = session.system
-            for parameter in (*system.owned(), *system.assumed):
-                if parameter.endswith("?"):  # of other parts than the standard one
-                    continue
-                slot, _, element = parameter.partition(".")
-                names = session.assembly.bindings[slot].parameters
-                assert element in names or any(n.startswith(element + "[") for n in names), f"{name}: {parameter}"
+        assembly = assembled(name)
+        for parameter in (*assembly.system.owned(), *assembly.system.assumed):
+            if parameter.endswith("?"):  # of other parts than the standard one
+                continue
+            slot, _, element = parameter.partition(".")
+            names = assembly.bindings[slot].parameters
+            assert element in names or any(n.startswith(element + "[") for n in names), f"{name}: {parameter}"
 
 
 # ------------------------------------------------------------------------------------------ the truth

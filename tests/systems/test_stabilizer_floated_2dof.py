@@ -113,13 +113,14 @@ def test_static_error_is_not_removed_by_the_lag(steps: Session) -> None:
 
 def test_5_25_prints_the_loop_gain(steps: Session) -> None:
     """theta/M of the parts is the closed form; the printed K_m K_x/(J s2) is another quantity altogether."""
-    model = steps.run(IDEAL).run.linear.closed.continuous
+    linear = steps.prepare(IDEAL)[2].linear
+    model = linear.closed.continuous
     f = np.array([0.01, 0.5, 2.0, 16.0, 60.0])
     s = 2j * np.pi * f
     found = margins.excitation_response(model, "torque", 1, "platform.attitude", f)
     np.testing.assert_allclose(found, closed.Loop(**DEFAULT).compliance(s), rtol=1e-6)
     assert np.min(np.abs(8250.0 / (0.5 * s**2) / found)) > 1e3
-    loop = steps.run(IDEAL).run.linear.loops["stabilizer"].continuous
+    loop = linear.loops["stabilizer"].continuous
     np.testing.assert_allclose(
         margins.model_response(loop, f)[:, 0, 0], closed.Loop(**DEFAULT).gain(s), rtol=1e-6
     )  # with G, it is L
@@ -201,7 +202,7 @@ def test_the_step_costs_margin_in_the_first_order(steps: Session) -> None:
     exact = closed.Loop(**DEFAULT).gain(2j * np.pi * f)
     lost = []
     for h in (2e-4, 1e-4, 5e-5):
-        model = steps.run(IDEAL, step=h).run.linear.loops["stabilizer"].discrete
+        model = steps.prepare(IDEAL, step=h)[2].linear.loops["stabilizer"].discrete
         lost.append(margins.model_response(model, f)[:, 0, 0] / exact - 1.0)
     assert abs(lost[1][1]) == pytest.approx(0.0138, abs=1e-3)  # 1.3 % and 0.27 degrees at the crossover
     for coarse, fine in pairwise(lost):

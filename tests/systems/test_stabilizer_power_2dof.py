@@ -161,7 +161,7 @@ def test_stop_of_the_precession_ends_the_run() -> None:
 # ------------------------------------------------------------------------------------ linear model and sweep
 def test_poles_of_the_default_set(steps: Session) -> None:
     """-9.1, -55 +- 89j 1/s, beside the free angle of the platform at 0."""
-    linear = steps.run(STILL).run.linear.closed.continuous
+    linear = steps.prepare(STILL)[2].linear.closed.continuous
     found = sorted((p for p in poles(linear) if abs(p) > 1e-3), key=lambda p: (p.real, p.imag))
     roots = sorted(np.roots([0.01, 1.2, 120.0, 1000.0]), key=lambda p: (p.real, p.imag))
     np.testing.assert_allclose(found, roots, rtol=1e-9)

@@ -81,7 +81,9 @@ def test_laboratory_record(
     expected = load().reduce(record)
     file = tmp_path / "lab.csv"
     file.write_text(laboratory(record, polarity), encoding="utf-8")
-    code, _, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out", pages=True)
+    code, _, err = command(
+        "reduce", NAME, "--data", file, "--out", tmp_path / "out", pages=True, figures=model == "nine"
+    )
     assert code == 0, err
     found: dict[str, Any] = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert [c["name"] for c in found["coefficients"]] == [c.name for c in expected.coefficients]
