@@ -353,7 +353,9 @@ class DriftReader:
     def _finish(self, rows: int) -> None:
         about = self.about
         if about.samples < 2:
-            lacking = f"; {rows - about.samples} of {rows} rows have none" if rows > about.samples else ""
+            names = ", ".join(s.name for s in self.signals)
+            of = f" in each of {names} (choose by channel=NAME)" if len(self.signals) > 1 else ""
+            lacking = f"; {rows - about.samples} of {rows} rows have none{of}" if rows > about.samples else ""
             raise DataError(self.table.source, [f"{about.samples} samples with a value{lacking}"])
         if about.gaps > 0.05 * about.samples and about.missing > about.samples:
             raise DataError(

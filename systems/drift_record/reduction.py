@@ -14,8 +14,8 @@ the test of the model says so; steps of the bias; drift of the scale factor.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -31,13 +31,14 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
+from gyrobench.reduction.series.long_record import SHORTEST
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
 
 from . import description, model_tables
-from .preparation import Prepared, columns_of, prepare, truth_of
+from .preparation import LEAST, WHOLE, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
 
@@ -111,15 +112,35 @@ def stretches(x: Array, least: int = 2) -> list[Array]:
 
 def analyse(p: Prepared, series: Mapping[str, Any] | None = None) -> Analysed:
     """Return the noise coefficients and deviations of a column."""
-    whole = stretches(p.clean, 32)
-    if len(whole) > MANY:  # single samples are missing all over: means over those that are there
-        whole = [p.stretch]
-    step = p.stretch_step if whole[0] is p.stretch else p.step
+    whole = stretches(p.clean, SHORTEST)
+    held_whole = sum(x.size for x in whole) >= WHOLE * np.count_nonzero(np.isfinite(p.clean))
+    singles = p.averaged > 1 and (len(whole) > MANY or not held_whole)  # are missing all over
+    noise = missing_all_over(p, whole) if singles else fit(whole, p.step)
     held = deviations(p.clean, p.step, tuple(KINDS))
     every = {kind: _read(d) for kind, d in (series or {}).get("deviations", {}).get(p.name, {}).items()}
     if every and p.cleaned:  # of the averaging times that the means do not reach, as recorded
         held = {kind: _joined(every[kind], d) for kind, d in held.items()}
-    return Analysed(p, fit(whole, step), held if p.cleaned or not every else every)
+    return Analysed(p, noise, held if p.cleaned or not every else every)
+
+
+def missing_all_over(p: Prepared, whole: Sequence[Array]) -> NoiseCoefficients:
+    """Return the coefficients of a record from which single samples are missing: B, K and R of means over those that
+    are there, N and Q of the longest stretches ``whole`` without a gap.
+
+    Means of k samples in place of m hold s2 (1/k - 1/m) of white noise more, s2 the variance of a sample: so much is
+    taken off N2 and the lower end of its interval, not off the upper, as little of it is there where samples are not
+    independent.  That N is taken where it is the better one.  Errors of angles do not cancel in such means.
+    """
+    slow = fit([p.stretch], p.stretch_step)
+    k = np.isfinite(p.clean[p.first : p.first + p.stretch.size * p.averaged]).reshape(-1, p.averaged).sum(axis=1)
+    steps = np.diff(p.clean)
+    more = 0.5 * float(np.nanmean(steps**2)) * p.step * (p.averaged * float(np.mean(1.0 / k)) - 1.0)
+    value, low = (math.sqrt(max(x * x - more, 0.0)) for x in (slow.N.value, max(slow.N.low, 0.0)))
+    N, Q = Estimate(value, low, slow.N.high, low > 0.0), Estimate(0.0, 0.0, slow.Q.high, False)
+    if sum(x.size for x in whole) >= LEAST:
+        fast = fit(whole, p.step)
+        N, Q = min((N, fast.N), key=lambda e: e.high - e.low), fast.Q
+    return replace(slow, N=N, Q=Q)
 
 
 def _read(d: Mapping[str, Any]) -> Deviation:

@@ -105,8 +105,8 @@ def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
 def test_flicker_of_a_fast_record_goes_to_half_its_sampling_rate() -> None:
     """100 Hz for ten minutes: B2/(2 pi f) from 1/600 to 50 Hz within 1.5 %; with the 1e5 s of slow ones a fifth at 50.
 
-    There w tau_11 = 7.49: 2 0.588 7.49/57.1 + 2 0.441 30.0/898 + 0.007 = 0.19.  A longer record than the 5.7 decades that
-    a gyro has keeps its length.
+    There w tau_11 = 7.49: 2 0.588 7.49/57.1 + 2 0.441 30.0/898 + 0.007 = 0.19.  A longer record than the 5.7 decades
+    that a gyro has keeps its length.
     """
     none, some = Estimate(0.0, 0.0, 1e-7, False), Estimate(2e-7, 1e-7, 3e-7, True)
     noise = NoiseCoefficients(none, some, none, none, none)
