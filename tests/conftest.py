@@ -65,20 +65,21 @@ def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     ) -> tuple[int, str, str]:
         from gyrobench.commands import cli
 
-        if not figures:
-            from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-            monkeypatch.setattr(FigureCanvasSVG, "print_svg", lambda _, file, **__: file.write(BLANK))
         plain = [] if pages or words[0] not in ("run", "reduce") else ["--no-report"]
         if words[0] == "run" and "--check-step" not in words and not default_check:
             plain.append("--no-check-step")
         monkeypatch.setattr(sys, "argv", ["gyrobench", *map(str, words), *plain])
         capsys.readouterr()
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
+        with monkeypatch.context() as patch:
+            if not figures:
+                from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+                patch.setattr(FigureCanvasSVG, "print_svg", lambda _, file, **__: file.write(BLANK))
+            try:
+                cli.main()
+                code = 0
+            except SystemExit as end:
+                code = int(end.code or 0)
         out, err = capsys.readouterr()
         assert "Traceback" not in err or "GYROBENCH_TRACEBACK" in os.environ
         return code, out, err

@@ -69,9 +69,9 @@ def test_step_check_changes_less_than_a_tenth_of_u(runs: Path) -> None:
 
 
 def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
-    code, out, _ = gyrobench("report", runs / "a", "--spec", "floated_gyro", "--strict")
+    code, out, _ = gyrobench("report", runs / "a", "--spec", "floated_gyro", "--strict", figures=False)
     assert code == 0 and "step check (" in out and "verdict: pass" in out
-    code, out, _ = gyrobench("report", runs / "b", "--spec", "floated_gyro", "--strict", "--json")
+    code, out, _ = gyrobench("report", runs / "b", "--spec", "floated_gyro", "--strict", "--json", figures=False)
     assert code == 1 and json.loads(out)["verdict"] == "fail"
 
 
@@ -114,7 +114,7 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
     }  # fmt: skip
     again = json.loads((tmp_path / "r" / "result.json").read_bytes())
     assert again["coefficients"] == json.loads(before)["coefficients"]
-    assert gyrobench("report", "r")[0] == 0 and (tmp_path / "r" / "report.html").is_file()
+    assert gyrobench("report", "r", figures=False)[0] == 0 and (tmp_path / "r" / "report.html").is_file()
 
 
 def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
     assert code == 3
     assert "D_I is given in 'mA'; the report uses '°/h/g'" in err
     assert "the record is kept in r; after correcting the cause: gyrobench report r" in err
-    assert gyrobench("report", "r")[0] == 0
+    assert gyrobench("report", "r", figures=False)[0] == 0
 
 
 def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--out", "c")
     assert code == 0 and out.startswith("B (b) ") and "Set differently: " in out.splitlines()[-5]
     assert out.endswith("\n\nc/comparison.json\nc/comparison.html\nc/comparison.pdf\n")
-    code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--json")
+    code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--json", figures=False)
     assert code == 0 and json.loads(out)
     code, _, err = gyrobench("compare", runs / "a", runs / "a")
     assert code == 2 and "given twice" in err
