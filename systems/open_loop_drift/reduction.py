@@ -19,7 +19,7 @@ rate at which the null runs away from the hand (1e-4 of it for 0.7 deg/h/g and a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,8 +31,8 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import Effect
-from gyrobench.reduction.estimation.findings import Group
+from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
+from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
@@ -64,6 +64,8 @@ class Setup(SiteSetup):
     u_attitude: float = 0.0
     u_latitude: float = 0.0
     u_angle: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
     u_float_gain: float = 0.0
 
     def earth(self, axis: int = 0) -> float:
@@ -143,7 +145,12 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     between = case_angles(theta, t0, t1, setup.wait)
     null, G, cross = null_angles(theta, between, t, u, setup)
     dt, span = np.diff(t), float(t[-1] - t[0])
-    y = np.diff(null) / dt + earth - cross
+
+    def data(angle: Array) -> Array:
+        at, _, beside = null_angles(angle, case_angles(angle, t0, t1, setup.wait), t, u, setup)
+        return np.asarray(np.diff(at) / dt + earth - beside)
+
+    y = data(theta)
     book = float((null[-1] - null[0]) / span) + earth - float(cross @ dt) / span
     true = None
     if setup.truth is not None:
@@ -161,6 +168,11 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
     )
     used = float(np.max(np.abs(theta - null)))
     coupled = float(cross @ dt) / span / max(setup.float_gain, 1e-9)
+
+    def sources(f: Findings) -> list[Effect]:
+        return _effects(setup, f, t, theta, data, coupled)
+
+    found = with_set_up(found, sources, setup.corrections)
     result = linear_result(
         found,
         system="open_loop_drift",
@@ -178,7 +190,7 @@ def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
             "θ is the case angle of the null: the reading of the table less u/G.",
             "Valid only while the pickoff is inside its range; flagged (saturated) readings are refused.",
         ],
-        effects=_effects(setup, found, t, coupled),
+        effects=sources(found),
         **setup.reported(),
         closed_caption="Least squares under the noise model; closed: angle between first and last null over the time",
         tables=[_table(setup, G, used, null, t, book)],
@@ -208,7 +220,12 @@ def _warnings(s: Setup, theta: Array, used: float) -> list[str]:
     return out
 
 
-def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
+def _effects(
+    s: Setup, found: Findings, t: Array, theta: Array, data: Callable[[Array], Array], coupled: float
+) -> list[Effect]:
+    """All sources with their sensitivities; data: drift (n-1,) of the intervals from readings of the angle (n,), which
+    give the gain of the pickoff, too.
+    """
     small, local = 1e-5, frames.earth_rate_local
     by_latitude = (s.attitude[0] @ (local(s.latitude + small, s.earth_rate) - local(s.latitude, s.earth_rate))) / small
     turned = []
@@ -217,6 +234,12 @@ def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
         rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
         turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate)))
     whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
+
+    def misread(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+        return np.array(
+            [found.error(data(theta + small * f(n * theta)) - data(theta)) / small for f in (np.sin, np.cos)]
+        )
+
     return [
         *turned,
         Effect(
@@ -227,6 +250,8 @@ def _effects(s: Setup, found: Any, t: Array, coupled: float) -> list[Effect]:
             "positive where the stated one is too large",
         ),
         Effect("angle between first and last reading", s.u_angle, "rad", whole),
+        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "encoder", SINES),
+        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "encoder", SINES),
         Effect("float gain H/C", s.u_float_gain, "1", found.error(-coupled), "Earth rate along the spin axis times b"),
     ]
 

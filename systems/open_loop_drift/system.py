@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench import frames
 from gyrobench.attitudes import attitude_problems, parse
-from gyrobench.system.families.option_groups import ATTITUDE, NUISANCES, SITE, type_b
+from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
 from gyrobench.system.part_values import PartValues
@@ -51,7 +51,8 @@ class OpenLoopDrift(OpenLoopTest):
             "float_gain": Option(0.0, "1", "H/C of the float; 0: from the parameters of the gyro, else 1", 0.0),
         }
         | NUISANCES
-        | type_b("attitude", "latitude")
+        | CORRECTIONS
+        | type_b("attitude", "latitude", "angle1", "angle2")
         | {
             "u_angle": Option(0.0, "rad", "standard uncertainty of the angle from the first to the last reading", 0.0),
             "u_float_gain": Option(0.0, "1", "standard uncertainty of H/C", 0.0),

@@ -132,3 +132,19 @@ def test_an_error_relative_to_the_reading_stays_outside() -> None:
     plain = line(y)
     found = with_set_up(plain, lambda _: [Effect("scale factor", 0.2, "1", -DPH * y)])
     np.testing.assert_array_equal(found.value, plain.value)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e6, 1e9])
+def test_errors_far_above_the_noise_leave_estimate_and_type_a_alone(size: float) -> None:
+    """A constant error of 1 to 1e9 times the noise, which looks like the constant: the gain still adds up to one, the
+    estimate is that without, type A that of the noise.  (With the square of 1e6 times it the gain lost 0.5 %,
+    and type A was that of rounding.)
+    """
+    y = X @ [0.3, -0.2] + 1e-6 * np.random.default_rng(4).normal(size=N)
+    plain = line(y)
+    stated = [Effect("constant", size * 1e-6 * DPH, "rad/s", np.ones(N))]
+    found = with_set_up(plain, lambda _: stated)
+    np.testing.assert_allclose(found.gain @ X, np.eye(2), atol=1e-6)
+    np.testing.assert_allclose(found.value, plain.value, atol=0.1 * plain.u.min())
+    np.testing.assert_allclose(found.u, plain.u, rtol=0.01)
+    np.testing.assert_allclose(found.reported.half_width, plain.reported.half_width, rtol=0.1)

@@ -29,17 +29,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 FAINT = 1e-3  # of the residuals' rms: directions of E that are smaller move no weight
+LOUD = 30.0  # of it, too: larger ones count as so large; no weight differs, and their square would swallow the noise
 ROUNDING = 1e-9  # of the largest: what the coefficients leave of a column that is made of them
 STEPS = 50
 
 
 def columns(errors: Array | None, residual: Array) -> Array:
-    """Return K (n, r) with K K' = E E', for E' = errors (m, n), but for faint directions; residual: (n,)."""
+    """Return K (n, r) with K K' = E E', for E' = errors (m, n), but for faint and loud directions; residual: (n,)."""
     if errors is None or not np.any(errors):
         return np.empty((residual.size, 0))
     u, size, _ = np.linalg.svd(np.asarray(errors).T, full_matrices=False)
-    seen = size > FAINT * np.sqrt(np.mean(residual**2))
-    out: Array = u[:, seen] * size[seen]
+    rms = np.sqrt(np.mean(residual**2))
+    seen = size > FAINT * rms
+    out: Array = u[:, seen] * np.minimum(size[seen], LOUD * rms * np.sqrt(residual.size))
     return out
 
 

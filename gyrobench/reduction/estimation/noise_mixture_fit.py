@@ -141,15 +141,15 @@ def fit(
         ll = np.where(white_only & (np.arange(len(each)) == 0)[:, None], 0.0, -np.inf)
     elif blocks and np.linalg.norm(remainder - both[:, :c] @ np.linalg.lstsq(both[:, :c], remainder)[0]) <= tiny:
         ll = np.where(white_only, ll, -np.inf)
-    w = np.exp(ll - ll.max())
-    w /= w.sum()
+    likelihood = _normalized(ll)
+    w = _normalized(ll + np.array([s.favour for s in each])[:, None])
     flat = w.ravel()
     b, s2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
 
     estimates = (start + b) @ T.T
     beta = flat @ estimates
     off = estimates - beta
-    counts = flat > LIGHT * flat.max()
+    counts = np.maximum(flat, likelihood.ravel()) > LIGHT * flat.max()
     chosen = zip(each, counts.reshape(w.shape), strict=True)
     cofactors = np.concatenate([equations.cofactors(s.extra, s.precision, models) for s, models in chosen])
     cov_each = T @ (s2[counts, None, None] * cofactors) @ T.T
@@ -167,7 +167,7 @@ def fit(
         mixture = replace(
             mixture, covariance=cov_each + extra[:, None, None] * part, known=likeliest @ likeliest.T, known_each=part
         )
-    evidence = _evidence(blocks, each, w, estimates, mixture, counts, s2.reshape(w.shape), p)
+    evidence = _evidence(blocks, each, likelihood, estimates, mixture, counts, s2.reshape(w.shape), p)
     keep = np.concatenate([np.ones(p, bool), *(_repeated(e.block, e.joined) for e in evidence)])
     mixture = replace(
         mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep],
@@ -228,6 +228,13 @@ def fit(
         np.column_stack([Zk[:, index], Zk[:, c:-1][:, plain]]), _listed(grid, models, counted), stated,
         absorbed.variance[counted], stated @ z,
     )  # fmt: skip
+
+
+def _normalized(log_weight: Array) -> Array:
+    """Return weights with a sum of 1."""
+    weight: Array = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    return weight
 
 
 def _slow(grid: noise.NoiseGrid, t0: Array, t1: Array) -> NDArray[np.bool_]:
@@ -323,17 +330,9 @@ def _evidence(
             size = np.array([s.scatter[j] if j in s.scatter else np.zeros(w.shape[1]) for s in each]) * np.sqrt(s2)
             part = np.where(present[:, None], w, 0.0).ravel()
             spread = _moments_of(size.ravel(), part)
+        change, u_without = with_it[:p] - without[:p], np.maximum(u_without[:p], 1e-300)
         found.append(
-            Evidence(
-                block,
-                probability,
-                with_it[columns],
-                u_with[columns],
-                with_it[:p] - without[:p],
-                np.maximum(u_without[:p], 1e-300),
-                u_with[:p],
-                spread,
-            )
+            Evidence(block, probability, with_it[columns], u_with[columns], change, u_without, u_with[:p], spread)
         )
     return found
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
-from gyrobench.reduction.estimation import noise_mixture_fit
+from gyrobench.reduction.estimation import noise_mixture_fit, nuisance_states
 from gyrobench.reduction.estimation.nuisance_states import Block
 
 Array = NDArray[np.float64]
@@ -242,7 +242,8 @@ def table(
     caption = (
         "Set-up effects weighed by the data, each with even odds beforehand. Estimate and u: if it is present. Largest "
         "change: coefficient that moves most when the effect is in the model, in its u without the effect. Estimates "
-        "and intervals are means over all combinations, weighted by their probabilities."
+        "and intervals are means over all combinations, weighted by their probabilities, in which the odds of a single "
+        f"effect count {nuisance_states.FAVOUR:g} times, so that effects of every size are covered alike."
     )
     return {"title": TITLE, "caption": caption, "columns": COLUMNS, "rows": rows}
 
