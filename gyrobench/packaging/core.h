@@ -47,7 +47,7 @@ static inline void outputs_d(Part *part, Vars *seed);
 static double *value(Part *p) { return (double *)&p->n.v; }
 
 /* ------------------------------------------------------------------------------------- refusals */
-static void vfail(Part *p, const char *format, va_list a) {
+static COLD void vfail(Part *p, const char *format, va_list a) {
     char text[512];
     if (p->failed) return; /* the first reason is the reason */
     vsnprintf(text, sizeof text, format, a);
@@ -55,7 +55,7 @@ static void vfail(Part *p, const char *format, va_list a) {
     p->failed = 1;
 }
 
-static void fail(Part *p, const char *format, ...) {
+static COLD void fail(Part *p, const char *format, ...) {
     va_list a;
     va_start(a, format);
     vfail(p, format, a);
@@ -72,7 +72,7 @@ static inline int at(Part *p, int i, int n) {
 /* ------------------------------------------------------------------------------------------ noise */
 /* The streams that are drawn in steps: those of ports that are not off, with a sample of 0 already.  Sizes and seed do
    not change while the part runs. */
-static void prepare_noise(Part *p) {
+static COLD void prepare_noise(Part *p) {
     p->kept.keyed = 1;
     p->kept.n_drawn = 0;
     p->kept.first = (uint64_t)1 << 63; /* none made: far from every count */
@@ -104,7 +104,7 @@ static void make_noise(Part *p, uint64_t count) {
     p->kept.first = count;
 }
 
-static void draw_start(Part *p) { /* what is drawn once, and the first samples of what is drawn per step */
+static COLD void draw_start(Part *p) { /* what is drawn once, and the first samples of what is drawn per step */
 #if N_PORTS > 0
     double *a = value(p), numbers[AHEAD];
     int i, j;
@@ -144,7 +144,7 @@ typedef double Square[N_X][N_X];
 typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
 #endif
 
-static NEVER_INLINE void product(Square a, Square b, Square out) {
+static OF_MATRIX void product(Square a, Square b, Square out) {
     int i, j, k;
     for (i = 0; i < N_X; i++)
         for (j = 0; j < N_X; j++) {
@@ -154,7 +154,7 @@ static NEVER_INLINE void product(Square a, Square b, Square out) {
         }
 }
 
-static NEVER_INLINE void phi1(Square z, Square out) {
+static OF_MATRIX void phi1(Square z, Square out) {
     Square g;
     double norm = 0.0, scale = 1.0;
     int i, j, k, s = 0;
@@ -184,7 +184,7 @@ static NEVER_INLINE void phi1(Square z, Square out) {
     }
 }
 
-static NEVER_INLINE void jacobian(Part *p, Square a) {
+static OF_MATRIX void jacobian(Part *p, Square a) {
     int i, j;
     for (j = 0; j < N_X; j++) {
         Vars seed;
@@ -252,7 +252,7 @@ static inline void advance(Part *p, double h) {
 #endif
 
 /* --------------------------------------------------------------------------------------- stepping */
-static int told_finite(Part *p, int from, int n, const char *what) {
+static COLD int told_finite(Part *p, int from, int n, const char *what) {
     const double *a = value(p);
     int i;
     for (i = from; i < from + n; i++)
@@ -263,7 +263,7 @@ static int told_finite(Part *p, int from, int n, const char *what) {
     return 1;
 }
 
-static int tell_finite(Part *p) { /* all that the equations write, but for memories */
+static COLD int tell_finite(Part *p) { /* all that the equations write, but for memories */
     int k, ok = told_finite(p, Y0, N_Y, "output") && told_finite(p, X0, N_X, "state");
     for (k = 0; ok && k < N_WATCHED; k++) ok = told_finite(p, watched[k].from, watched[k].n, "discrete");
     return ok;
@@ -292,14 +292,14 @@ static inline int renew(Part *p) {
     return 1;
 }
 
-static void begin(Part *p, const char *name) { /* as instantiated */
+static COLD void begin(Part *p, const char *name) { /* as instantiated */
     memset(p, 0, sizeof *p);
     snprintf(p->name, sizeof p->name, "%s", name ? name : "");
     memcpy(value(p), starts, N_REFERENCES * sizeof(double));
     p->n.dirty = 1.0;
 }
 
-static void evaluate_start(Part *p) {
+static NEVER_INLINE void evaluate_start(Part *p) {
     p->n.v.tick = 0.0;
     p->kept.settled = 0;
     draw_start(p);
@@ -308,7 +308,7 @@ static void evaluate_start(Part *p) {
     p->n.dirty = 0.0;
 }
 
-static void refresh(Part *p) {
+static NEVER_INLINE void refresh(Part *p) {
     if (p->n.dirty == 0.0) return;
     if (p->n.running != 0.0) {
         p->kept.settled = 0;
@@ -319,7 +319,7 @@ static void refresh(Part *p) {
     }
 }
 
-static void initialize(Part *p, double t0) {
+static COLD void initialize(Part *p, double t0) {
     static const char *const words[] = {">=", "<=", ">", "<"};
     const double *a = value(p);
     int i, k = 0;

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from gyrobench.component import Discrete, Input, Output, Parameter, State
 from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
-from gyrobench.packaging.source import Code, Source
+from gyrobench.packaging.source import Code, Source, dotted
 
 Reach: TypeAlias = dict[str, set[str]]  # variable -> the known variables it follows
 
@@ -22,7 +22,7 @@ def called(e: ast.AST, code: Code, source: Source) -> Code | None:
         language = e.func.id in FUNCTIONS or e.func.id in ARRAY_FUNCTIONS
         return None if language else source.function(e.func.id, code)
     if isinstance(e.func, ast.Attribute):
-        of = ast.unparse(e.func.value)
+        of = dotted(e.func.value)
         if of == "self":
             return source.method(e.func.attr, code)
         if of.startswith("self."):
@@ -102,7 +102,7 @@ def flat_name(e: ast.AST, code: Code) -> str | None:
     """Return the part's name of ``self.X``, ``self.der.X``, ``self.noise.X`` or ``self.block.X``; None otherwise."""
     if not isinstance(e, ast.Attribute):
         return None
-    of = ast.unparse(e.value)
+    of = dotted(e.value)
     if of == "self":
         return code.flat(e.attr)
     if of in ("self.der", "self.noise"):

@@ -8,7 +8,7 @@ typedef fmi2CallbackLogger Logger;
 #define EXTENT(place) 1 /* no arrays */
 #include "instance.h"
 
-static void say(Instance *m, const char *message) {
+static COLD void say(Instance *m, const char *message) {
     char format[2 * sizeof m->part.message];
     size_t i = 0;
     for (; *message; message++) { /* the logger takes a printf format */

@@ -19,7 +19,7 @@ typedef fmi3LogMessageCallback Logger;
 
 #define NOT_OFFERED(name) { return wrong((Instance *)m, #name ": not offered by this FMU"); }
 
-static void say(Instance *m, const char *message) { m->logger(m->environment, fmi3Error, "logStatusError", message); }
+static COLD void say(Instance *m, const char *message) { m->logger(m->environment, fmi3Error, "logStatusError", message); }
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
@@ -28,7 +28,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance m, fmi3Boolean on, size_t n, const f
 }
 
 /* ---------------------------------------------------------------------------------- instantiation */
-static fmi3Instance none(Logger logger, void *environment, const char *why) {
+static COLD fmi3Instance none(Logger logger, void *environment, const char *why) {
     if (logger) logger(environment, fmi3Error, "logStatusError", why);
     return NULL;
 }

@@ -14,10 +14,13 @@
 #define PATIENCE 8
 #define ROUNDING 1e-6 /* of the step before: a shorter one is the rounding of a master that sums up the time */
 
+/* COLD: no part of a step, so it is compiled for size, which is less work for the compiler. */
 #ifdef __GNUC__
 #define NEVER_INLINE __attribute__((noinline))
+#define COLD __attribute__((cold, noinline))
 #else
 #define NEVER_INLINE
+#define COLD
 #endif
 
 enum { ONCE, PER_STEP, PER_SECOND }; /* kinds of noise ports */

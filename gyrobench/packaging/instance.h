@@ -14,9 +14,9 @@ typedef struct {
     void *environment;
 } Instance;
 
-static void say(Instance *m, const char *message);
+static COLD void say(Instance *m, const char *message);
 
-static Instance *new_instance(const char *name, Logger logger, void *environment) {
+static COLD Instance *new_instance(const char *name, Logger logger, void *environment) {
     Instance *m = (Instance *)calloc(1, sizeof *m);
     if (!m) return NULL;
     begin(&m->part, name);
@@ -26,7 +26,7 @@ static Instance *new_instance(const char *name, Logger logger, void *environment
     return m;
 }
 
-static void reset(Instance *m) {
+static COLD void reset(Instance *m) {
     m->part.n = m->fresh;
     m->part.kept.settled = m->part.kept.keyed = 0;
     m->part.kept.step = 0.0;
@@ -34,14 +34,15 @@ static void reset(Instance *m) {
 }
 
 /* --------------------------------------------------------------------------------------- failures */
-static int told(Instance *m) { /* the reason of a failure goes to the caller's log, once */
-    if (!m->part.failed) return 0;
+static COLD int tell(Instance *m) { /* the reason of a failure goes to the caller's log, once */
     if (m->part.failed == 1 && m->logger) say(m, m->part.message);
     m->part.failed = 2;
     return 3;
 }
 
-static int wrong(Instance *m, const char *format, ...) { /* a wrong call leaves the instance as it was */
+static inline int told(Instance *m) { return m->part.failed ? tell(m) : 0; }
+
+static COLD int wrong(Instance *m, const char *format, ...) { /* a wrong call leaves the instance as it was */
     const int before = m->part.failed;
     va_list a;
     va_start(a, format);
@@ -54,7 +55,7 @@ static int wrong(Instance *m, const char *format, ...) { /* a wrong call leaves 
 }
 
 /* ---------------------------------------------------------------------------------------- values */
-static int missing(Instance *m, unsigned reference) {
+static COLD int missing(Instance *m, unsigned reference) {
     return wrong(m, "no variable has the value reference %u", reference);
 }
 
@@ -70,7 +71,7 @@ static inline int extent(unsigned reference) { /* the number of its values; 0 wh
 
 static inline int has(unsigned reference) { return extent(reference) > 0; }
 
-static int has_all(Instance *m, const unsigned references[], size_t n) {
+static COLD int has_all(Instance *m, const unsigned references[], size_t n) {
     size_t i;
     for (i = 0; i < n; i++)
         if (!has(references[i])) return missing(m, references[i]) == 0;
@@ -78,7 +79,7 @@ static int has_all(Instance *m, const unsigned references[], size_t n) {
 }
 
 /* To be called before values are read: outputs follow inputs that were set since the last step. */
-static void freshen(Instance *m, const unsigned references[], size_t n) {
+static NEVER_INLINE void freshen(Instance *m, const unsigned references[], size_t n) {
     size_t i;
     for (i = 0; i < n; i++)
         if (in_range(place(references[i]), Y0, N_Y)) refresh(&m->part);
@@ -125,7 +126,7 @@ LINKED_FORM int gyrobench_finite(void *c) { return tell_finite(&((Instance *)c)-
 #endif
 
 /* Derivatives of outputs and state derivatives with respect to inputs, states and parameters. */
-static int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
+static COLD int derivative(Instance *m, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
                       const double dv[], double out[]) {
     Vars seed;
     const Vars before = m->part.n.v; /* asking changes nothing: outputs may read the derivatives of the last step */
@@ -149,14 +150,14 @@ typedef struct {
     Numbers n;
 } Saved;
 
-static int get_state(Instance *m, void **state) {
+static COLD int get_state(Instance *m, void **state) {
     if (!*state) *state = malloc(sizeof(Numbers));
     if (!*state) return wrong(m, "out of memory");
     memcpy(*state, &m->part.n, sizeof(Numbers));
     return 0;
 }
 
-static int set_state(Instance *m, const void *state) {
+static COLD int set_state(Instance *m, const void *state) {
     if (!state) return wrong(m, "no state is given");
     memcpy(&m->part.n, state, sizeof(Numbers));
     m->part.kept.settled = m->part.kept.keyed = 0;
@@ -165,7 +166,7 @@ static int set_state(Instance *m, const void *state) {
     return 0;
 }
 
-static int save(Instance *m, const void *state, void *bytes, size_t size) {
+static COLD int save(Instance *m, const void *state, void *bytes, size_t size) {
     static const char guid[40] = MODEL_GUID;
     if (!state || size < sizeof(Saved)) return wrong(m, "a saved state has %u bytes", (unsigned)sizeof(Saved));
     memcpy(bytes, guid, sizeof guid);
@@ -173,7 +174,7 @@ static int save(Instance *m, const void *state, void *bytes, size_t size) {
     return 0;
 }
 
-static int load(Instance *m, const void *bytes, size_t size, void **state) {
+static COLD int load(Instance *m, const void *bytes, size_t size, void **state) {
     static const char guid[40] = MODEL_GUID;
     if (size != sizeof(Saved) || memcmp(bytes, guid, sizeof guid) != 0)
         return wrong(m, "these bytes are not a state of this FMU");

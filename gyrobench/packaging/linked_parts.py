@@ -11,7 +11,7 @@ from gyrobench.packaging.native_target import RUNTIME, c_source
 
 HERE = Path(__file__).parent
 DEFINED = re.compile(
-    r"^(?:BY_PROCESSOR )?static (?:inline |NEVER_INLINE )?\w+ \*?(\w+)\("  # functions
+    r"^(?:BY_PROCESSOR )?static (?:inline |NEVER_INLINE |COLD |OF_MATRIX )?\w+ \*?(\w+)\("  # functions
     r"|^static const .*?(\w+)\[\] = "  # tables
     r"|^\} (\w+);"  # structures
     r"|^typedef double (\w+)\[",

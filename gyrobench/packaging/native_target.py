@@ -112,6 +112,7 @@ def c_source(cls: type[Component], guid: str) -> str:
         "N_STEPPED": len(stepped),
         "N_FOLLOWED": -1 if follow is None else len(follow),
         "NONLINEAR": f"(p->n.v.{cls.nonlinear} != 0.0)" if isinstance(cls.nonlinear, str) else int(cls.nonlinear),
+        "OF_MATRIX": "NEVER_INLINE" if cls.nonlinear else "COLD",  # of a linear part it is made once for each step
         "MIDPOINT": int(cls.integrator == "midpoint"),
         "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
         "LARGEST_STEP(p, step)": "((p)->n.v.step)" if "step" in cls.declarations else "(step)",

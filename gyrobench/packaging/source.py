@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import functools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType
@@ -23,7 +22,7 @@ KEYWORDS = {
     "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
     # macros of the C library and of core.h
     "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA", "AHEAD",
-    "PATIENCE", "NEVER_INLINE", "BY_PROCESSOR", "CAN_BE_LINKED",
+    "PATIENCE", "NEVER_INLINE", "COLD", "OF_MATRIX", "BY_PROCESSOR", "CAN_BE_LINKED",
     "MODEL_GUID", "N_REFERENCES", "U0", "Y0", "X0", "DX0", "N_U", "N_Y", "N_X", "N_PORTS", "N_STREAMS",
     "N_BOUNDS", "N_WATCHED", "N_STEPPED", "N_FOLLOWED", "NONLINEAR", "MIDPOINT", "RK4_SUBSTEPS", "LARGEST_STEP",
 }  # fmt: skip
@@ -46,8 +45,25 @@ def local(name: str) -> str:
 
 
 @functools.lru_cache(maxsize=256)
-def _tree(path: str, _changed: float) -> ast.Module:
-    return ast.parse(Path(path).read_text(encoding="utf-8"))
+def _functions(path: str, _changed: float) -> dict[tuple[str, int], ast.FunctionDef]:
+    """Return the functions and methods of a file by name and first line, that of a decorator where there is one."""
+    tree = ast.parse(Path(path).read_text(encoding="utf-8"))
+    found = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
+    return {(n.name, min([n.lineno, *(d.lineno for d in n.decorator_list)])): n for n in found}
+
+
+@functools.lru_cache(maxsize=4096)
+def _nodes(function: ast.FunctionDef) -> list[ast.AST]:
+    return [n for s in function.body for n in ast.walk(s)]
+
+
+def dotted(e: ast.expr) -> str:
+    """Return the text of an expression, without the detour of :func:`ast.unparse` where it is a name with dots."""
+    if isinstance(e, ast.Name):
+        return e.id
+    if isinstance(e, ast.Attribute) and isinstance(e.value, ast.Name | ast.Attribute):
+        return f"{dotted(e.value)}.{e.attr}"
+    return ast.unparse(e)
 
 
 @dataclass(frozen=True)
@@ -86,9 +102,9 @@ class Code:
         x = self.function.__globals__.get(name)
         return ast.parse(repr(floats(x)), mode="eval").body if isinstance(x, list) else None  # type: ignore[return-value]
 
-    def nodes(self) -> Iterator[ast.AST]:
-        """Yield every node of the body."""
-        return (n for s in self.node.body for n in ast.walk(s))
+    def nodes(self) -> list[ast.AST]:
+        """Return every node of the body."""
+        return _nodes(self.node)
 
     @property
     def arguments(self) -> list[str]:
@@ -102,11 +118,9 @@ def read_code(function: Any, owner: type | None, placed: Placed | None) -> Code:
     path = Path(at.co_filename)
     if not path.is_file():
         raise SubsetError(f"{function.__qualname__}: equations must stand in a file, this one is in {at.co_filename}")
-    for node in ast.walk(_tree(str(path), path.stat().st_mtime)):
-        if isinstance(node, ast.FunctionDef) and node.name == function.__name__:
-            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
-            if first == at.co_firstlineno:
-                return Code(function, node, owner, placed)
+    node = _functions(str(path), path.stat().st_mtime).get((function.__name__, at.co_firstlineno))
+    if node is not None:
+        return Code(function, node, owner, placed)
     raise SubsetError(f"{path}:{at.co_firstlineno}: {function.__qualname__} is not found in its file: was it changed?")
 
 

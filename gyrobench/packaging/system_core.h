@@ -25,7 +25,7 @@ typedef struct {
 
 static double *value(Part *p) { return p->n.v.x; }
 
-static void vfail(Part *p, const char *format, va_list a) {
+static COLD void vfail(Part *p, const char *format, va_list a) {
     char text[896];
     if (p->failed) return; /* the first reason is the reason */
     vsnprintf(text, sizeof text, format, a);
@@ -33,7 +33,7 @@ static void vfail(Part *p, const char *format, va_list a) {
     p->failed = 1;
 }
 
-static void fail(Part *p, const char *format, ...) {
+static COLD void fail(Part *p, const char *format, ...) {
     va_list a;
     va_start(a, format);
     vfail(p, format, a);
@@ -46,7 +46,7 @@ static int broken(Part *p) { /* whether a part has failed */
     return p->failed;
 }
 
-static void propagate(Part *p) { /* outputs to inputs in execution order, until nothing changes */
+static COLD void propagate(Part *p) { /* outputs to inputs in execution order, until nothing changes */
     double before[N_WIRED] = {0.0}, after[N_WIRED] = {0.0};
     int pass;
     read_all(&p->n.parts);
@@ -58,7 +58,7 @@ static void propagate(Part *p) { /* outputs to inputs in execution order, until 
     }
 }
 
-static void evaluate_start(Part *p) {
+static COLD void evaluate_start(Part *p) {
     begin_parts(&p->n.parts, p->n.v.t);
     set_parameters(&p->n.parts, value(p));
     set_inputs(&p->n.parts, value(p));
@@ -80,7 +80,7 @@ static int inputs_are_finite(Part *p) {
     return !p->failed;
 }
 
-static void initialize(Part *p, double t0) {
+static COLD void initialize(Part *p, double t0) {
     p->n.v.t = p->n.t0 = t0;
     p->n.steps = 0.0;
     if (!inputs_are_finite(p)) return;
@@ -128,7 +128,7 @@ static int linked_step(Part *p, double t, double step) {
     return p->failed ? 3 : 0;
 }
 
-static void begin(Part *p, const char *name) { /* as instantiated */
+static COLD void begin(Part *p, const char *name) { /* as instantiated */
     memset(p, 0, sizeof *p);
     snprintf(p->name, sizeof p->name, "%s", name ? name : "");
     memcpy(value(p), starts, N_REFERENCES * sizeof(double));

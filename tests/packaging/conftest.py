@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import functools
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import fmpy
-import lark
 import pytest
 from toybench import FORMS, HEAD, PARTS, TARGETS, TOYS
 
@@ -26,26 +23,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("target", TARGETS)
     if "form" in metafunc.fixturenames:
         metafunc.parametrize("form", FORMS)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def parser_with_a_memory() -> Iterator[None]:
-    """FMPy's validation parses the name of every variable of an FMU, which takes seconds.
-
-    Names that differ in the value of a number alone ("faces[3,7]") are parsed once: the grammar knows digits only.
-    """
-    parse = lark.Lark.parse
-    parsed: set[tuple[str, str]] = set()
-
-    def once(self: lark.Lark, text: str) -> Any:
-        key = self.source_grammar, re.sub(r"[0-9]+", "1", text)
-        if key not in parsed:
-            parse(self, text)
-            parsed.add(key)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lark.Lark, "parse", once)
-        yield
 
 
 @pytest.fixture(scope="session")

@@ -8,12 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fmpy.model_description import ModelDescription, ScalarVariable
+from fmpy.validation import _validate_variable_names
 from toybench import TOYS
 
-from gyrobench.bench import BenchError
+from gyrobench.bench import Bench, BenchError, standard_folder
 from gyrobench.packaging import compiler
 from gyrobench.packaging.reference import write_reference
-from gyrobench.packaging.validate import validate
+from gyrobench.packaging.validate import STRUCTURED, validate
 
 
 def test_parts_have_no_problems(part: str) -> None:
@@ -89,3 +91,79 @@ def test_another_run_than_the_reference(tmp_path: Path, fmu: Callable) -> None:
     assert any("site 1.1.0, but the reference run is that of 1.0.0" in p for p in validate("site", tmp_path))
     (folder / "reference.csv").unlink()
     assert validate("site", tmp_path) == ["site has no reference.csv beside its model.py"]
+
+
+LEGAL = [
+    "a",
+    "_",
+    "A1_b",
+    "a[1]",
+    "a[1,22].b",
+    "der(a)",
+    "der(a.b[3],2)",
+    "'a#b'",
+    "der('q'[1])",
+    "a.'['.b[0]",
+    "'a b'",
+]
+ILLEGAL = [
+    "1a",
+    "a[",
+    "a[]",
+    "a[1,]",
+    "a[x]",
+    "a..b",
+    ".a",
+    "a.",
+    "der(a",
+    "der()",
+    "der(a,)",
+    "a[1][2]",
+    "é",
+    "''",
+    "'a",
+]
+ILLEGAL += ["a-b", "der(der(a))", "der(a)[1]", "'é'", "", "a b", "a\n"]
+
+
+@pytest.mark.parametrize("name", [*LEGAL, *ILLEGAL])
+def test_names_of_variables_as_the_grammar_has_them(name: str) -> None:
+    """The convention "structured" by a general parser of FMPy."""
+    description = ModelDescription()
+    description.modelVariables = [ScalarVariable(name, 1)]
+    description.variableNamingConvention = "structured"
+    assert (_validate_variable_names(description) == []) == (name in LEGAL)
+    assert (STRUCTURED.fullmatch(name) is not None) == (name in LEGAL)
+
+
+def test_escapes_in_names() -> None:
+    """Those of the standard; FMPy takes a backslash before any character."""
+    for c in "'\"?\\abfnrtv":
+        assert STRUCTURED.fullmatch(f"'a\\{c}b'")
+    assert not STRUCTURED.fullmatch("'a\\xb'") and not STRUCTURED.fullmatch("'a'b'")
+
+
+def test_an_illegal_name(fmu: Callable, tmp_path: Path) -> None:
+    path = changed(fmu("site", "native"), tmp_path / "a.fmu", lambda text: text.replace('name="g"', 'name="g-1"'))
+    (problem,) = validate(path)
+    assert re.fullmatch(r'"g-1" \(line \d+\) is not a legal name of the naming convention "structured"', problem)
+    flat = changed(path, tmp_path / "b.fmu", lambda text: text.replace('Convention="structured"', 'Convention="flat"'))
+    assert "legal" not in "".join(validate(flat))
+
+
+def test_a_system_that_has_the_name_of_a_part(fmu: Callable, tmp_path: Path) -> None:
+    """It is not the part, whose reference run has another version, other inputs and outputs."""
+    home, name = Bench(standard_folder()), "vertical_gyro"
+    assert name in home.systems() and name in home.parts()
+
+    def of_the_system(text: str) -> str:
+        return text.replace('modelName="VerticalGyro"', f'modelName="{name}"')
+
+    path = changed(
+        fmu(name, "native"),
+        tmp_path / "part.fmu",
+        lambda text: re.sub(r'(?<!xml) version="[^"]*"', ' version="9"', text),
+    )
+    (problem,) = validate(path)
+    assert problem.startswith("vertical_gyro 9, but the reference run is that of ")
+    assert validate(changed(path, tmp_path / "system.fmu", of_the_system)) == []

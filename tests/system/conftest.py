@@ -71,7 +71,8 @@ class SmallTumble(System):
         )
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**self.plan().parameters(), "site.latitude": self["latitude"]}
+        moves = {"table.acceleration": 1.0}  # rad/s2: a sixth of the time that its default takes for the same windows
+        return {**self.plan().parameters(), **moves, "site.latitude": self["latitude"]}
 
     def check(self) -> list[str]:
         return ["latitude 0: nothing to see"] if self["latitude"] == 0.0 else []

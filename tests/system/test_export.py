@@ -31,6 +31,7 @@ QUICK = {
     "gyro.pickoff": 0.0,
     "rebalance.meter": 0.0,
 }
+END = 4.0  # s, after the end of the plan
 MAPPED = {"gyro": FOREIGN / "vendor_gyro.toml"}
 
 
@@ -113,7 +114,7 @@ def test_ssp_in_fmpy(small: System, archive: Path) -> None:
     from fmpy.ssp.ssd import read_ssv
 
     values = read_ssv(str(archive), "resources/parameters.ssv")
-    found = simulate_ssp(str(archive), stop_time=22.0, step_size=1e-3, parameter_set=values)
+    found = simulate_ssp(str(archive), stop_time=END, step_size=1e-3, parameter_set=values)
     close(run(small, values=QUICK), record_from_series(small, {n: found[n] for n in names(small)}), 5)
 
 
@@ -132,7 +133,7 @@ def test_ssp_in_libcosim(small: System, archive: Path, tmp_path: Path) -> None:
     references = {v.name.decode(): v.reference for v in execution.slave_variables(slave)}
     wanted = [references[n.partition(".")[2]] for n in names(small)]
     rows: list[Any] = []
-    for _ in range(22000):
+    for _ in range(round(END / 1e-3)):
         execution.step()
         rows.append(observer.last_real_values(slave, wanted))
     series = dict(zip(names(small), np.array(rows).T, strict=True))
@@ -149,7 +150,7 @@ def test_container_is_bit_equal(small: System, tmp_path: Path) -> None:
     export_container(small, path, values=noisy, seed=9)
     assert validate_fmu(str(path)) == []
     found = simulate_fmu(
-        str(path), stop_time=22.0, step_size=1e-3, output_interval=1e-3, output=[*names(small), "gyro.u"]
+        str(path), stop_time=END, step_size=1e-3, output_interval=1e-3, output=[*names(small), "gyro.u"]
     )
     record = record_from_series(small, {n: found[n] for n in names(small)})
     assert record.windows.keys() == run(small, values=noisy, seed=9).windows.keys()
