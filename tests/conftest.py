@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -22,6 +23,8 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # the test processe
 
 def pytest_configure(config: pytest.Config) -> None:
     """Builds go to a folder of the session, which its processes share, unless GYROBENCH_CACHE names one."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell: tests interrupt their runs
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if "GYROBENCH_CACHE" not in os.environ:
         os.environ["GYROBENCH_CACHE"] = os.environ[CREATED] = tempfile.mkdtemp(prefix="gyrobench-tests-")
 

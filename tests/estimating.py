@@ -7,8 +7,7 @@ from ctypes import c_double, c_uint
 from typing import Any
 
 import numpy as np
-
-from gyrobench.packaging.instance import make
+from native_parts import make
 
 Array = np.ndarray[Any, Any]
 AR3 = (-0.7466, -0.5044, -0.2538)  # table 3.4.2 of Xia 2008 with its sign put right

@@ -6,21 +6,14 @@ import ast
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gyrobench.component import Noise, State
-from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
-from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells, words
-from gyrobench.packaging.source import Code, SubsetError, gives_value, local, member, returns
+from gyrobench.packaging.arrays import Place, Value, words
+from gyrobench.packaging.places import OPERATORS, Places
+from gyrobench.packaging.source import Code, SubsetError, gives_value, returns
 
 if TYPE_CHECKING:
-    from gyrobench.packaging.translate import Procedure, Translation
+    from gyrobench.packaging.translate import Procedure
 
-OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
-    ast.Add: ("+", "d_add"),
-    ast.Sub: ("-", "d_sub"),
-    ast.Mult: ("*", "d_mul"),
-    ast.Div: ("/", "d_div"),
-}
 COMPARISONS: dict[type[ast.AST], str] = {
     ast.Lt: "<",
     ast.LtE: "<=",
@@ -34,133 +27,9 @@ ARGUMENTS = {"atan2": 2, "minimum": 2, "maximum": 2, "clip": 3, "where": 3, "dot
 WRITE = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
-class Expressions:
+class Expressions(Places):
     """Translates the expressions of one method, for numbers (``dual=False``) or for dual numbers."""
 
-    def __init__(self, translation: Translation, code: Code, dual: bool, shapes: tuple[Shape, ...] = ()) -> None:
-        self.translation, self.code, self.dual = translation, code, dual
-        self.declared = translation.source.cls.declarations
-        self.locals: dict[str, Shape] = {}  # temporaries too, under their C names
-        self.bare: set[str] = set()  # locals made from a list: no arithmetic in Python
-        self.loops: dict[str, Range] = {}
-        self.arguments = dict(zip(code.arguments, shapes, strict=True))
-        self.assigned = set(self.arguments)  # locals that surely have a value here
-        self.pre: list[str] = []  # statements that come before the current one
-        self.temporaries = 0
-        self.touched: set[str] = set()  # flat names that are written, here or in what is called
-
-    def refuse(self, node: ast.AST, what: str) -> SubsetError:
-        return self.code.refuse(node, what)
-
-    # ------------------------------------------------------------------------------ places
-    def index(self, e: ast.expr) -> tuple[str, Range]:
-        """Return an index, counted from 0, and its range: loop variables, literals, + - *, and index(expr)."""
-        if isinstance(e, ast.Constant) and isinstance(e.value, int):
-            return str(e.value), (e.value, e.value)
-        if isinstance(e, ast.Name) and e.id in self.loops:
-            return local(e.id), self.loops[e.id]
-        if isinstance(e, ast.Name) and (x := self.code.constant(e.id)) is not None:
-            return str(int(x)), (int(x), int(x))
-        if isinstance(e, ast.BinOp) and isinstance(e.op, ast.Add | ast.Sub | ast.Mult):
-            (a, (a0, a1)), (b, (b0, b1)) = self.index(e.left), self.index(e.right)
-            text = f"({a} {OPERATORS[type(e.op)][0]} {b})"
-            if a0 is None or a1 is None or b0 is None or b1 is None:
-                return text, (None, None)
-            if isinstance(e.op, ast.Add):
-                return text, (a0 + b0, a1 + b1)
-            if isinstance(e.op, ast.Sub):
-                return text, (a0 - b1, a1 - b0)
-            ends = [x * y for x in (a0, a1) for y in (b0, b1)]
-            return text, (min(ends), max(ends))
-        if isinstance(e, ast.Call) and isinstance(e.func, ast.Name) and e.func.id == "index" and len(e.args) == 1:
-            return f"whole({self.scalar(e.args[0])})", (None, None)
-        raise self.refuse(
-            e, f"{ast.unparse(e)!r}: an index is a loop variable, a whole number from 0 on, or index(expression)"
-        )
-
-    def place(self, e: ast.expr) -> Place:
-        if isinstance(e, ast.Subscript):
-            return self.element(e)
-        if isinstance(e, ast.Name):
-            if e.id in self.loops:
-                return Place(local(e.id), "loop")
-            if e.id in self.locals or e.id in self.arguments:
-                if e.id not in self.assigned:
-                    raise self.refuse(e, f"{e.id!r} is not assigned on every path before it is read")
-                shape = self.locals[e.id] if e.id in self.locals else self.arguments[e.id]
-                return Place(local(e.id), "local", e.id, shape)
-            if (x := self.code.constant(e.id)) is not None:
-                return Place(repr(x), "constant")
-            raise self.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
-        if isinstance(e, ast.Attribute) and not self.transposes(e):
-            return self.attribute(e)
-        value = self.value(e)
-        if not value.shape:
-            raise self.refuse(e, f"{ast.unparse(e)} is a number: it has no elements")
-        return self.kept(value)
-
-    def element(self, e: ast.Subscript) -> Place:
-        of = self.place(e.value)
-        if isinstance(e.slice, ast.Tuple):
-            raise self.refuse(e, f"write {ast.unparse(e.value)}[i][j]")
-        if not of.shape:
-            raise self.refuse(e, f"{ast.unparse(e.value)} is a number: it has no elements")
-        size = of.shape[0]
-        if isinstance(e.slice, ast.Slice):
-            return of.indexed(self.span(e, e.slice, size))
-        text, (first, last) = self.index(e.slice)
-        if first is None or last is None:
-            text = f"at(part, {text}, {size})"
-        elif first <= last and not (first >= 0 and last < size):
-            which = f"is {first}" if first == last else f"runs over {first} to {last}"
-            have = f"{ast.unparse(e.value)} has the elements 0 to {size - 1}"
-            raise self.refuse(e, f"the index {ast.unparse(e.slice)} {which}: {have}")
-        return of.indexed(text)
-
-    def span(self, e: ast.Subscript, s: ast.Slice, size: int) -> Span:
-        ends = [(0, 0) if s.lower is None else self.index(s.lower)[1], (size, size)]
-        if s.upper is not None:
-            ends[1] = self.index(s.upper)[1]
-        (first, same), (last, end) = ends
-        if s.step is not None or first is None or last is None or first != same or last != end:
-            raise self.refuse(e, f"the slice {ast.unparse(e)} must be [a:b] with whole numbers that are fixed")
-        if not 0 <= first < last <= size:
-            raise self.refuse(e, f"the slice {ast.unparse(e)}: {ast.unparse(e.value)} has the elements 0 to {size - 1}")
-        return first, last - first
-
-    def attribute(self, e: ast.Attribute) -> Place:
-        source = ast.unparse(e.value)
-        name = self.code.flat(e.attr)
-        d = self.declared.get(name)
-        if source == "self":
-            if e.attr in TIMES:
-                return Place(e.attr, "self", e.attr)
-            if d is not None:
-                return Place(member(name), "self", name, d.shape)
-            if (x := self.code.constant(e.attr, of_self=True)) is not None:
-                return Place(repr(x), "constant")
-            owner = self.code.owner or self.translation.source.cls
-            raise self.refuse(e, f"self.{e.attr} is not declared in {owner.__name__}")
-        if source == "self.der" and isinstance(d, State):
-            return Place(f"der.{member(name)}", "self", f"der.{name}", d.shape)
-        if source == "self.noise" and isinstance(d, Noise):
-            return Place(f"noise.{member(name)}", "self", f"noise.{name}", d.sample_shape)
-        if source.startswith("self.") and (place := self.of_block(e, source)) is not None:
-            return place
-        raise self.refuse(e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise")
-
-    def of_block(self, e: ast.Attribute, source: str) -> Place | None:
-        """Return ``self.block.x``, a declaration of a block; None where there is no such block."""
-        blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
-        placed = blocks.get(source.removeprefix("self."))
-        if placed is None:
-            return None
-        if e.attr not in placed.names:
-            raise self.refuse(e, f"{ast.unparse(e)} is not declared in {type(placed.block).__name__}")
-        name = placed.names[e.attr]
-        return Place(member(name), "self", name, self.declared[name].shape)
-
-    # ------------------------------------------------------------------------------ expressions
     def expression(self, e: ast.expr) -> str:
         """Return the text of a number."""
         value = self.value(e)
@@ -281,16 +150,6 @@ class Expressions:
 
     def times(self, x: str, y: str) -> str:
         return f"d_mul({x}, {y})" if self.dual else f"({x} * {y})"
-
-    def transposes(self, e: ast.expr) -> bool:
-        """Return whether ``x.T`` is a transpose, not a quantity called T."""
-        if not isinstance(e, ast.Attribute) or e.attr != "T":
-            return False
-        blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
-        of = ast.unparse(e.value)
-        block = of.removeprefix("self.")
-        named = block in blocks and self.code.flat(block) not in self.declared  # not a block that is one array
-        return of not in ("self", "self.der", "self.noise") and not named
 
     def transposed(self, e: ast.Attribute) -> Value:
         of = self.operand(e.value)
@@ -424,32 +283,6 @@ class Expressions:
     def count(self, e: ast.Call, name: str, n: int) -> None:
         if len(e.args) != n:
             raise self.refuse(e, f"{name} takes {n} argument{'s' if n != 1 else ''}, not {len(e.args)}")
-
-    # ------------------------------------------------------------------------------ temporaries
-    def temporary(self, shape: Shape) -> Place:
-        self.temporaries += 1
-        name = f"t{self.temporaries}_"
-        self.locals[name] = shape
-        return Place(name, "local", name, shape)
-
-    def settled(self, p: Place) -> Place:
-        """Return a place whose run-time indices are computed once for all its elements."""
-        if not p.shape or not any(isinstance(t, str) and t.startswith("at(") for t in p.taken):
-            return p
-        taken: list[str | Span] = []
-        for t in p.taken:
-            if isinstance(t, str) and t.startswith("at("):
-                self.temporaries += 1
-                self.pre.append(f"const int t{self.temporaries}_ = {t};")
-                t = f"t{self.temporaries}_"
-            taken.append(t)
-        return Place(p.base, p.kind, p.name, p.dims, tuple(taken))
-
-    def kept(self, v: Value) -> Place:
-        """Compute an array before the current statement, into a temporary."""
-        at = self.temporary(v.shape)
-        self.pre += [f"{at.at(*i)} = {v.element(*i)};" for i in cells(v.shape)]
-        return at
 
     def named(self, v: Value) -> Value:
         """Compute a number before the current statement, so that all elements share it."""

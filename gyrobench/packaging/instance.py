@@ -157,7 +157,8 @@ class Fmu:
         self.messages = _logs.setdefault(self.identity, [])
         self.variables = {v.name: v for v in self.description.modelVariables}
         self._known: dict[tuple[str, ...], list[_Access]] = {}
-        self.holding = {n: v for v in self.variables.values() for n in elements([v])}  # element -> its variable
+        self.holding = {n: v for n, v in self.variables.items() if not v.shape}  # element -> its variable
+        self.holding |= {n: v for v in self.variables.values() if v.shape for n in elements([v])}
         self.t0 = 0.0
         arguments = {
             "guid": self.description.guid,

@@ -323,8 +323,9 @@ class Method(Expressions):
         head = f"static inline {kind} {name}(Part *part{seed}{args})"
         zero = "{0.0, 0.0}" if self.dual else "0.0"
         declared = [
-            f"    {number} {_c_name(n)}{dimensions(shape)}{'' if shape else f' = {zero}'};"
+            f"    {number} {c_name}{dimensions(shape)}{'' if shape else f' = {zero}'};"
             for n, shape in self.locals.items()
+            for c_name in [n if TEMPORARY.fullmatch(n) else local(n)]
         ]
         opening = ["    Vars *self = &part->n.v;"]
         if not any("self->" in x for x in lines):
@@ -332,11 +333,6 @@ class Method(Expressions):
         if self.dual and not any("seed" in x for x in lines):
             opening.append("    (void)seed;")
         return head, "\n".join([f"{head} {{", *opening, *declared, *lines, "}"])
-
-
-def _c_name(name: str) -> str:
-    """Return the C name of a local; a temporary has its own."""
-    return name if TEMPORARY.fullmatch(name) else local(name)
 
 
 class Translation:

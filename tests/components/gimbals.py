@@ -9,11 +9,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from native_parts import make
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 Three = load_part("platform_three_gimbal_2dof", BENCH)
 Four = load_part("platform_four_gimbal", BENCH)
@@ -72,7 +72,7 @@ def fly(
     their start angles (theta_0[1] ...) and the mount; the feedback (1/s) turns the platform back to where it began."""
     four = part == "platform_four_gimbal"
     mount = 1 if four else int(parameters.get("mount", 0))
-    one = make(part, "native", bench=BENCH)
+    one = make(part, "native")
     one.set({n: float(x) for n, x in parameters.items()})
     one.initialize()
     names = [f"{n}[{k}]" for n in ("theta", "attitude", "omega") for k in (1, 2, 3)] + ["lock", "saturated"]

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
 
-from gyrobench.packaging.instance import InstanceError, make
+from gyrobench.packaging.instance import InstanceError
 
 W, G = 7.2921159e-5, 9.80665
 DPH, ARCMIN = math.pi / 648000.0, math.pi / 10800.0

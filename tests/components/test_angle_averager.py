@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy import stats
 from scipy.interpolate import CubicSpline
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 ARCSEC = math.pi / 648000.0
 TURN = 2.0 * math.pi

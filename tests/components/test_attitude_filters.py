@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.linalg import block_diag, expm
 from scipy.spatial.transform import Rotation
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 H, G, LAT = 0.05, 9.80665, 0.6981317007977318
 EARTH = 7.2921159e-5 * np.array([0.0, math.cos(LAT), math.sin(LAT)])

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.spatial.transform import Rotation
 from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 BaseMotion = load_part("base_motion", BENCH)
 W_E, LATITUDE, H = 0.05, 0.7, 1e-4  # an Earth that turns fast, so that its share shows
@@ -100,7 +100,7 @@ def test_profile_follows_a_parabola_exactly_inside():
 @pytest.mark.parametrize(("preset", "roll", "heave"), [(1, 1.5, 0.2), (3, 8.0, 1.0), (5, 2.0, 1.5)])
 def test_presets_have_the_rms_of_the_table(preset, roll, heave):
     """Sines of different frequency add their powers: a long mean of the square is rms2.  (The native FMU: quicker.)"""
-    part = make("base_motion", "native", bench=BENCH)
+    part = make("base_motion", "native")
     part.set({"preset": preset, "onset": 0.0})
     part.initialize()
     angles, forces = [], []
@@ -124,7 +124,7 @@ def test_lines_of_a_preset_share_the_spectrum_equally():
 
 
 def test_native_target_repeats_a_preset():
-    parts = [make("base_motion", how, bench=BENCH) for how in ("plain", "native")]
+    parts = [make("base_motion", how) for how in ("plain", "native")]
     names = [f"{n}[{i}]" for n in ("angle", "omega", "alpha", "f") for i in (1, 2, 3)]
     seen = []
     for part in parts:

@@ -9,10 +9,8 @@ import math
 import numpy as np
 import pytest
 from gimbal_oracle import accelerations, along, turned
+from native_parts import make
 from scipy.integrate import solve_ivp
-from wired import BENCH
-
-from gyrobench.packaging.instance import make
 
 SIZE = np.array([0.8, 0.6, 0.5])  # rad/s
 FREQUENCY = 2.0 * math.pi * np.array([0.9, 1.3, 0.7])
@@ -48,7 +46,7 @@ def attitude(start):
 
 def ridden(part, h, outputs, told=True, names=("omega_b", "alpha_b", "f_b"), **parameters):
     """Outputs at END after steps h; ``told``: with the acceleration."""
-    one = make(part, "native", bench=BENCH)
+    one = make(part, "native")
     signals = dict(zip(names, (rate, acceleration if told else lambda t: np.zeros(3), force), strict=True))
 
     def give(t):
@@ -137,7 +135,7 @@ def test_three_axis():
 
 def test_three_axis_keeps_its_momentum_where_the_base_jumps():
     """Free bearings, a rate of the base that begins at once and without an acceleration: the element stays at rest."""
-    one = make("platform_three_axis", "native", bench=BENCH)
+    one = make("platform_three_axis", "native")
     one.set(elements("viscous", [0.0] * 3) | elements("k_e", [0.0] * 3))
     one.initialize()
     one.set({"omega_b[1]": 0.5})

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-
-from gyrobench.packaging.instance import make
+from native_parts import make
 
 DPH = ARCSEC = math.pi / 648000.0
 RMS, TAU = 0.01 * DPH, 3600.0

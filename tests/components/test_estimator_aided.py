@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from estimating import AIDED, aided_model, aided_series
+from native_parts import make
 from scipy import stats
 from wired import BENCH
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 T, K = AIDED["Ts"], AIDED["k"]
 OUT = ["estimate", "variance", "innovation", "nis", "b", "b_variance", "theta", "aided", "nis_angle"]

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 from estimating import play
+from native_parts import make
 from scipy.signal import lfilter
 
 from gyrobench.component import ComponentError
 from gyrobench.component.blocks import wavelet_bank as block
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 from gyrobench.reduction.series import wavelets as offline
 
 pywt = pytest.importorskip("pywt")

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 from estimating import AR3, SIGMA2, autoregressive, companion, kalman, play, rate_model, riccati, rms
+from native_parts import make
 from scipy import linalg, stats
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 SAMPLED = [
     "estimator_moving_average",

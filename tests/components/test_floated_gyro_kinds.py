@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro
 
 from gyrobench.component import ComponentError
-from gyrobench.packaging.instance import make
 
 H = 1e-3
 # the gyro of Xia 2008 [GYRO-SDF-EOM]; as a rate gyro of 100 Hz, damping 0.7
@@ -232,7 +232,7 @@ def test_native_is_bit_equal_with_everything_on():
     """reference.csv is the gyro of the drift tests; this one has spring, dynamic errors, reaction and stop."""
     rows = []
     for target in ("plain", "native"):
-        one = make("floated_gyro", target, bench=BENCH)
+        one = make("floated_gyro", target)
         one.set({**RATE, **FLOAT, "reaction": 1.0, "stop": 1.0, "seed": 4.0})
         one.set({"omega[2]": 0.3, "omega[3]": 0.5, "alpha[1]": 3.0, "alpha[3]": -2.0})
         one.initialize(0.0)

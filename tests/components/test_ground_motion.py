@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from wired import BENCH
 
-from gyrobench.packaging.instance import InstanceError, Plain, make
+from gyrobench.packaging.instance import InstanceError, Plain
 from gyrobench.packaging.loading import load_part
 
 GroundMotion = load_part("ground_motion", BENCH)
@@ -93,7 +94,7 @@ def test_without_motion_it_is_the_site():
 
 def test_seismic_noise_has_its_size_and_its_peak():
     """rms and spectrum from 1000 s: power in bands of S ~ f2 / ((f0^2 - f2)2 + (2 d f0 f)2), integrated here."""
-    made = make("ground_motion", "native", bench=BENCH)
+    made = make("ground_motion", "native")
     try:
         made.set({"seismic_n": 1e-5, "gravity": G0, "seed": 5})
         made.initialize(0.0)

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH, Native
+from wired import Native
 
 from gyrobench.component import ComponentError
-from gyrobench.packaging.instance import make
 
 QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
 STILL = {**QUIET, **{f"D{c}_{n}": 0.0 for c in "xy" for n in ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")}}
@@ -136,7 +136,7 @@ def test_native_is_bit_equal_at_full_size():
     values = {"full": 1.0, **POWER, "seed": 3.0, "stop": 1.2}
     rows = []
     for target in ("plain", "native"):
-        one = make("gyro_2dof", target, bench=BENCH)
+        one = make("gyro_2dof", target)
         one.set(values)
         one.set({"M_x": 6.0, "omega[3]": 0.4})
         one.initialize(0.0)

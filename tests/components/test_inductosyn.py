@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from wired import BENCH
@@ -11,7 +12,6 @@ from wired import BENCH
 from gyrobench.component import Component, ComponentError, Input, Output, Parameter, sampled
 from gyrobench.component.blocks import angle as block
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 Inductosyn = load_part("inductosyn", BENCH)
 ARCSEC = math.pi / 648000.0
@@ -411,7 +411,7 @@ def test_native_is_bit_equal_in_every_mode(more):
     """reference.csv is one mode with one-phase excitation."""
     rows = []
     for target in ("plain", "native"):
-        one = make("inductosyn", target, bench=BENCH)
+        one = make("inductosyn", target)
         one.set({"coarse_zero": 0.003, "encoder_reading": 1e-6, "seed": 4.0, **{n: float(x) for n, x in more.items()}})
         one.initialize(0.0)
         for k in range(100):

@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro
 
 from gyrobench import drift
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 G0 = 9.80665
 # the gyro of Xia 2008 as a rate gyro of 100 Hz [GYRO-SDF-EOM]

@@ -356,7 +356,7 @@ def test_nees_and_nis_of_the_state(part: str) -> None:
     roots = {k: np.linalg.cholesky(given[k]) for k in ("W", "V", "P0")}
     P = kalman_of_many(np.zeros((steps, 2)), **oracle)[-1][1][:3, :3]
     nees, nis = [], []
-    from gyrobench.packaging.instance import make
+    from native_parts import make
 
     one = make(f"estimator_{part}", "native")
     for _ in range(runs):

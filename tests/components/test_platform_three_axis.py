@@ -5,13 +5,13 @@ import math
 import casadi
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import make
 
 Platform = load_part("platform_three_axis", BENCH)
 SingleAxis = load_part("platform_single_axis", BENCH)
@@ -90,7 +90,7 @@ def test_neutral_inertias():
 @pytest.mark.parametrize("h", [1e-4, 1e-3])
 def test_energy_of_the_undriven_gimbals_is_kept(h):
     """10 s, no friction, base at rest: to 1e-8, and the momentum about the roll axis, which nothing can change, too."""
-    part = make("platform_three_axis", "native", bench=BENCH)
+    part = make("platform_three_axis", "native")
     none = {f"{n}[{k}]": 0.0 for n in ("viscous", "k_e") for k in (1, 2, 3)}
     start = {"theta_0[1]": 0.5, "theta_0[2]": 0.1, "theta_0[3]": 0.3}
     rates = {"theta_dot_0[1]": -0.7, "theta_dot_0[2]": 0.4, "theta_dot_0[3]": 3.0}  # swings about pitch 0

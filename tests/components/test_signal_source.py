@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 from estimating import AR3, SIGMA2, arrays
+from native_parts import make
 from scipy import signal, stats
-
-from gyrobench.packaging.instance import make
 
 NAMES = ["z", "truth", "signal", "drift"]
 

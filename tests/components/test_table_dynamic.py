@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
-from wired import BENCH
 
-from gyrobench.packaging.instance import InstanceError, make
+from gyrobench.packaging.instance import InstanceError
 
 ARCSEC = math.pi / 648000.0
 ERU = 7.2921159e-5
@@ -18,7 +18,7 @@ GCM = 9.80665e-5
 
 @pytest.fixture
 def table():
-    part = make("table_dynamic", "native", bench=BENCH)
+    part = make("table_dynamic", "native")
     yield part
     part.free()
 
@@ -115,7 +115,7 @@ def test_acceleration_turns_into_the_change_of_rate(table, h):
 def test_less_jitter_with_softer_poles(table):
     """p = 0.7 for 0: rate jitter 14 times less without lag, stiffness 16 times less.  [CTRL-SAMPLED]"""
     soft = run(table, 5.0, ["rate"], target=10.0 * ERU, law_p=0.7)
-    other = make("table_dynamic", "native", bench=BENCH)
+    other = make("table_dynamic", "native")
     hard = run(other, 5.0, ["rate"], target=10.0 * ERU)
     other.free()
     assert np.std(hard[2000:, 0]) > 5.0 * np.std(soft[2000:, 0])

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from wired import BENCH
 
-from gyrobench.packaging.instance import InstanceError, make
+from gyrobench.packaging.instance import InstanceError
 
 ARCSEC = math.pi / 648000.0
 GCM = 9.80665e-5
@@ -19,7 +19,7 @@ SENSITIVITY = K_SG * H / C_G
 
 @pytest.fixture
 def table():
-    part = make("table_servo_dynamic", "native", bench=BENCH)
+    part = make("table_servo_dynamic", "native")
     yield part
     part.free()
 

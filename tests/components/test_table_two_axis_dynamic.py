@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from wired import BENCH
+from native_parts import make
 
-from gyrobench.packaging.instance import InstanceError, make
+from gyrobench.packaging.instance import InstanceError
 
 ARCSEC = math.pi / 648000.0
 ERU = 7.2921159e-5
@@ -15,7 +15,7 @@ SOFT = {"outer_law_p": 0.7, "inner_law_p": 0.7}
 
 @pytest.fixture
 def table():
-    part = make("table_two_axis_dynamic", "native", bench=BENCH)
+    part = make("table_two_axis_dynamic", "native")
     yield part
     part.free()
 
@@ -50,7 +50,7 @@ def test_inertia_of_the_outer_axis_grows_with_the_inner_angle(table):
     """Unbalance switched on by a step of gravity: x'' = M / (J + D sin2 y) before the loop answers (T = 5 ms)."""
     acc = {}
     for y in (0.0, 90.0):
-        part = make("table_two_axis_dynamic", "native", bench=BENCH)
+        part = make("table_two_axis_dynamic", "native")
         part.set({"angle0[2]": math.radians(y), "across[2]": 3.0, "outer_axis_unbalance[1]": 0.05})
         part.set({"f_local[3]": 0.0, "f_local[2]": 0.0})
         part.initialize()
@@ -81,7 +81,7 @@ def test_stands_against_the_earth_as_the_kinematic_table(table):
     same = {"squareness": 0.002, "wobble[1]": 1e-4, "wobble[2]": 2e-4, "f_local[1]": 0.3, "omega_local[2]": 5e-5}
     angles = {"angle0[1]": 0.7, "angle0[2]": -0.4}
     names = [f"{v}[{k}]" for v in ("omega", "f") for k in (1, 2, 3)]
-    kinematic = make("table_two_axis", "native", bench=BENCH)
+    kinematic = make("table_two_axis", "native")
     expected = run(kinematic, 1e-3, names, **same, **angles)[-1]
     kinematic.free()
     seen = run(table, 1.0, names, **same, **angles)

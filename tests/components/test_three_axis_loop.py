@@ -8,11 +8,9 @@ import math
 import control
 import numpy as np
 import pytest
+from native_parts import make
 from scipy.linalg import expm
 from scipy.signal import cont2discrete, detrend, lfilter
-from wired import BENCH
-
-from gyrobench.packaging.instance import make
 
 DEG = math.pi / 180.0
 MIL = 2 * math.pi / 6000  # 83 mil = 4.98 deg
@@ -38,8 +36,8 @@ def network():
 
 def fly(theta, seconds, decoupled, command=lambda t: np.zeros(3), base=lambda t: (np.zeros(3), np.zeros(3))):
     """Attitude over time of the closed loop from these joint angles (A order), or None where it ran off."""
-    platform = make("platform_three_axis", "native", bench=BENCH)
-    part = make("decoupler_t2" if decoupled else "decoupler_none", "native", bench=BENCH)
+    platform = make("platform_three_axis", "native")
+    part = make("decoupler_t2" if decoupled else "decoupler_none", "native")
     vector = lambda name: [f"{name}[{k}]" for k in (1, 2, 3)]  # noqa: E731
     motor = {n: x for k in (1, 2, 3) for n, x in ((f"L[{k}]", 0.0), (f"k_e[{k}]", 0.0), (f"R[{k}]", 1.0))}
     limits = {f"{n}[{k}]": 1e6 for n in ("v_max", "i_max") for k in (1, 2, 3)}
@@ -154,7 +152,7 @@ def test_signal_chain_of_the_83_mil_bench(theta, without, with_t2):
     c, s, cf = np.cos(azimuth), np.sin(azimuth), np.cos(pitch)
     wn = 2 * math.pi * 50
     b, a, _ = cont2discrete(([wn**2], [1, 1.4 * wn, wn**2]), h, method="bilinear")
-    part = make("decoupler_t2", "native", bench=BENCH)
+    part = make("decoupler_t2", "native")
     part.initialize()
     for drive, main in (("roll", 1), ("pitch", 0)):
         rates = np.zeros((2, t.size))

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 import itertools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from fmpy import read_model_description
+from native_parts import native_files
 
 from gyrobench.component import Component, ComponentError
 from gyrobench.component.vectors import copied
-from gyrobench.files import temporary_folder, unzip_fmu
-from gyrobench.packaging import build, load_part
-from gyrobench.packaging.instance import Fmu, InstanceError, Unzipped
+from gyrobench.packaging import load_part
+from gyrobench.packaging.instance import Fmu, InstanceError
 from gyrobench.system.values import flatten
 
 BENCH = Path(__file__).resolve().parents[2]
@@ -66,15 +64,6 @@ def plan(phases: list[dict[str, Any]], faces: list[Any]) -> dict[str, Any]:
     flat = [[float(x) for row in f for x in row] for f in faces]
     out["faces"] = flat + [[1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0]] * (12 - len(flat))
     return out
-
-
-@functools.cache
-def native_files(name: str) -> Unzipped:
-    """The native FMU of a part, unzipped once a process."""
-    folder = temporary_folder()
-    path = build(name, "native", out=folder, bench=BENCH)
-    unzip_fmu(path, folder)
-    return Unzipped(read_model_description(str(path), validate=False), folder)
 
 
 class Native:
