@@ -73,7 +73,7 @@ class Plan:
 
     def document(self) -> dict[str, Any]:
         """Return the content of campaign.json."""
-        from gyrobench.engine.session import package_versions
+        from gyrobench.record.run_document import package_versions
 
         d = self.definition
         kind = "suite" if self.is_suite else "system"

@@ -8,7 +8,6 @@ A :class:`Session` is prepared once (unzip, load, bind, order) and runs many tim
 from __future__ import annotations
 
 import datetime
-import functools
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -26,7 +25,7 @@ from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressRepor
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
-from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument
+from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument, package_versions
 from gyrobench.system.parameters import Starts, defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.recorded_units import recorded_units
@@ -408,18 +407,3 @@ def run(
         system, parts, maps, engine=engine, target=target, bench=bench, child=child, timeout=timeout
     ) as session:
         return session.run(values, seed, step, out, progress, checkpoints)
-
-
-@functools.cache
-def package_versions() -> dict[str, str]:
-    import platform
-    from importlib.metadata import PackageNotFoundError, version
-
-    """Return the versions of Python and of the packages that determine a result."""
-    versions = {"python": platform.python_version()}
-    for name in ("gyrobench", "fmpy", "numpy"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
-    return versions

@@ -310,3 +310,18 @@ def schema() -> dict[str, Any]:
         "description": "What a record says of its run, or of the tests of a suite. SI units; further keys are allowed.",
     }
     return {**head, **TypeAdapter(RunDocument | SuiteDocument).json_schema()}
+
+
+@functools.cache
+def package_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that determine a result."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    versions = {"python": platform.python_version()}
+    for name in ("gyrobench", "fmpy", "numpy"):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions

@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Any
 from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.record.run_document import FILE as RUN
-from gyrobench.record.run_document import PartInfo, RecordError, RunDocument, SuiteDocument, SuiteTestRun, read_run
+from gyrobench.record.run_document import (
+    PartInfo,
+    RecordError,
+    RunDocument,
+    SuiteDocument,
+    SuiteTestRun,
+    package_versions,
+    read_run,
+)
 from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS
 from gyrobench.result import DriftTestResult, SuiteResult
@@ -44,8 +52,6 @@ class SuiteOutcome:
 
 def suite_document(suite: Suite, identity: Mapping[str, Any]) -> SuiteDocument:
     """Return the content of a suite's run.json that is known before its tests."""
-    from gyrobench.engine.session import package_versions
-
     return SuiteDocument(
         **identity,
         title=suite.title,

@@ -90,7 +90,7 @@ def test_a_number_that_is_not_finite_ends_the_run_at_its_step(
     told, records = [], []
     for engine in ("linked", "native", "reference"):
         with Session(small, engine=engine, child=False) as session, pytest.raises(RunError) as failed:
-            session.run({**QUICK, "gyro.ramp": ramp}, seed=5, out=tmp_path / engine)
+            session.run({**QUICK, "dwell": 2.0, "gyro.ramp": ramp}, seed=5, out=tmp_path / engine)
         told.append(str(failed.value).replace(engine, "ENGINE"))
         records.append(failed.value.record)
     assert f"output {what}" in told[0]
