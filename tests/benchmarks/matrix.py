@@ -69,7 +69,7 @@ PLANS: dict[str, tuple[dict[str, Any], float | None]] = {
             "site.earth_rate": 500 * W, "time": 172.8, "window": 4.8, "settle": 2.0, "cage_x.i_max": 10.0,
             "cage_y.i_max": 10.0,
         },
-        None,
+        5e-4,
     ),
     "servo_vertical_level": ({"dwell": 5.0, "cycles": 1, "settle": 1.0}, None),
     "stabilizer_floated_2dof": ({"hold": 1.0}, 1e-3),
