@@ -188,8 +188,8 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     """
     right = 17.2e3 * DPH  # rad/s/A
     tests = "tumble_single_axis tumble_two_axis servo_polar"
-    chosen, true = floated(3, tests, k=1.1 * right, u_scale_factor=0.1)
-    found = results(sessions, chosen, 3)
+    chosen, true = floated(4, tests, k=1.1 * right, u_scale_factor=0.1)
+    found = results(sessions, chosen, 4)
     together = report(found, chosen)
     assert together.suite.consistency == "consistent" and together.suite.shared == ["torquer scale factor"]
     name = max(("D_I", "D_S"), key=lambda n: abs(true[n]))
@@ -201,8 +201,8 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     mean = next(c for c in together.coefficients if c.name == name)
     assert abs(mean.estimate - true[name] / DPH) < 3.0 * mean.u < 0.03 * abs(mean.estimate)
 
-    blind, _ = floated(3, tests, k=1.1 * right)
-    apart = report(results(sessions, blind, 3), blind)
+    blind, _ = floated(4, tests, k=1.1 * right)
+    apart = report(results(sessions, blind, 4), blind)
     assert name in apart.suite.disagreeing
     words = next(q["words"] for q in apart.suite.quantities if q["name"] == name)
     assert words.startswith("servo_polar deviates by")  # what an unstated common error does

@@ -135,6 +135,7 @@ def normality(x: Array) -> tuple[float, float]:
     x = x[:5000]
     w, p = stats.shapiro(x)
     d = x - x.mean()
+    d /= max(float(np.abs(d).max()), 1e-300)  # of data without noise these are any size
     m2, m3, m4 = (float(np.mean(d**k)) for k in (2, 3, 4))  # central moments: kurtosis m4/m2^2 - 3, skewness m3/m2^1.5
     light = m4 < 3.0 * m2**2 and abs(m3) < 2.0 * math.sqrt(6.0 / x.size) * m2**1.5
     return float(w), 1.0 if light else float(p)
