@@ -17,7 +17,7 @@ errors of the scale that last longer than a window.  Other torques are sought in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,46 +35,15 @@ from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Specification
 
 from . import left_out
+from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
 
 Array = NDArray[np.float64]
-ANGLE, VOLTAGE, CURRENT = "reader.angle_read", "voltmeter.reading", "ammeter.reading"
-PIECE = 0.05  # s, length T
-SLOW = 0.05  # rad/s: a window with a slower end may have been at rest, where friction is what the load is
 SEEN = 10.0  # standard errors: a current that is read at all
 WOUND = "J w' = K_t i + M_h - D w - M_C \"sgn\"(w) + M_0 - c x, quad U = R i + K_e w + L i'"
 SQUARE_LAW = 'J w\' = K V abs(V) + M_h - D w - M_C "sgn"(w) + M_0 - c x, quad V = U - K_e w'
 QUANTUM = 2.0 * math.pi / 7.2e6
 NO_LIMIT = "the voltage does not come to its limit in the steps: take a larger torque"
 EDGE = 0.9  # of the largest voltage: at its limit; of the change: the voltage has begun to move
-
-
-@dataclass(frozen=True)
-class Window:
-    """Two pieces of a phase, from -T to T: samples in the middle of time, SI.
-
-    phase: number of the phase; place: that of the window's middle in it, in pieces, neighbours overlap by T.  motor,
-    hung: demanded and known torque.  angle, rate: at each sample, the rate linear in time.  weight: (T - |t|) times the
-    sampling interval.
-    """
-
-    phase: int
-    place: int
-    y: float
-    angle: Array
-    rate: Array
-    turned: float  # <w>, from the angles
-    voltage: Array
-    current: Array
-    weight: Array
-    motor: float
-    hung: float
-
-    @property
-    def sense(self) -> float:
-        return float(np.sign(self.rate[0]))
-
-    def integral(self, f: Array | float) -> float:
-        return float(np.sum(self.weight * f))
 
 
 @dataclass(frozen=True)
@@ -212,65 +181,6 @@ def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window
     )
 
 
-def cut(gate: Gate) -> list[Window]:
-    """Return the windows of a phase in which the table turns one way, faster than SLOW."""
-    dt = float(gate.t[1] - gate.t[0])
-    n = round(PIECE / dt)
-    x = gate[ANGLE]
-    found = []
-    offset = np.arange(-n, n + 1)
-    weight = (n - np.abs(offset)) * dt * dt
-    for place, middle in enumerate(range(n, x.size - n, n)):
-        part = slice(middle - n, middle + n + 1)
-        before, after = x[middle] - x[middle - n], x[middle + n] - x[middle]
-        ends = (1.5 * before - 0.5 * after) / PIECE, (1.5 * after - 0.5 * before) / PIECE
-        if ends[0] * ends[1] <= 0.0 or min(map(abs, ends)) < SLOW:
-            continue
-        halves = (np.trapezoid(x[s], dx=dt) for s in (slice(middle, middle + n + 1), slice(middle - n, middle + 1)))
-        right, left = (float(v) for v in halves)
-        torque = [gate.amplitude if gate.kind == "torque" and gate.axis == k else 0.0 for k in (1, 2)]
-        found.append(
-            Window(gate.row.phase, place, float(after - before), x[part], np.linspace(*ends, offset.size),
-                   right - left, gate[VOLTAGE][part], gate[CURRENT][part], weight, *torque)
-        )  # fmt: skip
-    return found
-
-
-def bands(windows: Sequence[Window]) -> Array:
-    """Return the covariances of y as (2, 3, n), lower bands: random torque (density 1, J = 1) and errors of the angles
-    (1 rad), y = e(T) - 2 e(0) + e(-T).  Windows of different phases have nothing in common.
-    """
-    torque, angle = PIECE**3 / 6.0 * np.array([4.0, 1.0, 0.0, 0.0]), np.array([6.0, -4.0, 1.0, 0.0])
-    found = np.zeros((2, 3, len(windows)))
-    for d in range(3):
-        apart = np.array([min(b.place - a.place, 3) if a.phase == b.phase else 3 for a, b in _pairs(windows, d)], int)
-        found[:, d, : apart.size] = torque[apart], angle[apart]
-    return found
-
-
-def meter_bands(windows: Sequence[Window], slope: Array) -> Array:
-    """Return the covariance (3, n), lower bands, of <slope e> for errors e of the readings of a meter, of variance 1.
-
-    slope: (n, samples of a window).  Neighbours share the readings of a piece.
-    """
-    of = slope * windows[0].weight
-    m = of.shape[1] // 2
-    found = np.zeros((3, len(windows)))
-    found[0] = np.sum(of**2, axis=1)
-    next_to = np.array([a.phase == b.phase and b.place == a.place + 1 for a, b in _pairs(windows, 1)], bool)
-    found[1, :-1] = np.where(next_to, np.sum(of[:-1, m:] * of[1:, : m + 1], axis=1), 0.0)
-    return found
-
-
-def _pairs(windows: Sequence[Window], d: int) -> Iterator[tuple[Window, Window]]:
-    return zip(windows[: len(windows) - d], windows[d:], strict=True)
-
-
-def reading_noise(readings: Sequence[Array]) -> float:
-    """Return the standard deviation of the readings of a meter: that of their second differences over sqrt(6)."""
-    return math.sqrt(float(np.mean([np.mean(np.diff(r, 2) ** 2) for r in readings])) / 6.0)
-
-
 def _wound(w: Window, _: float, __: float) -> tuple[float, float, Array]:
     """Return <i>, which does not depend on K_e, and its slopes by the readings."""
     return w.integral(w.current), 0.0, np.ones(w.current.size)
@@ -366,29 +276,16 @@ def _linear(X: Array, y: Array) -> Solution:
 
 def _voltages(windows: Sequence[Window]) -> Solution:
     """Return R, K_e and the zero of the voltmeter: U = R i + K_e w + zero, means of every other window, L i' = 0."""
-    rows = [(float(np.mean(w.current)), float(np.mean(w.rate)), float(np.mean(w.voltage))) for w in _apart(windows)]
+    rows = [(float(np.mean(w.current)), float(np.mean(w.rate)), float(np.mean(w.voltage))) for w in apart(windows)]
     i, w, U = np.array(rows).T
     return _linear(np.column_stack([i, w, np.ones(i.size)]), U)
 
 
 def _shaper(windows: Sequence[Window]) -> Solution:
     """Return 1/sqrt(K) and the offset: U = sgn(d) sqrt(|d| / K) + offset."""
-    rows = [(math.copysign(math.sqrt(abs(w.motor)), w.motor), float(np.mean(w.voltage))) for w in _apart(windows)]
+    rows = [(math.copysign(math.sqrt(abs(w.motor)), w.motor), float(np.mean(w.voltage))) for w in apart(windows)]
     d, U = np.array(rows).T
     return _linear(np.column_stack([d, np.ones(d.size)]), U)
-
-
-def _apart(windows: Sequence[Window]) -> list[Window]:
-    """Return windows that do not overlap."""
-    found: list[Window] = []
-    skipped = False
-    for w in windows:
-        if found and not skipped and found[-1].phase == w.phase:
-            skipped = True
-            continue
-        found.append(w)
-        skipped = False
-    return found
 
 
 def _inductance(gate: Gate, R: float, K_e: float) -> float | None:
