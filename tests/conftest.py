@@ -8,10 +8,8 @@ import shutil
 import signal
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -97,20 +95,3 @@ def gyrobench(
     """Run a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
     return command
-
-
-@pytest.fixture
-def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs that pause after each thousand steps or so, for an interrupt that comes before the end of a short one."""
-    from gyrobench.engine import child, run_driver, supervision
-
-    execute = child.execute
-
-    def pausing(job: Any, instances: Any, board: Any, progress: Any, stopped: Callable[[], bool]) -> Any:
-        return execute(job, instances, board, progress, lambda: time.sleep(0.05) or stopped())
-
-    monkeypatch.setattr(child, "execute", pausing)
-    monkeypatch.setattr(run_driver, "CHUNK", 0.001)
-    monkeypatch.setattr(supervision, "REPORT", 0.0)
-    # a child that is no fork would not have these; the threads that other tests have left hold no lock
-    monkeypatch.setattr(supervision, "can_fork", lambda: True)

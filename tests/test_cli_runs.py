@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import unhurried
 
 from gyrobench.bench import Bench
 from gyrobench.commands import cli, progress_display
@@ -162,7 +163,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 
 # ---------------------------------------------------------------------------- interrupted and failed runs
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if status.windows >= 2:
@@ -170,7 +171,8 @@ def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
 
     monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
     run = ["run", NAME, "--set", "rate=2deg/s", "--set", "windows=36", "--out", "r"]
-    code, out, err = gyrobench(*run)
+    with unhurried():
+        code, out, err = gyrobench(*run)
     assert code == 130 and out == ""
     assert "interrupted at t = " in err and "the record until then is kept in r" in err
     record = Record.load(tmp_path / "r")
@@ -182,27 +184,29 @@ def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
 
 
 def test_interrupt_does_not_replace_a_whole_record(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run)[0] == 0
     monkeypatch.setattr(
         progress_display.ProgressDisplay, "__call__", lambda self, status: signal.raise_signal(signal.SIGINT)
     )
-    code, _, err = gyrobench(*run)
+    with unhurried():
+        code, _, err = gyrobench(*run)
     assert code == 130 and "is kept in r-incomplete" in err
     assert Record.load(tmp_path / "r").complete and not Record.load(tmp_path / "r-incomplete").complete
 
 
 def test_interrupted_step_check_still_gives_the_report(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None
+    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if "step check" in self.label:
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
-    code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r", pages=True, figures=False)
+    with unhurried():
+        code, out, err = gyrobench("run", NAME, *TINY, "--check-step", "--out", "r", pages=True, figures=False)
     assert code == 130
     assert "r/report.html" in out and "the report is without it" in err
     assert json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["step_check"] == {}

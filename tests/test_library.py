@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas
 import pytest
+from processes import unhurried
 
 import gyrobench as gb
 from gyrobench.commands.catalog import init_bench
@@ -271,17 +272,17 @@ def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monke
         bare.result  # noqa: B018
 
 
-def test_an_interrupted_run_holds_what_was_recorded(folder: Path, unhurried: None) -> None:
+def test_an_interrupted_run_holds_what_was_recorded(folder: Path) -> None:
     """Ctrl-C in a notebook: an error with the record until then, in memory or, with out, in the folder to resume."""
 
     def interrupt(status: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
     test = gb.load(NAME)
-    with pytest.raises(RunError, match="interrupted at t") as error:
+    with unhurried(), pytest.raises(RunError, match="interrupted at t") as error:
         test.run(progress=interrupt)
     assert error.value.record is not None and not error.value.record.complete and list(folder.iterdir()) == []
-    with pytest.raises(PostRunError, match="the record until then is kept in r"):
+    with unhurried(), pytest.raises(PostRunError, match="the record until then is kept in r"):
         test.run(out="r", progress=interrupt)
     assert repr(gb.open_run("r").record).endswith("incomplete>")
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import jsonschema
 import pytest
+from processes import unhurried
 
 from gyrobench.bench import standard_folder
 from gyrobench.commands import cli, progress_display
@@ -189,7 +190,7 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------ stopped and failed
-def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None) -> None:
+def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
@@ -197,7 +198,7 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
         if self.label == "tumble_single_axis" and status.windows >= 2:
             signal.raise_signal(signal.SIGINT)
 
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, unhurried():
         patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         code, _, err = gyrobench(*run)
     assert code == 130 and "the same command with --resume continues the suite" in err

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from processes import processes_in
+from processes import processes_in, unhurried
 
 from gyrobench.commands import cli
 from gyrobench.engine import checkpoint, supervision
@@ -91,12 +91,12 @@ def killed(words: list[str], folder: Path, moment: str, patch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_killed_and_resumed(
-    command: Command, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, unhurried: None, moment: str
+    command: Command, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, moment: str
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     (tmp_path / "tmp").mkdir()
     out = tmp_path / "r"
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, unhurried():
         killed(["run", NAME, *TINY, "--no-report", "--out", str(out)], out, moment, patch)
     end = time.monotonic() + 60.0
     while processes_in(tmp_path / "tmp") and time.monotonic() < end:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import unhurried
 
 from gyrobench.commands import cli, progress_display
 from gyrobench.engine import checkpoint
@@ -231,9 +232,7 @@ def command(words: list[str], capture: Any, patch: pytest.MonkeyPatch) -> tuple[
     return code, out, err
 
 
-def test_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], unhurried: None
-) -> None:
+def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
 
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
@@ -242,7 +241,7 @@ def test_command(
 
     code, out, err = command([*WORDS, "--resume", "--out", "r"], capsys, monkeypatch)
     assert code == 2 and "--resume: nothing to continue in r: no checkpoint of a run with these parts and values" in err
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, unhurried():
         patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         code, out, err = command([*WORDS, "--out", "r"], capsys, monkeypatch)
     assert code == 130 and out == "" and "the same command with --resume continues it" in err
@@ -260,7 +259,7 @@ def test_command(
     assert code == 2 and "--resume: nothing to continue in r: the run is complete" in err
 
     # a whole record is never replaced by half of one: the checkpoint is beside it too, and found there
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, unhurried():
         patch.setattr(progress_display.ProgressDisplay, "__call__", interrupt)
         assert command([*WORDS, "--out", "r"], capsys, monkeypatch)[0] == 130
     assert (tmp_path / "r-incomplete" / FILE).is_file() and Record.load(tmp_path / "r").complete
