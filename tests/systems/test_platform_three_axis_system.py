@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from gimbal_oracle import isolation, three_axis_loop
+from gimballed import session as with_methods
 
 from gyrobench.engine.session import RunError, Session, run
 from gyrobench.record.csv_reader import DataError
@@ -20,9 +21,25 @@ IDEAL = {f"{g}.{n}": 0.0 for g in GYROS for n in TERMS}
 SHORT = {**IDEAL, "sweeps": False, "hold": 5.0}
 
 
+NO_T2 = {"decoupler": "decoupler_none"}
+
+
+def only(*labels, parts=None):
+    """A session whose plan has the phases alone whose labels start so."""
+    system = type(load_system(NAME))
+    phases = lambda self: [p for p in system.phases(self) if p.label.startswith(labels)]  # noqa: E731
+    return with_methods(NAME, parts=parts, phases=phases)
+
+
 @pytest.fixture(scope="module")
 def sessions():
-    with Session(NAME) as a, Session(NAME, {"decoupler": "decoupler_none"}) as b:
+    with Session(NAME) as a, Session(NAME, NO_T2) as b:
+        yield {True: a, False: b}
+
+
+@pytest.fixture(scope="module")
+def sine_about_x():
+    with only("command x") as a, only("command x", parts=NO_T2) as b:
         yield {True: a, False: b}
 
 
@@ -33,9 +50,10 @@ def reduced(session, **values):
 
 
 @pytest.fixture(scope="module")
-def short(sessions):
-    """The run without other values, with T2 and without."""
-    return {decoupled: reduced(session) for decoupled, session in sessions.items()}
+def short():
+    """The sines of the base in the run without other values, with T2 and without."""
+    with only("base ") as a, only("base ", parts=NO_T2) as b:
+        return {True: reduced(a), False: reduced(b)}
 
 
 def linear(session, **values):
@@ -84,11 +102,11 @@ def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
 @pytest.mark.parametrize(
     ("theta", "hertz", "printed"), [((20, 0, 30), 1.0, 1.72), ((40, 10, 30), 1.0, 1.90), ((40, 10, 30), 3.0, 16.4)]
 )
-def test_coupling_on_the_83_mil_bench(sessions, theta, hertz, printed):
+def test_coupling_on_the_83_mil_bench(sine_about_x, theta, hertz, printed):
     """[DECOUPLE-BENCH-83MIL] A third of 83 mil: cross axes without T2 as there, with T2 a tenth of it."""
     values = {"pitch": f"{theta[0]}deg", "roll": f"{theta[1]}deg", "azimuth": f"{theta[2]}deg", "frequency": hertz,
               "swing": 83 * 2 * math.pi / 6000 / 3}  # fmt: skip
-    cross = {d: reduced(s, **values)[2]["cross x"].estimate for d, s in sessions.items()}
+    cross = {d: reduced(s, **values)[2]["cross x"].estimate for d, s in sine_about_x.items()}
     assert cross[False] == pytest.approx(printed, rel=0.03)
     assert cross[True] < 0.1 * cross[False]
 
@@ -121,9 +139,10 @@ def test_isolation_is_that_of_the_continuous_model(short):
             assert 20.0 * math.log10(taken) == pytest.approx(truth, abs=0.15)
 
 
-def test_command_turns_the_platform_its_way(sessions):
+def test_command_turns_the_platform_its_way():
     """A commanded rate through the torquer: angle reached = angle commanded / |1 + 1/L|, in phase within degrees."""
-    record, _, found = reduced(sessions[True], frequency=0.5)
+    with only("command") as session:
+        record, _, found = reduced(session, frequency=0.5)
     for k, axis in enumerate("xyz", 1):
         assert found[f"reached {axis}"].estimate == pytest.approx(1.0, abs=0.02)
         phase = next(p.phase for p in record.run.plan if p.label.startswith(f"command {axis}"))
@@ -135,7 +154,7 @@ def test_command_turns_the_platform_its_way(sessions):
 
 def test_margins_of_the_sweep_are_those_of_the_linear_parts(sessions):
     """Within 1 dB and 3 degrees up to twice the crossover, on each axis; the delays are in the model."""
-    _, result, found = reduced(sessions[True], sweeps=True)
+    _, result, found = reduced(sessions[True], sweeps=True, swing=0.0)
     rows = next(t for t in result.tables if t["title"].startswith("Linear models"))["rows"]
     assert len(rows) == 6  # three axes, with and without the step
     for model, _, count, db, degrees, _loop in rows:
@@ -146,7 +165,8 @@ def test_margins_of_the_sweep_are_those_of_the_linear_parts(sessions):
 
 def test_platform_drifts_as_its_gyros_do():
     """Drift about each axis is that of the gyro there, for gravity as the tilted element sees it; noise included."""
-    record = run(NAME, values={"sweeps": False, "hold": 40.0, "roll": "10deg"})
+    with only("command step", "drift") as session:
+        record = session.run({"sweeps": False, "hold": 40.0, "roll": "10deg"})
     found = {c.name: c for c in load_system(NAME).reduce(record).coefficients}
     for axis in "xyz":
         c = found[f"drift {axis}"]
