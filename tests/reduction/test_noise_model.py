@@ -230,7 +230,7 @@ SLOW = os.environ.get("GYROBENCH_SLOW") == "1"
 @pytest.mark.parametrize(("tau", "share"), [(0.0, 0.0), (1.0, 1.0), (3.0, 1.0), (8.0, 1.0)])
 def test_intervals_cover(turn: int, dwell: int, tau: float, share: float) -> None:
     """Nine coefficients, white and Gauss-Markov noise whose parameters the fit estimates itself."""
-    runs = 1000 if SLOW else 250 if turn == 36 else 100
+    runs = 1000 if SLOW else 120 if turn == 36 else 50
     found = mc.coverage(turn, dwell, tau, share, runs, seed=20)
     low, high = bounds(runs)
     assert np.all(found >= low), dict(zip(drift.terms(9), found, strict=True))

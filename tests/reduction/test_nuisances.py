@@ -180,17 +180,17 @@ def test_noise_free_records_have_no_nuisances() -> None:
 
 @pytest.mark.parametrize("name", ["clean", "tilt of 20 arcsec", "ramp of 0.02 deg/h"])
 def test_intervals_hold_with_setup_effects(name: str) -> None:
-    """Half the windows of the benchmark, 100 records: none of the nine below 0.88, their mean within 0.93 and 0.98;
+    """Half the windows of the benchmark, 50 records: none of the nine below 0.88, their mean within 0.93 and 0.98;
     without the nuisance model the tilt makes it 0 of D_S, the ramp less than 0.85 of D_O.
     """
     records = bench.Bench(turn=36, dwell=5)
-    held, _, joined = bench.count(records, bench.CASES[name], 100, 5)
+    held, _, joined = bench.count(records, bench.CASES[name], 50, 5)
     assert name != "clean" or joined["any"] <= 0.03  # reported though nothing is there
     assert held.min() >= 0.88 and 0.93 <= held.mean() <= 0.985
     worst = {"tilt of 20 arcsec": ("D_S", 0.1), "ramp of 0.02 deg/h": ("D_O", 0.9)}
     if name in worst:
         coefficient, most = worst[name]
-        plain, *_ = bench.count(records, bench.CASES[name], 40, 5, how="none")
+        plain, *_ = bench.count(records, bench.CASES[name], 20, 5, how="none")
         assert plain[bench.NAMES.index(coefficient)] < most
 
 
@@ -212,14 +212,14 @@ def test_mounts_that_scatter_by_as_much_as_a_window() -> None:
 
 
 def test_no_verdict_rests_on_noise_being_white() -> None:
-    """Half the windows of the benchmark, 60 records under drift with a correlation time of a quarter of the record and
+    """Half the windows of the benchmark, 30 records under drift with a correlation time of a quarter of the record and
     half the variance of a window, which a record cannot tell; a limit at the truth itself, the worst there is: at most
     5 % pass that should not, and 5 % fail; by the stated intervals alone more would.
     """
     records, rng = bench.Bench(turn=36, dwell=5), np.random.default_rng(3)
     p, verdicts, stated = records.plan, [], []
     limits = {n: (float(v), None) for n, v in zip(records.names, p.truth, strict=True)}
-    for _ in range(60):
+    for _ in range(30):
         y = records.record(bench.Case(slow=0.5), rng)
         found = fit(records.names, p.X, y, p.t0, p.t1, [], "rate", "", 1.0, candidates=p.candidates)
         result = linear_result(

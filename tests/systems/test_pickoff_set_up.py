@@ -94,15 +94,15 @@ def record(rng: np.random.Generator, encoder: float, slope: float = 12.0) -> dic
 
 
 def test_stated_errors_of_the_encoder_are_held() -> None:
-    """A hundred records with 30 arcsec once a turn (1.5e-4 of S, ten times its u of type A): 0.9 or more are held where
+    """Forty records with 30 arcsec once a turn (1.5e-4 of S, ten times its u of type A): 0.87 or more are held where
     it is stated, less than a third where it is not.
     """
     rng = np.random.default_rng(4)
     held = np.zeros((2, 3))
-    for _ in range(100):
+    for _ in range(40):
         windows = record(rng, 30.0 * ARCSEC)
         for k, size in enumerate((30.0 * ARCSEC, 0.0)):
             r = R.reduce(windows, R.PickoffSetup(gain=1.0, drift=2.0 * DPH, u_angle1=size))
             pairs = ((r["S"], 12.0), (r["K_sg"], 12.0), (r["drift"], 0.7))
             held[k] += [abs(c.estimate - x) <= c.k * c.u for c, x in pairs]
-    assert held[0].min() >= 88 and held[1, 0] < 33
+    assert held[0].min() >= 35 and held[1, 0] < 13
