@@ -43,7 +43,7 @@ from scipy import special
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction import plausibility
-from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation import asked, uncertainty
 from gyrobench.reduction.estimation.effects import UNSTATED
 from gyrobench.reduction.run_metadata import NO_TYPE_B, Site
 from gyrobench.reduction.window_checks import ReductionError
@@ -142,8 +142,8 @@ def _correlated(result: DriftTestResult) -> bool:
 
 
 def _undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
-    """Return the result of a record with a mistake undone; None where that makes nonsense of it."""
-    with warnings.catch_warnings():
+    """Return the residuals of a record with a mistake undone (asked); None where that makes nonsense of it."""
+    with warnings.catch_warnings(), asked.residuals_alone():
         warnings.simplefilter("ignore", RuntimeWarning)
         try:
             return reduce(record)

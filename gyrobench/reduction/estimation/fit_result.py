@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.estimation import outliers, regression, uncertainty
+from gyrobench.reduction.estimation import asked, outliers, regression, uncertainty
 from gyrobench.reduction.estimation.effects import (
     TOUCHED,
     Effect,
@@ -81,7 +81,7 @@ def linear_result(
     slow_warnings = _judge_slow_drift(fit, coefficients, rows)
     design = fit.est.design
     odd = outliers.find(fit)
-    beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust else [])]
+    beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust and asked.whole() else [])]
     fit_warnings = [*outliers.warnings(fit, odd), *fit.est.warnings, *fit.warnings()]
     if no_closed:
         fit_warnings.append(f"No closed-form estimates: {no_closed}.")
@@ -186,6 +186,8 @@ def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: 
 
 def _judge_slow_drift(fit: Findings, coefficients: list[Coefficient], contributions: Array) -> list[str]:
     """Make verdicts inconclusive that slow drift, which the record does not exclude, would take back; say so."""
+    if all(c.verdict not in ("pass", "fail") for c in coefficients):
+        return []
     probability, widening = fit.if_slow()
     turned = []
     for j, c in enumerate(coefficients):

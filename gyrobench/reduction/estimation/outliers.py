@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -49,10 +50,10 @@ class Outliers:
 
 
 def find(found: Findings) -> Outliers | None:
-    """Return the outliers of a fit; None where there are none, or too few windows to tell."""
+    """Return the outliers of a fit; None where there are none, too few windows to tell, or nobody asks (asked)."""
     n = found.y.size
     most = int(min(MOST * n, found.dof - FEWEST))
-    if found.ideal or most < 1:
+    if found.ideal or most < 1 or not asked.whole():
         return None
     limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
     each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.set_up))

@@ -6,6 +6,7 @@ Residuals come as stretches: runs of windows of equal length without a gap.  Not
 
 from __future__ import annotations
 
+import functools
 import math
 from itertools import pairwise
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import deviations
 
@@ -71,9 +73,17 @@ def fitted_noise(fitted: Array) -> Array | None:
         return None
     basis, size, _ = np.linalg.svd(fitted, full_matrices=False)
     basis = basis[:, size > 1e-9 * size[0]]
-    z = np.random.default_rng(0).standard_normal((DRAWS, len(fitted)))
+    z = _draws(len(fitted))
     out: Array = z - (z @ basis) @ basis.T
     return out
+
+
+@functools.lru_cache(maxsize=2)  # a fit asks twice, and the next one is mostly of a record as long
+def _draws(n: int) -> Array:
+    """White noise (DRAWS, n), the same at every call; read only."""
+    z = np.random.default_rng(0).standard_normal((DRAWS, n))
+    z.flags.writeable = False
+    return z
 
 
 def ljung_box_of_fit(parts: list[Array], lags: int, null: Array | None) -> tuple[float, float]:
@@ -146,7 +156,7 @@ def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
 
     tau [s] up to a third of the longest stretch, dev, lo, hi (95 %, unit of the data), see
     :mod:`gyrobench.reduction.series.deviations`; slopes: local log-log slopes.  Empty when no stretch has ``minimum``
-    windows.
+    windows, and where the residuals alone are asked for (asked).
     """
     chosen, window = _alike(parts, minimum)
     if not chosen:
@@ -166,6 +176,7 @@ def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> dict[str, A
     """One-sided power spectral density (Welch, Hann), averaged over the stretches of the most frequent window length.
 
     f [Hz], S [unit of the data squared per Hz].  The averaging windows act as a filter sinc^2(f T), not divided out.
+    Empty as the Allan deviation.
     """
     from scipy import signal
 
@@ -180,7 +191,7 @@ def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> dict[str, A
 
 def _alike(parts: list[tuple[float, Array]], minimum: int) -> tuple[list[Array], float]:
     long = [(w, p) for w, p in parts if p.size >= minimum]
-    if not long:
+    if not long or not asked.whole():
         return [], 0.0
     window = max(long, key=lambda item: item[1].size)[0]
     return [p for w, p in long if abs(w - window) <= 0.02 * window], window
