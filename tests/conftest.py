@@ -8,7 +8,8 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Generator
+import threading
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,20 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files of the commands, of few and long tests, come first: no process waits at the end for another's last."""
     items.sort(key=lambda item: item.path.parent != Path(__file__).parent)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def forks() -> Iterator[None]:
+    """Runs fork, as those of a command do: the threads of a test process that are there before its tests hold no lock.
+
+    Each run would start Python anew, for a third of a second.
+    """
+    from gyrobench.engine import supervision
+
+    before = set(threading.enumerate())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(supervision, "can_fork", lambda: sys.platform == "linux" and set(threading.enumerate()) <= before)
+        yield
 
 
 @pytest.fixture
