@@ -171,6 +171,7 @@ class _Execution:
         self.flying: dict[Any, Chunk] = {}
         self.finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.tries: dict[str, list[str]] = {}
+        self.spent: dict[str, tuple[str, str]] = {}  # runs with no try left: state and reason
         self.vanished: Counter[str] = Counter()
         self.final: set[str] = set()
         self.states: Counter[str] = Counter()
@@ -290,18 +291,20 @@ class _Execution:
         from gyrobench.campaign.worker import find_casualties
 
         answers = self.client.run(find_casualties, self.name, on_error="ignore") if self.own else {}
-        runs = {r.run: r for chunk, _, _ in self.lost for r in chunk.runs}
         tries_allowed = self.plan.definition.retries + 1
         for casualty in [c for found in answers.values() for c in found or ()]:
             tries = self.tries.setdefault(casualty.run, [])
             tries.append(f"{casualty.reason} {casualty.detail}".strip())
-            if len(tries) >= tries_allowed and casualty.run in runs:
-                self._end(runs[casualty.run], casualty.state, f"{casualty.reason}{_times(tries_allowed)}")
+            if len(tries) >= tries_allowed:
+                self.spent[casualty.run] = casualty.state, f"{casualty.reason}{_times(tries_allowed)}"
         machines = {_machine(address) for address in answers}
         late = time.monotonic() - PATIENCE
         for entry in [e for e in self.lost if e[1] in machines or e[2] < late]:
             self.lost.remove(entry)
             for run in reversed(entry[0].runs):
+                if run.run in self.spent:  # told, perhaps, before its chunk was known to be lost
+                    self._end(run, *self.spent[run.run])
+                    continue
                 self.vanished[run.run] += 1
                 if self.vanished[run.run] > UNSEEN:
                     self._end(run, "crashed", f"its worker vanished {UNSEEN} times")

@@ -165,6 +165,23 @@ def test_a_run_that_lost_its_worker_once_is_done_the_second_time(two: Any, tmp_p
     assert "ended its worker process" in log[log["attempts"] == 2]["tries"].iloc[0]
 
 
+def test_a_fault_that_is_told_before_its_worker_is_known_to_be_lost_is_not_tried_again(
+    two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    collect = campaign_execution._Execution._collect
+
+    def told_first(execution: Any) -> None:
+        while execution.flying and not execution.tries:
+            time.sleep(0.02)
+            execution._inquire()
+        collect(execution)
+
+    monkeypatch.setattr(campaign_execution._Execution, "_collect", told_first)
+    asked = {"system": "weighing", "retries": 0, "set": {"duration": "0.05s", "fault": "crash"}}
+    assert gb.campaign(asked, client=two, out=tmp_path / "c")["state"].tolist() == ["crashed"]
+    assert Campaign.open(tmp_path / "c").log()["attempts"].tolist() == [1]
+
+
 def test_a_full_disk_ends_the_campaign_and_nothing_is_lost(
     two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
