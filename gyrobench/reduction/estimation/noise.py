@@ -17,7 +17,8 @@ Not modelled: flicker noise, random walk, quanta that are no white error.  [RED-
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,8 +154,42 @@ class _Filter:
     s: Array
     h: Array | None = None
 
+    @functools.cached_property
+    def move(self) -> Array:
+        """f - k a: what x_i itself leaves of x_{i+1}, without h."""
+        return self.f - self.k * self.a
 
-def _filters(t0: Array, t1: Array, tau: Array, share: Array, reading: Array | None, rows: int) -> Iterator[_Filter]:
+    @functools.cached_property
+    def scale(self) -> Array:
+        """1/sqrt(s)."""
+        out: Array = 1.0 / np.sqrt(self.s)
+        return out
+
+    @functools.cached_property
+    def logdet(self) -> Array:
+        """(G,): part of the log determinant."""
+        out: Array = np.log(self.s).sum(axis=0)
+        return out
+
+
+def _filters(t0: Array, t1: Array, tau: Array, share: Array, reading: Array | None, rows: int) -> Iterable[_Filter]:
+    """Return the recursion for ``rows`` windows at a time.
+
+    Of short records it is kept: fits to the same windows (other data, other columns, a correction) ask for it again.
+    """
+    if t0.size * tau.size > NUMBERS:
+        return _recursion(t0, t1, tau, share, reading, rows)
+    given = (None if v is None else np.asarray(v, dtype=float).tobytes() for v in (t0, t1, tau, share, reading))
+    return _kept(tuple(given), min(rows, t0.size))
+
+
+@functools.lru_cache(maxsize=16)
+def _kept(given: tuple[bytes | None, ...], rows: int) -> tuple[_Filter, ...]:
+    t0, t1, tau, share, reading = (np.frombuffer(b"" if v is None else v) for v in given)
+    return tuple(_recursion(t0, t1, tau, share, reading if given[-1] is not None else None, rows))
+
+
+def _recursion(t0: Array, t1: Array, tau: Array, share: Array, reading: Array | None, rows: int) -> Iterator[_Filter]:
     """Yield the recursion for ``rows`` windows at a time; the variances run on from block to block.
 
     The covariance is scaled so that a window of the median length has variance 1.
@@ -290,7 +325,7 @@ def whitened_blocks(
         if w.h is None:
             path = w.k[:, None, :] * y  # becomes x of the next window
             e[0] = x
-            for move, after in zip(w.f - w.k * w.a, path, strict=True):
+            for move, after in zip(w.move, path, strict=True):
                 np.multiply(move, x, out=scratch)
                 after += scratch
                 x = after
@@ -308,8 +343,8 @@ def whitened_blocks(
                 x += scratch
                 before = ei
             before = before.copy()
-        e *= (1.0 / np.sqrt(w.s))[:, None, :]
-        yield w.rows, e, np.log(w.s).sum(axis=0)
+        e *= w.scale[:, None, :]
+        yield w.rows, e, w.logdet
 
 
 def whiten(
@@ -334,11 +369,17 @@ def whiten_transposed(t0: Array, t1: Array, columns: Array, model: tuple[float, 
     tau, share, reading = (np.array([v]) for v in model)
     (w,) = _filters(t0, t1, tau, share, reading, len(columns))
     out = columns / np.sqrt(w.s)
-    later = np.zeros(columns.shape[1])
-    h = np.zeros_like(w.s) if w.h is None else w.h
-    after, h_after = np.zeros_like(later), 0.0
-    for i in range(len(columns) - 1, -1, -1):
-        out[i] += w.k[i, 0] * later + h_after * after
-        later = w.f[i, 0] * later - w.a[i, 0] * out[i]
-        after, h_after = out[i], h[i, 0]
+    later, scratch = np.zeros((2, columns.shape[1]))
+    after, h_after = scratch, 0.0
+    k, f, a = (v[::-1, 0].tolist() for v in (w.k, w.f, w.a))
+    h = [0.0] * len(k) if w.h is None else w.h[::-1, 0].tolist()
+    for row, ki, fi, ai, hi in zip(out[::-1], k, f, a, h, strict=True):
+        np.multiply(later, ki, out=scratch)
+        if h_after:
+            scratch += h_after * after
+        row += scratch
+        later *= fi
+        np.multiply(row, ai, out=scratch)
+        later -= scratch
+        after, h_after = row, hi
     return out
