@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize, stats
+from scipy import linalg, optimize, special
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
@@ -188,7 +188,7 @@ def _averaged(J: Array, left: Array, prior: Array, drifts: list[Array]) -> tuple
             step = inverse @ (u.T @ white[:, -1])
             rest, dof = white[:, -1] - white[:, :-1] @ step, left.size + len(prior) - p
             s2 = float(rest @ rest) / dof
-            widened = (float(stats.t.ppf(0.975, dof)) / NORMAL) ** 2
+            widened = (float(special.stdtrit(dof, 0.975)) / NORMAL) ** 2
             values.append((_likelihood(both, var), step, widened * s2 * inverse @ inverse.T, s2, math.exp(x) * s2))
     least = min(v[0] for v in values)
     weights = np.exp([least - v[0] for v in values])
@@ -209,4 +209,4 @@ def _white(e: Array, lags: int = 20) -> float:
         return 1.0
     r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
     q = n * (n + 2.0) * float(np.sum(r * r / (n - np.arange(1, lags + 1))))
-    return float(stats.chi2.sf(q, lags))
+    return float(special.chdtrc(lags, q))

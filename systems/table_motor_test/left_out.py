@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 Array = NDArray[np.float64]
 LEVEL = 1e-3  # of all terms together
@@ -70,7 +70,7 @@ def seek(X: Array, rest: Array, V: Array, J: float, terms: Sequence[Array]) -> l
         own = np.linalg.inv(A.T @ A)[-m:, -m:] * left / dof
         along = value[-m:] / size if size > 0.0 else np.eye(m)[0]
         u = float(np.sqrt(along @ own @ along))
-        found.append(Sought(term, J * (size if m > 1 else float(value[-1])), J * u, float(stats.f.sf(F, m, dof))))
+        found.append(Sought(term, J * (size if m > 1 else float(value[-1])), J * u, float(special.fdtrc(m, dof, F))))
     return sorted(found, key=lambda s: s.p)
 
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import integrate, linalg, optimize, stats
+from scipy import integrate, linalg, optimize, special
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
@@ -62,7 +62,7 @@ class Solution:
         """Return a function of the values and its u: half of the 95 % interval over 1.96."""
         step = 1e-5 * np.sqrt(np.diag(self.covariance))
         slopes = np.array([(f(self.value + d) - f(self.value - d)) / 2.0 for d in np.diag(step)]) / step
-        k = float(stats.t.ppf(0.975, self.dof)) / NORMAL
+        k = float(special.stdtrit(self.dof, 0.975)) / NORMAL
         return float(f(self.value)), k * math.sqrt(float(slopes @ self.covariance @ slopes))
 
 
@@ -318,5 +318,5 @@ def _lag(gate: Gate) -> float:
 def _mean(values: Sequence[float]) -> tuple[float, float]:
     """Return a mean and its u: half of the 95 % interval over 1.96."""
     x = np.array(values)
-    k = float(stats.t.ppf(0.975, x.size - 1)) / NORMAL
+    k = float(special.stdtrit(x.size - 1, 0.975)) / NORMAL
     return float(np.mean(x)), k * float(np.std(x, ddof=1)) / math.sqrt(x.size)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
@@ -247,7 +247,7 @@ def _result(r: Readings, run: RunDocument, limits: Specification) -> LoopResult:
 
     def add(name: str, meaning: str, value: float, u: float, dof: float, truth: Any = None, none: str = "",
             at_once: int = 1) -> None:  # fmt: skip
-        k = float(stats.t.ppf(1.0 - 0.025 / at_once, dof))
+        k = float(special.stdtrit(dof, 1.0 - 0.025 / at_once))
         x, size = (math.nan, math.nan) if none else (value / ARCSEC, u / ARCSEC)
         true = None if truth is None or none else float(truth) / ARCSEC
         limit = limits.get(name)

@@ -10,15 +10,18 @@ rate of a driven table inside a window.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 
 from gyrobench import drift
 from gyrobench.frames import G0, pole
 from gyrobench.reduction.run_metadata import Site
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 Array = NDArray[np.float64]
 NODES, _WEIGHTS = leggauss(12)
@@ -45,6 +48,8 @@ class Turning:
 
 def reading_spline(times: Array, readings: Array) -> BSpline:
     """Return the curve through successive readings, of fifth order where there are enough of them."""
+    from scipy.interpolate import make_interp_spline  # a fifth of a second, for tables that do not turn evenly
+
     n = times.size
     return make_interp_spline(times, readings, 5 if n > 5 else 3 if n > 3 else 1)
 

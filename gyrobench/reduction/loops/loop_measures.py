@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -178,7 +178,7 @@ def neighbour_noise(t: Array, y: Array, f: float) -> float | None:
     own = phasor(t, y, f)
     rest = y - (own * np.exp(2j * np.pi * f * t)).real  # the record may be a sample longer than whole periods
     power = float(np.mean([abs(phasor(t, rest, x)) ** 2 for x in lines])) / 2.0
-    return float(stats.t.ppf(0.975, 2 * len(lines))) / NORMAL * math.sqrt(power)
+    return float(special.stdtrit(2 * len(lines), 0.975)) / NORMAL * math.sqrt(power)
 
 
 def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.complex128]]:
@@ -334,7 +334,7 @@ def short_rest(quiet: Gate, samples: int, measures: Step) -> str:
 
 def _of_few(std: float, dof: int) -> float:
     """Return a standard deviation of few numbers, wide enough for an interval of 1.96 of it."""
-    return float(std * stats.t.ppf(0.975, dof) / NORMAL)
+    return float(std * special.stdtrit(dof, 0.975) / NORMAL)
 
 
 # ------------------------------------------------------------------------------------------- drift

@@ -23,7 +23,7 @@ from itertools import combinations as pairs_of
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
@@ -158,7 +158,7 @@ def probability(Q: float, m: int, few: Array, w: Array) -> float:
     if spread == 0.0:
         return float(special.chdtrc(m - 1, Q))
     F = Q / (m - 1) / (1.0 + 2.0 * (m - 2) * spread / (m * m - 1))
-    return float(stats.f.sf(F, m - 1, (m * m - 1) / (3.0 * spread)))
+    return float(special.fdtrc(m - 1, (m * m - 1) / (3.0 * spread), F))
 
 
 def holm(p: Sequence[float]) -> list[float]:
