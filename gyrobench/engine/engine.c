@@ -50,8 +50,8 @@ enum { BLOCK = 4096 }; /* steps */
 enum { REAL = 0, FLOAT64 = 3, FLOAT32 = 4, BOOLEAN3 = 13 };
 
 typedef int (*step2_function)(void *, double, double, int);
-typedef int (*linked_function)(void *, double, double); /* gyrobench_step and gyrobench_quick_step of instance.h */
-typedef int (*finite_function)(void *); /* gyrobench_finite of instance.h */
+typedef int (*linked_function)(void *, double, double); /* gyrobench_step and gyrobench_quick_step of instance.c */
+typedef int (*finite_function)(void *); /* gyrobench_finite of instance.c */
 typedef int (*get_state_function)(void *, void **); /* frees, too */
 typedef int (*set_state_function)(void *, void *);
 typedef int (*step3_function)(void *, double, double, bool, bool *, bool *, bool *, double *);

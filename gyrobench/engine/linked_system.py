@@ -1,7 +1,7 @@
 """The linked form of a system of native parts: the wires between them as C, on the memory of their instances.
 
 An instance of a native FMU of the bench begins with the values of all its variables, double, in the order of the value
-references (core.h, instance.h).  ``system.h`` has ``step_all``, which takes all parts through one communication step
+references (core.h, instance.c).  ``system.h`` has ``step_all``, which takes all parts through one communication step
 in execution order: copy the inputs from the outputs of others, one assignment each, and doStep.  That is what the
 engines do with calls for sets and gets, in the same order on the same instances; so states, records and checkpoints
 are the same bit for bit, and a run may change from one form to the other between two steps.

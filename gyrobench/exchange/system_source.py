@@ -12,7 +12,7 @@ from gyrobench.component.declarations import Scalar
 from gyrobench.engine.linked_system import HELPER, READ, assignments, checks_inputs, places
 from gyrobench.engine.program import Program
 from gyrobench.packaging.linked_parts import c_name, linked_files
-from gyrobench.packaging.native_target import extents_header, header_folder
+from gyrobench.packaging.native_target import face_files
 
 HERE = Path(packaging.__file__).parent
 KINDS = {float: "Real", int: "Integer", bool: "Boolean"}
@@ -137,12 +137,9 @@ def model_text(s: SystemSource, guid: str) -> str:
 
 def source_files(s: SystemSource, guid: str, fmi: int) -> dict[str, str]:
     """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
-    headers = [f"fmi{fmi}Functions.h", f"fmi{fmi}FunctionTypes.h"]
-    headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
     return {
         **linked_files({c_name(name): cls for name, cls in s.parts.values()}),
         "model.c": model_text(s, guid),
-        **({"extents.h": extents_header([1] * len(s.exposed))} if fmi == 3 else {}),
-        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("system_core.h", "instance.h", f"fmi{fmi}.c")},
-        **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
+        "system_core.h": (HERE / "system_core.h").read_text(encoding="utf-8"),
+        **face_files([1] * len(s.exposed), fmi),
     }

@@ -16,7 +16,7 @@ from gyrobench.errors import GyrobenchError
 
 #: No vector code: these programs store numbers one by one and would wait for them when loading them in pairs.
 SCALAR = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
-FLAGS = ("-O3", *SCALAR, "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+FLAGS = ("-O3", *SCALAR, "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC")
 #: FMI 2 platform folder -> (library suffix, zig target)
 PLATFORMS = {
     "linux64": (".so", "x86_64-linux-gnu.2.17"),
@@ -71,15 +71,26 @@ def identity(platform: str) -> str:
     return hashlib.sha256(repr((cc[1:], version.splitlines()[:1], FLAGS)).encode()).hexdigest()[:16]
 
 
-def compile_library(source: Path, output: Path, includes: tuple[Path, ...], platform: str) -> None:
-    """Compile one C file to a shared library.  Raises CompilerError with the compiler's message."""
+def compile_library(
+    source: Path, output: Path, includes: tuple[Path, ...], platform: str, objects: tuple[Path, ...] = ()
+) -> None:
+    """Compile one C file, with objects, to a shared library.  Raises CompilerError with the compiler's message."""
+    math = () if platform.startswith("win") else ("-lm",)
+    _compile(source, output, includes, platform, "-shared", *map(str, objects), *math)
+
+
+def compile_object(source: Path, output: Path, includes: tuple[Path, ...], platform: str) -> None:
+    """Compile one C file of a library that has others, which then is APART.  Raises CompilerError."""
+    _compile(source, output, includes, platform, "-DAPART", "-c")
+
+
+def _compile(source: Path, output: Path, includes: tuple[Path, ...], platform: str, *more: str) -> None:
     cc = command(platform)
     if cc is None:
         raise CompilerError(
             f"no C compiler for {platform}: install one (cc, gcc or clang), or `pip install gyrobench[cross]`"
         )
-    math = () if platform.startswith("win") else ("-lm",)
-    args = [*cc, *FLAGS, *(f"-I{i}" for i in includes), str(source), "-o", str(output), *math]
+    args = [*cc, *FLAGS, *(f"-I{i}" for i in includes), str(source), "-o", str(output), *more]
     done = subprocess.run(args, capture_output=True, text=True, check=False)
     if done.returncode:
         raise CompilerError(f"{source.name}: the C compiler failed:\n{done.stderr.strip()}")

@@ -5,7 +5,7 @@
  * stands in the same order in component.py, integration.py and numerics.py of gyrobench/component: bit for bit.
  */
 #include "functions.h"
-#define CAN_BE_LINKED /* see instance.h */
+#define CAN_BE_LINKED /* see instance.c */
 
 typedef struct {
     Vars v;
@@ -347,7 +347,7 @@ static COLD void initialize(Part *p, double t0) {
     if (!p->failed && tell_finite(p)) p->n.running = 1.0;
 }
 
-static int can_step(Part *p, double t, double step) {
+static inline int can_step(Part *p, double t, double step) {
     if (!(step > 0.0 && (t + step) * 0.0 == 0.0)) { /* both finite */
         fail(p, "a step must be positive and finite, not %g s", plain(step));
         return 0;
@@ -415,6 +415,4 @@ static inline int linked_step(Part *p, double t, double step) {
     return (finite_sum(sum) || tell_finite(p)) ? 0 : 3;
 }
 
-static inline void do_step(Part *p, double t, double step) {
-    if (can_step(p, t, step)) linked_step(p, t, step);
-}
+static inline int do_step(Part *p, double t, double step) { return can_step(p, t, step) ? linked_step(p, t, step) : 3; }

@@ -1,22 +1,20 @@
-/* FMI 2.0 co-simulation face of a native component.  Compiled as one unit: model.c is generated. */
-#include "model.c"
+/* FMI 2.0 co-simulation face of a native component: with the model in one unit, or APART (see instance.h). */
+#ifndef APART
+#include "instance.c"
+#endif
+#include "instance.h"
 
 #include "fmi2Functions.h"
 
-typedef fmi2CallbackLogger Logger;
-#define FIRST_REFERENCE 0u
-#define EXTENT(place) 1 /* no arrays */
-#include "instance.h"
-
-static COLD void say(Instance *m, const char *message) {
-    char format[2 * sizeof m->part.message];
+static void say(const Face *face, const char *message) {
+    char format[2048];
     size_t i = 0;
-    for (; *message; message++) { /* the logger takes a printf format */
+    for (; *message && i < sizeof format - 2; message++) { /* the logger takes a printf format */
         if (*message == '%') format[i++] = '%';
         format[i++] = *message;
     }
     format[i] = 0;
-    m->logger(m->environment, m->part.name, fmi2Error, "logStatusError", format);
+    ((fmi2CallbackLogger)face->logger)(face->environment, face->name, fmi2Error, "logStatusError", format);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -27,62 +25,66 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
     return fmi2OK;
 }
 
-fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String location,
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String location,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     const char *why = type != fmi2CoSimulation ? "only co-simulation is offered"
-                      : !guid || strcmp(guid, MODEL_GUID) != 0 ? "the GUID is not this FMU's" : NULL;
+                      : !token || strcmp(token, guid) != 0 ? "the GUID is not this FMU's" : NULL;
     (void)location; (void)visible; (void)logging;
-    if (!why) return new_instance(name, callbacks ? callbacks->logger : NULL, callbacks ? callbacks->componentEnvironment : NULL);
+    if (!why) {
+        Face face = {.say = say};
+        if (callbacks) {
+            face.logger = (void (*)(void))callbacks->logger;
+            face.environment = callbacks->componentEnvironment;
+        }
+        return new_instance(name, &face);
+    }
     if (callbacks && callbacks->logger)
         callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "logStatusError", why);
     return NULL;
 }
 
-void fmi2FreeInstance(fmi2Component c) { free(c); }
+void fmi2FreeInstance(fmi2Component c) { if (c) free(face_of(c)); }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     (void)toleranceDefined; (void)tolerance; (void)stopTimeDefined; (void)stopTime;
-    ((Instance *)c)->part.n.v.t = startTime;
+    *face_of(c)->time = startTime;
     return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    Instance *m = (Instance *)c;
-    m->part.failed = 0;
-    initialize(&m->part, m->part.n.v.t);
-    return told(m);
-}
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return run((Instance *)c); }
 
 fmi2Status fmi2Terminate(fmi2Component c) { (void)c; return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
 
 /* ------------------------------------------------------------------------------------ variables */
-#define GETTER(Name, Type, expression)                                                                    \
-    fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, Type out[]) {      \
-        Instance *m = (Instance *)c;                                                                      \
-        size_t i;                                                                                         \
-        if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                    \
-        for (i = 0; i < n; i++) {                                                                         \
-            const double *const v = values_of(m, vr[i]), x = v ? *v : 0.0;                                \
-            if (!v) return fmi2Error;                                                                     \
-            out[i] = expression;                                                                          \
-        }                                                                                                 \
-        return told(m);                                                                                   \
+#define GETTER(Name, Type, expression)                                                                            \
+    fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, Type out[]) {              \
+        const double *const values = (const double *)c;                                                           \
+        const unsigned count = model.n_references;                                                                \
+        size_t i;                                                                                                 \
+        if (*face_of(c)->dirty != 0.0) freshen((Instance *)c, vr, n);                                             \
+        for (i = 0; i < n; i++) {                                                                                 \
+            double x;                                                                                             \
+            if (!in_range(vr[i], 0, count)) return missing((Instance *)c, vr[i]);                                 \
+            x = values[vr[i]];                                                                                    \
+            out[i] = expression;                                                                                  \
+        }                                                                                                         \
+        return told((Instance *)c);                                                                               \
     }
-#define SETTER(Name, Type)                                                                                \
-    fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, const Type in[]) { \
-        Instance *m = (Instance *)c;                                                                      \
-        size_t i;                                                                                         \
-        for (i = 0; i < n; i++) {                                                                         \
-            double *const v = settable(m, vr[i]);                                                         \
-            if (!v) return fmi2Error;                                                                     \
-            *v = (double)in[i];                                                                           \
-        }                                                                                                 \
-        m->part.n.dirty = 1.0;                                                                            \
-        return fmi2OK;                                                                                    \
+#define SETTER(Name, Type)                                                                                        \
+    fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, const Type in[]) {         \
+        double *const values = (double *)c;                                                                       \
+        const unsigned first = first_settable(face_of(c)), count = model.n_references - first;                    \
+        size_t i;                                                                                                 \
+        for (i = 0; i < n; i++) {                                                                                 \
+            if (!in_range(vr[i], first, count)) return unsettable((Instance *)c, vr[i]);                          \
+            values[vr[i]] = (double)in[i];                                                                        \
+        }                                                                                                         \
+        *face_of(c)->dirty = 1.0;                                                                                 \
+        return fmi2OK;                                                                                            \
     }
 
 GETTER(Real, fmi2Real, x)
@@ -123,7 +125,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *s) { (void)c; (void)k; (void)s; return fmi2Discard; }
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *x) {
     if (k != fmi2LastSuccessfulTime) return fmi2Discard;
-    *x = ((Instance *)c)->part.n.v.t;
+    *x = *face_of(c)->time;
     return fmi2OK;
 }
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *x) { (void)c; (void)k; (void)x; return fmi2Discard; }
@@ -141,7 +143,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 }
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     (void)c; (void)state;
-    *size = sizeof(Saved);
+    *size = model.saved;
     return fmi2OK;
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {

@@ -1,17 +1,14 @@
-/* FMI 3.0 co-simulation face of a native component.  Compiled as one unit: model.c is generated.
+/* FMI 3.0 co-simulation face of a native component: with the model in one unit, or APART (see instance.h).
  *
  * The time has the value reference 0; after it come the variables in the order of the FMI 2.0 face.  An array has the
  * reference of its first element, and those of the others are of no variable.
  */
-#include "model.c"
-#include "extents.h" /* generated: the number of values of the variable that begins at a place, 0 within an array */
+#ifndef APART
+#include "instance.c"
+#endif
+#include "instance.h"
 
 #include "fmi3Functions.h"
-
-typedef fmi3LogMessageCallback Logger;
-#define FIRST_REFERENCE 1u
-#define EXTENT(place) extents[place]
-#include "instance.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* of the functions that only say they are not offered */
@@ -19,7 +16,9 @@ typedef fmi3LogMessageCallback Logger;
 
 #define NOT_OFFERED(name) { return wrong((Instance *)m, #name ": not offered by this FMU"); }
 
-static COLD void say(Instance *m, const char *message) { m->logger(m->environment, fmi3Error, "logStatusError", message); }
+static void say(const Face *face, const char *message) {
+    ((fmi3LogMessageCallback)face->logger)(face->environment, fmi3Error, "logStatusError", message);
+}
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
@@ -28,7 +27,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance m, fmi3Boolean on, size_t n, const f
 }
 
 /* ---------------------------------------------------------------------------------- instantiation */
-static COLD fmi3Instance none(Logger logger, void *environment, const char *why) {
+static fmi3Instance none(fmi3LogMessageCallback logger, void *environment, const char *why) {
     if (logger) logger(environment, fmi3Error, "logStatusError", why);
     return NULL;
 }
@@ -38,9 +37,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const fmi3ValueReference required[], size_t nRequired,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                          fmi3IntermediateUpdateCallback update) {
-    if (!token || strcmp(token, MODEL_GUID) != 0) return none(logger, environment, "the instantiation token is not this FMU's");
+    if (!token || strcmp(token, guid) != 0) return none(logger, environment, "the instantiation token is not this FMU's");
     if (nRequired) return none(logger, environment, "no intermediate variables are offered");
-    return new_instance(name, logger, environment);
+    return new_instance(name, &(Face){.first = 1, .extents = model.extents, .say = say, .logger = (void (*)(void))logger,
+                                      .environment = environment});
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -56,20 +56,15 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     return none(logger, environment, "only co-simulation is offered");
 }
 
-void fmi3FreeInstance(fmi3Instance m) { free(m); }
+void fmi3FreeInstance(fmi3Instance m) { if (m) free(face_of(m)); }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance m, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    ((Instance *)m)->part.n.v.t = startTime;
+    *face_of(m)->time = startTime;
     return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-    Instance *m = (Instance *)c;
-    m->part.failed = 0;
-    initialize(&m->part, m->part.n.v.t);
-    return told(m);
-}
+fmi3Status fmi3ExitInitializationMode(fmi3Instance m) { return run((Instance *)m); }
 
 fmi3Status fmi3Terminate(fmi3Instance m) { return fmi3OK; }
 fmi3Status fmi3Reset(fmi3Instance m) { reset((Instance *)m); return fmi3OK; }
@@ -78,13 +73,15 @@ fmi3Status fmi3EnterConfigurationMode(fmi3Instance m) { return fmi3OK; }
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance m) { return fmi3OK; }
 
 /* -------------------------------------------------------------------------------------- variables */
-static int n_values(unsigned reference) { return reference ? extent(reference) : 1; } /* the time has one */
+static int n_values(Instance *m, unsigned reference) { /* the time has one */
+    return reference ? extent(face_of(m), reference) : 1;
+}
 
 static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size_t given) {
     size_t i, expected = 0;
     for (i = 0; i < n; i++) {
-        if (!n_values(vr[i])) return missing(m, vr[i]);
-        expected += (size_t)n_values(vr[i]);
+        if (!n_values(m, vr[i])) return missing(m, vr[i]);
+        expected += (size_t)n_values(m, vr[i]);
     }
     if (given == expected) return 0;
     return wrong(m, "%u values for variables of %u values", (unsigned)given, (unsigned)expected);
@@ -96,10 +93,10 @@ static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size
         size_t i, j = 0;                                                                                             \
         int k;                                                                                                       \
         if (miscounted(m, vr, n, n_out)) return fmi3Error;                                                           \
-        if (m->part.n.dirty != 0.0) freshen(m, vr, n);                                                               \
+        if (*face_of(m)->dirty != 0.0) freshen(m, vr, n);                                                            \
         for (i = 0; i < n; i++) {                                                                                    \
-            const double *const v = vr[i] ? values_of(m, vr[i]) : &m->part.n.v.t;                                    \
-            for (k = 0; k < n_values(vr[i]); k++) {                                                                  \
+            const double *const v = vr[i] ? (double *)c + place(face_of(m), vr[i]) : face_of(m)->time;               \
+            for (k = 0; k < n_values(m, vr[i]); k++) {                                                               \
                 const double x = v[k];                                                                               \
                 out[j++] = expression;                                                                               \
             }                                                                                                        \
@@ -109,15 +106,16 @@ static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size
 #define SETTER(Name, Type)                                                                                           \
     fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const Type in[], size_t n_in) {\
         Instance *m = (Instance *)c;                                                                                 \
+        const unsigned first = first_settable(face_of(m)), count = model.n_references - first;                       \
         size_t i, j = 0;                                                                                             \
         int k;                                                                                                       \
         if (miscounted(m, vr, n, n_in)) return fmi3Error;                                                            \
         for (i = 0; i < n; i++) {                                                                                    \
-            double *const v = settable(m, vr[i]);                                                                    \
-            if (!v) return fmi3Error;                                                                                \
-            for (k = 0; k < extent(vr[i]); k++) v[k] = (double)in[j++];                                              \
+            const unsigned at = place(face_of(m), vr[i]);                                                            \
+            if (!in_range(at, first, count)) return unsettable(m, vr[i]);                                            \
+            for (k = 0; k < extent(face_of(m), vr[i]); k++) ((double *)c)[at + k] = (double)in[j++];                 \
         }                                                                                                            \
-        m->part.n.dirty = 1.0;                                                                                       \
+        *face_of(m)->dirty = 1.0;                                                                                    \
         return fmi3OK;                                                                                               \
     }
 #define NO_TYPE(Name)                                                                                                \
@@ -167,7 +165,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance m, fmi3FMUState *state) {
     return fmi3OK;
 }
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance m, fmi3FMUState state, size_t *size) {
-    *size = sizeof(Saved);
+    *size = model.saved;
     return fmi3OK;
 }
 fmi3Status fmi3SerializeFMUState(fmi3Instance m, fmi3FMUState state, fmi3Byte bytes[], size_t size) {

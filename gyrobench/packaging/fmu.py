@@ -19,6 +19,7 @@ from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
 from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
 from gyrobench.packaging.loading import BuildError, load_part, sources
+from gyrobench.packaging.native_library import make_library
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
@@ -73,15 +74,13 @@ def write_archive(path: Path, entries: dict[str, bytes]) -> None:
 
 
 def native_entries(files: dict[str, str], name: str, platforms: tuple[str, ...], fmi: int) -> dict[str, bytes]:
-    """Return sources and compiled binaries as entries of an FMU; fmi2.c (or fmi3.c) of the files is compiled."""
+    """Return sources and compiled binaries as entries of an FMU.  Raises CompilerError."""
     entries = {f"sources/{n}": t.encode() for n, t in files.items()}
     with tempfile.TemporaryDirectory() as folder:
-        for n, t in files.items():
-            (Path(folder) / n).write_text(t, encoding="utf-8")
         for platform in platforms:
             suffix = compiler.PLATFORMS[platform][0]
             library = Path(folder) / f"{name}-{platform}{suffix}"
-            compiler.compile_library(Path(folder) / f"fmi{fmi}.c", library, (Path(folder),), platform)
+            make_library(files, name, fmi, platform, library)
             entries[f"binaries/{_folder_of(platform, fmi)}/{name}{suffix}"] = library.read_bytes()
     return entries
 

@@ -140,14 +140,6 @@ def c_source(cls: type[Component], guid: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def extents_header(extents: Iterable[int]) -> str:
-    """Return extents.h of the FMI 3.0 face: of each value reference of FMI 2.0 the number of values of its variable.
-
-    extents: 1 for a scalar; of an array its size at the first element and 0 at the others.
-    """
-    return f"static const int extents[] = {{{', '.join(map(str, extents)) or '0'}}};\n"
-
-
 def variables(cls: type[Component]) -> list[list[Scalar]]:
     """Return the variables of the FMI 3.0 face as their elements: those of an array, or one scalar."""
     return [list(v) for _, v in itertools.groupby(cls.layout, lambda s: (s.section, s.decl.name))]
@@ -160,14 +152,25 @@ def header_folder() -> Path:
     return Path(spec.origin).parent / "c-code"
 
 
-def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
-    """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
+def face_files(extents: Iterable[int], fmi: int) -> dict[str, str]:
+    """Return the files beside model.c and what that includes, by name: instance.c, the FMI face and its headers.
+
+    extents: of each value reference of FMI 2.0 the number of values of its variable in FMI 3.0: 1 for a scalar; of an
+    array its size at the first element and 0 at the others.
+    """
     headers = [f"fmi{fmi}Functions.h", f"fmi{fmi}FunctionTypes.h"]
     headers.append("fmi2TypesPlatform.h" if fmi == 2 else "fmi3PlatformTypes.h")
-    extents = [n for v in variables(cls) for n in (len(v), *[0] * (len(v) - 1))]
+    return {
+        "extents.h": f"static const int extents[] = {{{', '.join(map(str, extents)) or '0'}}};\n",
+        **{n: (HERE / n).read_text(encoding="utf-8") for n in ("instance.h", "instance.c", f"fmi{fmi}.c")},
+        **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
+    }
+
+
+def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
+    """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
     return {
         "model.c": c_source(cls, guid),
-        **({"extents.h": extents_header(extents)} if fmi == 3 else {}),
-        **{n: (HERE / n).read_text(encoding="utf-8") for n in (*RUNTIME, "instance.h", f"fmi{fmi}.c")},
-        **{h: (header_folder() / h).read_text(encoding="utf-8") for h in headers},
+        **{n: (HERE / n).read_text(encoding="utf-8") for n in RUNTIME},
+        **face_files((n for v in variables(cls) for n in (len(v), *[0] * (len(v) - 1))), fmi),
     }

@@ -22,7 +22,7 @@ KEYWORDS = {
     "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
     # macros of the C library and of core.h
     "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA", "AHEAD",
-    "PATIENCE", "NEVER_INLINE", "COLD", "OF_MATRIX", "BY_PROCESSOR", "CAN_BE_LINKED",
+    "PATIENCE", "NEVER_INLINE", "COLD", "OF_MATRIX", "BY_PROCESSOR", "CAN_BE_LINKED", "APART", "SHARED", "LINKED_FORM",
     "MODEL_GUID", "N_REFERENCES", "U0", "Y0", "X0", "DX0", "N_U", "N_Y", "N_X", "N_PORTS", "N_STREAMS",
     "N_BOUNDS", "N_WATCHED", "N_STEPPED", "N_FOLLOWED", "NONLINEAR", "MIDPOINT", "RK4_SUBSTEPS", "LARGEST_STEP",
 }  # fmt: skip

@@ -1,4 +1,4 @@
-/* A system of native parts as one component: the same interface as core.h, for instance.h and the FMI faces.
+/* A system of native parts as one component: the same interface as core.h, for instance.c and the FMI faces.
  *
  * model.c defines `Vars` (the values that are exposed: parameters, inputs, outputs), `Parts` (the parts themselves), the
  * counts and tables used here, the wires, and includes this file.  The order of all operations is that of the engines
@@ -119,12 +119,8 @@ static void proceed(Part *p, double t, double step) {
     p->n.dirty = 0.0;
 }
 
-static void do_step(Part *p, double t, double step) {
+static int do_step(Part *p, double t, double step) {
     if (inputs_are_finite(p)) proceed(p, t, step);
-}
-
-static int linked_step(Part *p, double t, double step) {
-    do_step(p, t, step);
     return p->failed ? 3 : 0;
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,9 @@ from toybench import TOYS
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component
-from gyrobench.packaging import load_part
-from gyrobench.packaging.instance import Fmu, InstanceError
-from gyrobench.packaging.reference import Reference, read_reference, run_reference, write_reference
+from gyrobench.packaging import compiler, load_part
+from gyrobench.packaging.instance import Fmu, InstanceError, Unzipped
+from gyrobench.packaging.reference import Reference, compare, read_reference, run_reference, write_reference
 from gyrobench.units import base_unit, unit
 
 
@@ -70,6 +71,25 @@ def test_sources_say_how_to_build(part: str, fmu: Callable) -> None:
     """FMI 3: a build description (the standard's own checks of all FMUs are those of test_validate)."""
     (one,) = fmpy.model_description.read_build_description(str(fmu(part, "native", 3)))
     assert [f for s in one.sourceFileSets for f in s.sourceFiles] == ["fmi3.c"]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_sources_build_by_themselves(fmu: Callable, tmp_path: Path, fmi: int) -> None:
+    """The one file that is named is one unit, without an option of the build's own: the same bits."""
+    path = fmu("floated_gyro", "native", fmi)
+    files = Unzipped(
+        fmpy.read_model_description(str(path), validate=False), Path(fmpy.extract(str(path), str(tmp_path)))
+    )
+    (library,) = (tmp_path / "binaries").glob("*/floated_gyro.*")
+    built = library.read_bytes()
+    cc = compiler.command(compiler.this_platform())
+    assert cc is not None
+    options = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-o", str(library), f"fmi{fmi}.c", "-lm")
+    subprocess.run([*cc, *options], cwd=tmp_path / "sources", check=True)
+    assert library.read_bytes() != built
+    one = Fmu(path, like=files)
+    assert compare(read_reference(reference_of("floated_gyro")), one, "from its sources") == []
+    one.free()
 
 
 def test_description(part: str, target: str, fmu: Callable) -> None:
