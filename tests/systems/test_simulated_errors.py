@@ -130,15 +130,17 @@ def test_servo_table() -> None:
     agree("servo_vertical_level", {}, {**SERVO, "cycles": 1}, errors, 0.05)
 
 
-#: the day in 29 minutes; counts of 0.02", between two of which the servo of a gyro without noise hunts
-BUILT = {**DAY50, **SERVO, "table.quantum": 1e-7, "window": 24.0, "dwell": 72.0}
+#: the day in 14 minutes; counts of 0.02", between two of which the servo of a gyro without noise hunts
+W100 = 2.0 * W50
+BUILT = {**DAY50, **SERVO, "table.quantum": 1e-7, "window": 12.0, "dwell": 36.0, "route": "combination"}
+BUILT |= {"site.earth_rate": W100, "time": DAY50["time"] / 2.0}
 del BUILT["table.rumble"]
 
 
 def test_polar_servo_on_the_table_as_it_is_built() -> None:
     """Scale, axis and unbalance of a table whose sampled controller holds the gyro, and the gyro on it, all at once.
 
-    0.004 kg.m over 11070 N.m/rad (p = 0.5) are 0.73": 0.004 deg/h/g2 in D_IS at fifty Earth rates.  The scale moves
+    0.004 kg.m over 11070 N.m/rad (p = 0.5) are 0.73": 0.008 deg/h/g2 in D_IS at a hundred Earth rates.  The scale moves
     D_S, the axis D_I and D_O; each is of the order 0.1 deg/h/g.
     """
     errors = {
@@ -157,13 +159,12 @@ def test_unbalance_over_the_stiffness_of_a_sampled_servo() -> None:
     2 a W g c / (g2 sin 2 phi) downwards.  [BEARING-AIR, SERVO-TF]
     """
     system, parts = load_system("servo_polar"), {"table": "table_servo_dynamic"}
-    values = {**BUILT, "route": "combination"}
-    wrong = {**values, "table.axis_unbalance": [0.004, 0.003]}
+    wrong = {**BUILT, "table.axis_unbalance": [0.004, 0.003]}
     with Session("servo_polar", parts) as session:
-        plain, off = (system.with_values(v).reduce(session.run(v, seed=3)) for v in (values, wrong))
+        plain, off = (system.with_values(v).reduce(session.run(v, seed=3)) for v in (BUILT, wrong))
     stiffness = 547.0 * 9.80665e-5 / ARCSEC
     g = frames.normal_gravity(PHI) / frames.G0
-    per_mass = frames.G0 / stiffness * W50 / (g * math.sin(PHI)) / DPH
+    per_mass = frames.G0 / stiffness * W100 / (g * math.sin(PHI)) / DPH
     moved = {c.name: off[c.name].estimate - c.estimate for c in plain.coefficients}
     for name, mass in (("D_IO", 0.004), ("D_IS", 0.003)):
         assert moved[name] == pytest.approx(-mass * per_mass, rel=0.03)
