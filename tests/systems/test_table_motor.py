@@ -101,18 +101,16 @@ def test_momentum_of_a_coasting_table(run: gb.Run) -> None:
     assert lost == pytest.approx(braked, rel=0.03)
 
 
-def with_values(values: dict[str, Any], seed: int = 11) -> LoopResult:
+def with_values(values: dict[str, Any], seed: int = 11) -> gb.Run:
     test = gb.load(NAME)
     for name, value in values.items():
         test.set(name, value)
-    result = test.run(seed=seed, check_step=False).result
-    assert isinstance(result, LoopResult)
-    return result
+    return test.run(seed=seed, check_step=False)
 
 
 def test_a_cable_is_told_from_the_inertia() -> None:
     """0.05 N.m/rad about 1 rad, so 0.05 N.m at the angle 0.  Without c in the model J is 44 u and K_t 27 u off."""
-    result = with_values({"body.axis_cable": 0.05, "body.axis_cable_zero": "1rad"})
+    result = with_values({"body.axis_cable": 0.05, "body.axis_cable_zero": "1rad"}).result
     for c in result.coefficients:
         truth = 0.05 if c.name == "M_0" else c.truth
         assert truth is not None and abs(c.estimate - truth) < 3.5 * c.u, c.name
@@ -123,16 +121,14 @@ def test_a_cable_is_told_from_the_inertia() -> None:
 def test_a_torque_that_the_model_lacks_is_named() -> None:
     """0.05 kg.m on an axis tilted by 1 deg: 0.05 * 9.8066 * sin(1 deg) = 8.56e-3 N.m once a turn."""
     values: dict[str, Any] = {"body.axis_unbalance[1]": 0.05, "body.tilt[1]": "1deg"}
-    result = with_values(values)
+    run = with_values(values)
+    result = run.result
+    assert isinstance(result, LoopResult)
     said = [w for w in result.warnings if "torque once a turn, 0.008" in w]
     assert len(said) == 1 and "Balance the table" in said[0]
     rows = next(t["rows"] for t in result.tables if t["title"] == "Torques left out")
     assert rows[0][0] == "torque once a turn" and rows[0][1] == pytest.approx(8.56e-3, abs=4.0 * rows[0][2])
-    run = gb.load(NAME)
-    for name, value in values.items():
-        run.set(name, value)
-    record = run.run(seed=11, check_step=False).record
-    judged = load_system(NAME).reduce(record, {"K_t": (2.0, 4.0)})
+    judged = load_system(NAME).reduce(run.record, {"K_t": (2.0, 4.0)})
     assert judged["K_t"].verdict == "inconclusive"
 
 
@@ -205,17 +201,23 @@ def windows(rng: np.random.Generator) -> list[Any]:
     return found
 
 
-def test_u_is_the_scatter_of_the_errors_where_angles_and_meter_are_the_noise() -> None:
+@pytest.fixture(scope="module")
+def solved() -> list[Any]:
+    """What is found in 60 records with nothing left out."""
+    rng = np.random.default_rng(3)
+    return [reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound) for _ in range(60)]
+
+
+def test_u_is_the_scatter_of_the_errors_where_angles_and_meter_are_the_noise(solved: list[Any]) -> None:
     """Random torque makes 2 T3/3 (2e-4/2.5)2, the angles 6 (4e-7)2, the ammeter 2 T3/3 2.5e-3 s (3 1e-3/2.5)2 of the
     variance of y: 5.3e-13, 9.6e-13 and 3.0e-13.  With angles that err by their rounding alone, 3.8e-13, and all
     the rest taken for torque u is 1.3 to 1.5 times as large.
     """
-    rng, truth = np.random.default_rng(3), np.array([K_T, 1.0, 0.03, 0.1, M_0, CABLE]) / J
-    found = [reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound) for _ in range(60)]
-    z = np.array([(f.value - truth) / np.sqrt(np.diag(f.covariance)) for f in found])
+    truth = np.array([K_T, 1.0, 0.03, 0.1, M_0, CABLE]) / J
+    z = np.array([(f.value - truth) / np.sqrt(np.diag(f.covariance)) for f in solved])
     assert np.sqrt(np.mean(z**2, axis=0)) == pytest.approx(np.ones(6), abs=0.25)
-    assert np.mean([f.torque_density for f in found]) == pytest.approx(DENSITY, rel=0.05)
-    assert np.mean([f.angle_error for f in found]) == pytest.approx(ANGLE_ERROR, rel=0.05)
+    assert np.mean([f.torque_density for f in solved]) == pytest.approx(DENSITY, rel=0.05)
+    assert np.mean([f.angle_error for f in solved]) == pytest.approx(ANGLE_ERROR, rel=0.05)
 
 
 def test_an_angle_errs_by_its_rounding_at_least() -> None:
@@ -225,13 +227,12 @@ def test_an_angle_errs_by_its_rounding_at_least() -> None:
     assert found.angle_error == pytest.approx(10.0 * ANGLE_ERROR)
 
 
-def test_terms_that_are_not_there_are_found_by_chance_only() -> None:
+def test_terms_that_are_not_there_are_found_by_chance_only(solved: list[Any]) -> None:
     """60 records with nothing left out: p is uniform, the smallest of 120 rarely below 1e-3; one with w |w|."""
-    rng = np.random.default_rng(5)
-    p = [s.p for _ in range(60) for s in reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound).left_out]
+    p = [s.p for f in solved for s in f.left_out]
     assert 0.35 < np.mean(p) < 0.65 and min(p) > 1e-4
 
-    square = windows(rng)
+    square = windows(np.random.default_rng(5))
     for k, w in enumerate(square):
         square[k] = replace(w, y=w.y - 0.02 * float(w.rate[0] * abs(w.rate[0])) * reduction.PIECE**2 / J)
     first = reduction.solve(square, reduction.QUANTUM, reduction._wound).left_out[0]
