@@ -28,6 +28,12 @@ def session(name: str, legs: list[Leg] | None = None, parts: dict[str, str] | No
     return Session(other, parts or {})
 
 
+def only(name: str, *labels: str, parts: dict[str, str] | None = None) -> Session:
+    """The loop test with the phases alone whose labels start so."""
+    base: Any = type(load_system(name))
+    return session(name, parts=parts, phases=lambda self: [p for p in base.phases(self) if p.label.startswith(labels)])
+
+
 def measures(result: Result) -> dict[str, float]:
     return {c.name: c.estimate for c in result.coefficients}
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize
 
-from gyrobench.engine.session import run
+from gyrobench.engine.session import Session
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
 
@@ -21,15 +21,22 @@ DEG = math.pi / 180.0
 QUIET = {"noise": 0.0, "random_drift": 0.0}
 
 
-def reduced(phases: tuple[str, ...] = (), seed: int = 1, **values: Any) -> Any:
+def reduced(phases: tuple[str, ...] = (), **values: Any) -> Any:
     """Result of a run, of these phases alone where some are named."""
+    (result,) = each(phases, 1, **values)
+    return result
+
+
+def each(phases: tuple[str, ...], runs: int, **values: Any) -> list[Any]:
+    """Results of runs with the seeds 1, 2, ..."""
     system = load_system(NAME)
     for name, value in values.items():
         system.set(name, value)
     if phases:
         plan = [p for p in system.phases() if p.label.startswith(phases) or p.label == "turn"]
         system.phases = lambda: plan  # type: ignore[method-assign]
-    return system.reduce(run(system, seed=seed))
+    with Session(system) as session:
+        return [system.reduce(session.run(seed=seed)) for seed in range(1, runs + 1)]
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +71,7 @@ def test_cut_off_is_k_over_two_pi_measured_and_computed(quiet: Any) -> None:
 
 def test_time_constant_under_noise() -> None:
     """The noise of the heading decays as the step does, so that its samples are no independent ones: eight seeds."""
-    found = [reduced(("alignment",), seed=s)["time constant"] for s in range(1, 9)]
+    found = [result["time constant"] for result in each(("alignment",), 8)]
     z = np.array([(c.estimate - 60.0) / c.u for c in found])
     assert 0.4 < math.sqrt(np.mean(z**2)) < 1.75 and abs(np.mean(z)) < 1.2  # 3.3 standard deviations
     assert all(0.3 < c.u < 4.0 for c in found)
@@ -126,7 +133,7 @@ def test_random_heading_noise_is_that_of_the_two_filters() -> None:
     """White noise S of the magnetic heading: var S2 k/2; random walk N: N2/(2k).  Four times 1440 s: 48 independent."""
     noise, walk, k = 0.1 * DEG, 0.1 * DEG / 60.0, 1.0 / 60.0
     expected = math.sqrt(noise**2 * k / 2.0 + walk**2 / (2.0 * k)) / DEG
-    squares = [reduced(("rest",), seed=s)["heading noise"].estimate ** 2 for s in range(1, 5)]
+    squares = [result["heading noise"].estimate ** 2 for result in each(("rest",), 4)]
     assert math.sqrt(np.mean(squares)) == pytest.approx(expected, rel=0.25)  # 10 % of the rms
 
 

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from gimballed import only
 
-from gyrobench.engine.session import Session, run
+from gyrobench.engine.session import run
 from gyrobench.system.system import load_system
 
 NAME = "platform_single_axis"
@@ -54,9 +55,9 @@ def test_commanded_rate_is_reached(quiet):
     assert found["settling"].estimate < 0.3
 
 
-def test_isolation_is_that_of_the_friction_and_the_back_emf():
+def test_isolation_is_that_of_the_friction_and_the_back_emf(quiet):
     """The base drags by (viscous + k_e k_t / R) (omega_b - omega): without both it cannot."""
-    _, result, _ = reduced(**QUIET)
+    _, result, _ = quiet
     _, free, _ = reduced(**QUIET, **{"platform.viscous": 0.0, "platform.k_e": 0.0, "gyro.D_F": 0.0, "gyro.D_S": 0.0,
                                      "gyro.D_SS": 0.0, "gyro.D_O": 0.0, "gyro.D_IS": 0.0, "gyro.D_OS": 0.0,
                                      "gyro.D_I": 0.0, "gyro.D_IO": 0.0, "gyro.D_II": 0.0})  # fmt: skip
@@ -98,10 +99,10 @@ def test_every_estimator_runs_in_the_loop(name):
         assert found["platform error"].estimate < 10.0
 
 
-def test_servo_with_a_current_loop_swaps_and_isolates_better():
+def test_servo_with_a_current_loop_swaps_and_isolates_better(quiet):
     """The current loop holds the torque against the back EMF, which is what the base drags by."""
     _, result, found = reduced({"stabilizer": "servo_three_loop"}, **QUIET)
-    _, _, plain = reduced(**QUIET)
+    _, _, plain = quiet
     assert found["platform error"].estimate < 0.3 * plain["platform error"].estimate
     assert rows(result, "Linear models and")[0]["gain / dB"] < 0.05
     assert not any("carried over" in s for s in result.summary)  # by other ways than those of a plain motor
@@ -109,7 +110,7 @@ def test_servo_with_a_current_loop_swaps_and_isolates_better():
 
 def test_halving_the_step_moves_the_margin_by_its_delay():
     """The exchange delays by about a step: 360 f_c h = 1.8 degrees at 10 Hz and 0.5 ms, half of it at half the step."""
-    with Session(NAME) as session:
+    with only(NAME, "loop", "drift") as session:
         pm = []
         for h in (5e-4, 2.5e-4, 1.25e-4):
             result = load_system(NAME).reduce(session.run({**QUIET, **SHORT}, step=h))
@@ -118,14 +119,14 @@ def test_halving_the_step_moves_the_margin_by_its_delay():
     assert 0.0 < first < 3.6 and second == pytest.approx(first / 2.0, rel=0.2)
 
 
-def test_ride_by_a_recorded_profile(tmp_path):
+def test_ride_by_a_recorded_profile(tmp_path, quiet):
     """Pitch of 1 degree at 1 Hz as a recording leaves what the exciter's sine of that size leaves, but for its ends."""
     t = np.arange(0.0, 20.0, 0.05)
     path = tmp_path / "pitch.csv"
     rows = (f"{x:.3f},{math.sin(2 * math.pi * x):.6f}" for x in t)
     path.write_text("\n".join(["time [s],pitch [deg]", *rows]) + "\n")
     _, _, recorded = reduced(**{**QUIET, "profile": str(path), "hold": 18.0})
-    _, _, plain = reduced(**QUIET)
+    _, _, plain = quiet
     assert recorded["platform error"].estimate == pytest.approx(plain["platform error"].estimate, rel=0.1)
     assert "drift" not in recorded
 
@@ -133,8 +134,9 @@ def test_ride_by_a_recorded_profile(tmp_path):
 def test_no_crossover_out_of_noise():
     """Thirty times the noise at 15 Hz: 58.5 Hz was stated where the linear model has 15.4; now no value, and why."""
     noisy = {"crossover": 15.0, "reading_noise": 3e-3}
-    for seed in (1, 2):
-        record = run(load_system(NAME), values={**SHORT, **noisy}, seed=seed)
+    with only(NAME, "loop", "drift") as session:
+        records = [session.run({**SHORT, **noisy}, seed=seed) for seed in (1, 2)]
+    for record in records:
         result = load_system(NAME).reduce(record)
         f_c = result["f_c"]
         assert f_c.closed == pytest.approx(15.4, abs=0.1)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from gimbal_oracle import isolation, three_axis_loop
-from gimballed import session as with_methods
+from gimballed import only
 
 from gyrobench.engine.session import RunError, Session, run
 from gyrobench.record.csv_reader import DataError
@@ -24,13 +24,6 @@ SHORT = {**IDEAL, "sweeps": False, "hold": 5.0}
 NO_T2 = {"decoupler": "decoupler_none"}
 
 
-def only(*labels, parts=None):
-    """A session whose plan has the phases alone whose labels start so."""
-    system = type(load_system(NAME))
-    phases = lambda self: [p for p in system.phases(self) if p.label.startswith(labels)]  # noqa: E731
-    return with_methods(NAME, parts=parts, phases=phases)
-
-
 @pytest.fixture(scope="module")
 def sessions():
     with Session(NAME) as a, Session(NAME, NO_T2) as b:
@@ -39,7 +32,7 @@ def sessions():
 
 @pytest.fixture(scope="module")
 def sine_about_x():
-    with only("command x") as a, only("command x", parts=NO_T2) as b:
+    with only(NAME, "command x") as a, only(NAME, "command x", parts=NO_T2) as b:
         yield {True: a, False: b}
 
 
@@ -52,7 +45,7 @@ def reduced(session, **values):
 @pytest.fixture(scope="module")
 def short():
     """The sines of the base in the run without other values, with T2 and without."""
-    with only("base ") as a, only("base ", parts=NO_T2) as b:
+    with only(NAME, "base ") as a, only(NAME, "base ", parts=NO_T2) as b:
         return {True: reduced(a), False: reduced(b)}
 
 
@@ -141,7 +134,7 @@ def test_isolation_is_that_of_the_continuous_model(short):
 
 def test_command_turns_the_platform_its_way():
     """A commanded rate through the torquer: angle reached = angle commanded / |1 + 1/L|, in phase within degrees."""
-    with only("command") as session:
+    with only(NAME, "command") as session:
         record, _, found = reduced(session, frequency=0.5)
     for k, axis in enumerate("xyz", 1):
         assert found[f"reached {axis}"].estimate == pytest.approx(1.0, abs=0.02)
@@ -165,7 +158,7 @@ def test_margins_of_the_sweep_are_those_of_the_linear_parts(sessions):
 
 def test_platform_drifts_as_its_gyros_do():
     """Drift about each axis is that of the gyro there, for gravity as the tilted element sees it; noise included."""
-    with only("command step", "drift") as session:
+    with only(NAME, "command step", "drift") as session:
         record = session.run({"sweeps": False, "hold": 40.0, "roll": "10deg"})
     found = {c.name: c for c in load_system(NAME).reduce(record).coefficients}
     for axis in "xyz":
