@@ -13,6 +13,7 @@ from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.system.families.servo_test import ServoTest
+from gyrobench.system.system import System, load_system
 
 Array = NDArray[np.float64]
 DPH = math.pi / 180.0 / 3600.0  # 1 deg/h in rad/s
@@ -30,6 +31,13 @@ DAY500: dict[str, Any] = {
 QUIET: dict[str, Any] = {**dict.fromkeys(ServoTest.noises, 0.0), "nuisances": "none"}
 #: Ranges of the coefficients in Hu 1981 (ch. 2), deg/h per g^n; signs are drawn.
 RANGES = {"D_F": (0.05, 0.55), "D_I": (0.5, 1.3), "D_O": (0.1, 0.5), "D_S": (0.5, 1.3), "D_IS": (0.1, 0.2)}
+
+
+def polar_at_2_ms() -> System:
+    """The polar test in steps of 2 ms, with which the servo as it is set is stable and a run takes half the time."""
+    system = load_system("servo_polar")
+    system.step = 2e-3
+    return system
 
 
 def gyro(rng: np.random.Generator) -> dict[str, Any]:

@@ -65,7 +65,8 @@ def test_single_axis(designed: Session, values: dict[str, Any]) -> None:
 
 
 def test_rebalance_set_by_hand_is_what_the_stabilizer_reckons_with(designed: Session) -> None:
-    record, result = reduced(designed, {"rebalance.K_p": 200.0, "hold": 10.0})  # A/V, of 754: the float follows with 27 Hz
+    values = {"rebalance.K_p": 200.0, "hold": 10.0}  # A/V, of 754: the float follows with 27 Hz
+    record, result = reduced(designed, values)
     assert estimates(result)["f_c"] == pytest.approx(10.0, rel=0.03)
     assert record.run.linear is not None and record.run.linear.wanted == {"stabilizer": 10.0}
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import servoing_two_axes
-from servoing import DAY50, QUIET
+from servoing import DAY50, QUIET, polar_at_2_ms
 from tumbling import DPH, NAMES, SHORT, load, quiet
 
 from gyrobench import frames
@@ -19,7 +19,7 @@ from gyrobench.packaging import build
 from gyrobench.record.record import Record
 from gyrobench.result import DriftTestResult
 from gyrobench.system.suite import Suite, load_test
-from gyrobench.system.system import load_system
+from gyrobench.system.system import System, load_system
 
 PER_KELVIN = 0.2 * DPH  # rad/s/K
 FIELD = {"surroundings.field[3]": -44e-6, "gyro.D_B[1]": 2000.0 * DPH, "gyro.D_B[3]": -500.0 * DPH}
@@ -105,9 +105,8 @@ def test_surroundings_are_there_only_where_they_are_asked_for() -> None:
     assert asked.with_values({"dwell": 10.0}).slots == asked.slots
 
 
-def shifts(name: str, values: dict[str, Any], *fields: dict[str, Any]) -> list[dict[str, float]]:
+def shifts(system: System, values: dict[str, Any], *fields: dict[str, Any]) -> list[dict[str, float]]:
     """Changes of the estimates of a test by magnetic fields, deg/h per g^n."""
-    system = load_system(name)
     system.request("surroundings")
     with Session(system) as session:
         runs = [session.run({**values, **field}, seed=1) for field in ({}, *fields)]
@@ -122,7 +121,7 @@ def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_its_table() -> N
     """
     b, sensitivity = 44e-6, {1: 2000.0, 2: 800.0, 3: -500.0}
     values = {**DAY50, **QUIET, "route": "combination"} | {f"gyro.D_B[{k}]": x * DPH for k, x in sensitivity.items()}
-    up, east = shifts("servo_polar", values, {"surroundings.field[3]": b}, {"surroundings.field[1]": b})
+    up, east = shifts(polar_at_2_ms(), values, {"surroundings.field[3]": b}, {"surroundings.field[1]": b})
     phi = math.radians(45.75)
     g = frames.normal_gravity(phi) / frames.G0
     product = g * g * math.sin(phi) * math.cos(phi)
@@ -139,7 +138,7 @@ def test_the_field_is_turned_on_two_axes() -> None:
     b = 44e-6
     values = {"dwell": 10.0, "windows": 1, "settle": 3.0, **quiet(load_system("tumble_two_axis")), "nuisances": "none"}
     values |= {"gyro.D_B[1]": 2000.0 * DPH, "gyro.D_B[2]": 800.0 * DPH, "gyro.D_B[3]": -500.0 * DPH}
-    (up,) = shifts("tumble_two_axis", values, {"surroundings.field[3]": b})
+    (up,) = shifts(load_system("tumble_two_axis"), values, {"surroundings.field[3]": b})
     g = frames.normal_gravity(math.radians(45.75)) / frames.G0
     expected = {"D_I": -b * 2000.0 / g, "D_O": -b * 800.0 / g, "D_S": b * 500.0 / g}
     assert {n: up[n] for n in expected} == pytest.approx(expected, rel=2e-3)
@@ -151,7 +150,7 @@ def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_two_axes() -> No
     b, values = 44e-6, servoing_two_axes.day(200.0, 72, **servoing_two_axes.QUIET)
     given = {"Dx_B": (2000.0, 800.0, -500.0), "Dy_B": (-1500.0, 400.0, 900.0)}
     values |= {f"gyro.{n}[{k}]": x * DPH for n, of in given.items() for k, x in enumerate(of, 1)}
-    (up,) = shifts("servo_two_axis", values, {"surroundings.field[3]": b})
+    (up,) = shifts(load_system("servo_two_axis"), values, {"surroundings.field[3]": b})
     g = frames.normal_gravity(math.radians(45.75)) / frames.G0
     expected = {f"{n[:2]}_{axis}": -b * x / g for n, of in given.items() for axis, x in zip("xyz", of, strict=True)}
     assert {n: up[n] for n in expected} == pytest.approx(expected, rel=5e-3)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rate, gyro, held, latitude
+from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rate, gyro, held, latitude, polar_at_2_ms
 from stated import FAINT
 
 from gyrobench import frames
@@ -27,9 +27,7 @@ ARCSEC = math.pi / 648000.0
 
 @pytest.fixture(scope="module")
 def polar() -> Iterator[Session]:
-    system = load_system(NAME)
-    system.step = 2e-3  # a soft servo and a fast table below want 1 ms
-    with Session(system) as prepared:
+    with Session(polar_at_2_ms()) as prepared:  # a soft servo and a fast table below want 1 ms
         yield prepared
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from servoing import DAY50, DPH, QUIET, W50
+from servoing import DAY50, DPH, QUIET, W50, polar_at_2_ms
 from stated import FAINT
 from tumbling import WOBBLE
 
@@ -82,21 +82,29 @@ class Wobbling(type(load_system(NAME))):  # type: ignore[misc]
     )
 
 
+HEAVY = {"gyro.D_I": -9.0 * DPH, "gyro.D_S": -7.0 * DPH}
+
+
+@pytest.fixture(scope="module")
+def wobbling() -> Iterator[tuple[Session, dict[str, float]]]:
+    """A session with the wobble, in steps of 2 ms, and the estimates of a run without any."""
+    plain_system = polar_at_2_ms()
+    system = Wobbling()
+    system.name, system.folder, system.step = plain_system.name, plain_system.folder, plain_system.step
+    with Session(system) as session:
+        yield session, estimates(session, system, **HEAVY)[0]
+
+
 @pytest.mark.parametrize(("phase", "row"), [(0.0, 0), (math.pi / 2.0, 1)])
-def test_wobble(phase: float, row: int) -> None:
+def test_wobble(wobbling: tuple[Session, dict[str, float]], phase: float, row: int) -> None:
     """The axis goes round a cone twice a turn: gravity along the gyro axes changes with it, Earth rate along the input
     axis does not, to first order.  Told by the budget with sign, to 5 % of the largest shift.  (Second order is q2 W,
     at fifty Earth rates 1e-5 deg/h: the gyro has ten times the usual unbalance to stand above it.)
     """
     size = 20.0 * ARCSEC
-    heavy = {"gyro.D_I": -9.0 * DPH, "gyro.D_S": -7.0 * DPH}
-    plain_system = load_system(NAME)
-    system = Wobbling()
-    system.name, system.folder = plain_system.name, plain_system.folder
-    with Session(system) as session:
-        plain, _ = estimates(session, system, **heavy)
-        wobble = {"wobble.amplitude": size, "wobble.phase": phase, "u_wobble": size * FAINT}
-        found, result = estimates(session, system, **heavy, **wobble)
+    session, plain = wobbling
+    wobble = {"wobble.amplitude": size, "wobble.phase": phase, "u_wobble": size * FAINT}
+    found, result = estimates(session, session.system, **HEAVY, **wobble)
     expected = np.array(next(b for b in result.type_b if b["source"].startswith("wobble"))["changes"])[row] / FAINT
     shift = np.array([found[n] - plain[n] for n in found])
     assert np.max(np.abs(expected)) > 2e-4

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
-from servoing import DAY50, DPH
+from servoing import DAY50, DPH, polar_at_2_ms
 from servoing_two_axes import day
 from stated import FAINT
 
@@ -87,7 +87,7 @@ def test_polar_servo() -> None:
     """A day in fifty.  A ramp of 0.5 deg/h/h in the table angle; 0.02 deg/h/K of a thermometer, which is put into the
     angle by parts: the drift of a window is 0.02 (T - mean).  In the plan without repeats mounts cannot be told.
     """
-    with Session("servo_polar") as session:
+    with Session(polar_at_2_ms()) as session:
         record = session.run(DAY50, seed=3)
     clean = reduced(record)
     holds(clean)
