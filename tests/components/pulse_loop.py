@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from wired import BENCH
+from wired import Native
 
-from gyrobench.packaging import load_part
-
-RebalancePwm = load_part("rebalance_pwm", BENCH)
-RebalancePulse = load_part("rebalance_pulse", BENCH)
+RebalancePwm = partial(Native, "rebalance_pwm")
+RebalancePulse = partial(Native, "rebalance_pulse")
 DEG = math.pi / 180.0
 ARCSEC = DEG / 3600.0
 RATIO, TAU, K_SG = 4.0 / 3.0, 1e-3, 10.0

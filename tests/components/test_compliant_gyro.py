@@ -1,13 +1,14 @@
 """Third-order dynamics against the transfer functions of Hu 1981, the loop, and what it shares with floated_gyro."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro, RebalanceAnalog, Wired
+from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, Wired
 
 from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
@@ -32,7 +33,7 @@ def started(cls=CompliantGyro, **parameters):
 
 def looped(late=False, **parameters):
     inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
-    gyro, loop = CompliantGyro(**{**QUIET, **parameters}), RebalanceAnalog(meter=0.0)
+    gyro, loop = Native("compliant_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
     for key, x in inputs.items():
         setattr(gyro, key, x)
     return Wired({"gyro": gyro, "rebalance": loop}, ["gyro", "rebalance"], late=late)
@@ -195,7 +196,7 @@ def test_same_drift_and_the_same_noise_as_the_floated_gyro():
 @pytest.mark.parametrize("port, name", [("white", "drift"), ("pickoff", "u")])
 def test_noise_density_does_not_depend_on_the_step(port, name, h):
     n, size = 12_000, 3e-7
-    part = started(**{**QUIET, **NO_DRIFT, port: size, "step": 1.0})
+    part = started(partial(Native, "compliant_gyro"), **{**QUIET, **NO_DRIFT, port: size, "step": 1.0})
     x = np.empty(n)
     for k in range(n):
         part.do_step(k * h, h)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import integrate
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -19,8 +19,8 @@ NORTH, UP = W * math.cos(LATITUDE), W * math.sin(LATITUDE)
 
 def stepped(time, step, *, rate=(0.0, NORTH, UP), f=(0.0, 0.0, G0), cut=0.0, **parameters):
     """A compass after so many s under constant inputs."""
-    part = Compass(step=step, **parameters)
-    part.rate[:], part.f[:], part.cut = rate, f, cut
+    part = Native("gyrocompass", step=step, **parameters)
+    part.rate, part.f, part.cut = rate, f, cut
     part.initialize()
     for k in range(round(time / step)):
         part.do_step(k * step, step)

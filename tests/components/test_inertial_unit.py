@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from native_parts import make
-from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native
 
 from gyrobench import drift
 from gyrobench.component import ComponentError
@@ -51,7 +51,7 @@ def test_errors_are_those_of_a_floated_gyro(axis):
 
 def rate_gyro(omega, alpha, h, **given):
     """w_hat of a floated gyro through a motion given at the middle of each step."""
-    gyro = FloatedGyro(**{**QUIET, **NO_DRIFT, **RATE, **given})
+    gyro = Native("floated_gyro", **{**QUIET, **NO_DRIFT, **RATE, **given})
     gyro.initialize()
     out = []
     for k in range(len(omega)):
@@ -80,7 +80,7 @@ def test_acceptance_of_the_compensation(f, tau_a, least, most):
     error = indicated - alone
     # readings of the other two gyros: the same motion through gyros without errors
     others = [rate_gyro(np.column_stack([omega[:, k], 0 * t, 0 * t]), 0 * alpha, h) for k in (1, 2)]
-    part = load_part("gyro_error_compensator")(tau_a=tau_a, **{f"x_{n}": DYNAMIC[n] for n in ("J", "dJ", "HK")})
+    part = Native("gyro_error_compensator", tau_a=tau_a, **{f"x_{n}": DYNAMIC[n] for n in ("J", "dJ", "HK")})
     part.initialize()
     left = []
     for k in range(n):

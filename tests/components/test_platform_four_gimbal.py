@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gimbals import DEG, Four, base_rate, fly, platform_in_base
 from test_platform_three_gimbal import roll_then_yaw
+from wired import Native
 
 from gyrobench.component import ComponentError
 
@@ -147,7 +148,7 @@ def test_lock_input_holds_and_releases():
 
 # ------------------------------------------------------------------------------------------- refusals
 def flight(rate, steps=3000, **parameters):
-    part = Four(**{n: x for n, x in parameters.items() if n != "lock_4"})
+    part = Native("platform_four_gimbal", **{n: x for n, x in parameters.items() if n != "lock_4"})
     part.lock_4 = parameters.get("lock_4", 0.0)
     part.omega_b = rate.tolist()
     part.initialize()

@@ -105,7 +105,7 @@ def test_limits_of_voltage_and_current():
 # ----------------------------------------------------------------------------------------------- gyro
 def test_gyro_wired_by_its_momentum_keeps_the_nutation():
     """J w + h = const and J_g b'' = H w exchanged at 0.1 ms: 17.4 Hz, neither growth nor decay over 32 turns (2 s)."""
-    p = made(J=0.5, **BARE)
+    p = made(native=True, J=0.5, **BARE)
     h, big_h, small = 1e-4, 10.0, 0.02  # STAB-POWER-2DOF: nutation H / sqrt(J_x J_y) = 100 rad/s with 0.5 and 0.02
     b, rate, kick = 0.0, 0.01, []
     for k in range(20000):
@@ -186,7 +186,7 @@ def test_stick_slip_as_counted_by_events():
 def test_bearing_never_gives_more_than_its_spring_holds():
     """Random torques: the work of the contact is never above the start (0), less than -F x slipped way + spring."""
     rng = np.random.default_rng(4)
-    p = made(friction=0.3, stiction=0.5, **BARE)
+    p = made(native=True, friction=0.3, stiction=0.5, **BARE)
     work, slipped, h = 0.0, 0.0, 2e-4
     for k in range(20000):
         if k % 100 == 0:

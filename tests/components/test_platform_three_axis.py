@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from native_parts import make
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
@@ -199,14 +199,15 @@ def test_one_axis_alone_is_the_single_axis_platform(axis, inertia):
     arrays = {
         n: [x if k == axis else 0.0 if n.endswith("ction") else 1.0 for k in range(3)] for n, x in numbers.items()
     }
-    many = Platform(I_a=[0.6 if axis == 1 else 0.5, 0.5, 0.7], **{**arrays, "L": [3e-3] * 3})
-    one = SingleAxis(J=inertia, **numbers)
+    inner = [0.6 if axis == 1 else 0.5, 0.5, 0.7]
+    many = Native("platform_three_axis", I_a=inner, **{**arrays, "L": [3e-3] * 3})
+    one = Native("platform_single_axis", J=inertia, **numbers)
     many.initialize(), one.initialize()
     limited = 0.0
     for k in range(800):
         volts = 15.0 * math.sin(20.0 * k * 1e-3) * (k < 600)
-        many.v[axis], one.v = volts, volts
-        many.M_load[axis], one.M_load = 0.2, 0.2
+        many.v, one.v = [volts * (k == axis) for k in range(3)], volts
+        many.M_load, one.M_load = [0.2 * (k == axis) for k in range(3)], 0.2
         many.do_step(k * 1e-3, 1e-3), one.do_step(k * 1e-3, 1e-3)
         assert many.theta[axis] == pytest.approx(one.theta, rel=1e-9, abs=1e-13)
         assert many.i_motor[axis] == pytest.approx(one.i_motor, rel=1e-9, abs=1e-13)
@@ -228,7 +229,7 @@ def test_every_limit_shows():
 
 def test_pitch_stop_and_lock():
     """1 rad/s against the stop at 85 deg: thrown back slower, never 1 deg beyond; `lock` beyond 80 deg only."""
-    part = Platform(theta_0=[1.3, 0.2, 0.4], theta_dot_0=[1.0, 0.0, 0.0], **BARE)
+    part = Native("platform_three_axis", theta_0=[1.3, 0.2, 0.4], theta_dot_0=[1.0, 0.0, 0.0], **BARE)
     part.initialize()
     widest = 0.0
     for k in range(1000):

@@ -1,17 +1,15 @@
 """Rate by gates and by the time of a degree: resolution, time base, overflow, reversal, stamps."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from wired import BENCH
+from wired import Native
 
 from gyrobench.component import ComponentError
-from gyrobench.packaging import load_part
 
-RateGate = load_part("rate_gate", BENCH)
-InverseRate = load_part("inverse_rate", BENCH)
-Inductosyn = load_part("inductosyn", BENCH)
+RateGate, InverseRate, Inductosyn = (partial(Native, n) for n in ("rate_gate", "inverse_rate", "inductosyn"))
 DEG = math.pi / 180.0
 ARCSEC = DEG / 3600.0
 COUNT = 0.18 * ARCSEC

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from pulse_loop import ARCSEC, DEG, RATIO, TAU, I, Loop, RebalancePwm, W, loop_gain
+from wired import BENCH
 
 from gyrobench.component import ComponentError
+from gyrobench.packaging import load_part
 
 N = 1e-6 * DEG  # rad, one clock of full torque
 T_S, CLOCKS = 1e-3, 1000
@@ -63,7 +65,7 @@ def test_the_newest_demand_meets_the_saw() -> None:
 
 def test_amplifier() -> None:
     # u = 1e-4 V for 0.1 s: K_p u + K_i u t; a saw late, the first step is not known
-    part = RebalancePwm(K_p=100.0, K_i=1000.0)
+    part = load_part("rebalance_pwm", BENCH)(K_p=100.0, K_i=1000.0)
     part.initialize()
     part.u = 1e-4
     for k in range(100):

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from wired import BENCH, Wired
+from wired import Native, Wired
 
 from gyrobench.drift import NAMES_2DOF
-from gyrobench.packaging import load_part
 
-Gyro = load_part("gyro_2dof", BENCH)
-TwoAxis = load_part("rebalance_two_axis", BENCH)
+Gyro = partial(Native, "gyro_2dof")
+TwoAxis = partial(Native, "rebalance_two_axis")
 QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
 DRIFTLESS = dict.fromkeys((*NAMES_2DOF["x"], *NAMES_2DOF["y"]), 0.0)
 WIRES = [

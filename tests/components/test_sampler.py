@@ -2,13 +2,15 @@
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from wired import ROW, Sampler
+from wired import ROW, Native
 
 from gyrobench.component import ComponentError
 
+Sampler = partial(Native, "sampler")
 H = 0.01
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from wired import TableRate
+from wired import Native
 
 from gyrobench.component import ComponentError
 
@@ -17,7 +17,7 @@ H = 0.01
 
 def started(**parameters):
     inputs = {k: parameters.pop(k) for k in ("mode", "target", "face", "f_local", "omega_local") if k in parameters}
-    part = TableRate(**parameters)
+    part = Native("table_rate", **parameters)
     for key, x in inputs.items():
         setattr(part, key, x)
     part.initialize()
