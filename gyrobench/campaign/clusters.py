@@ -85,7 +85,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
         settings["distributed.worker.multiprocessing-method"] = "forkserver"
     with dask.config.set(settings), _without_main():
         if sys.platform == "linux":
-            get_mp_context().set_forkserver_preload(["distributed", "gyrobench.campaign.worker"])  # in place of dask's
+            loaded = ["distributed", "gyrobench.campaign.worker", "scipy.stats", "scipy.signal"]  # in place of dask's
+            get_mp_context().set_forkserver_preload(loaded)
         with (
             LocalCluster(
                 n_workers=workers,

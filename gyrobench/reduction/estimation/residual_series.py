@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.estimation import asked
-from gyrobench.reduction.estimation.shapiro_wilk import shapiro_wilk
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import deviations
 
@@ -143,13 +142,15 @@ def normality(x: Array) -> tuple[float, float]:
 
     Lighter tails than normal, as of readings in coarse steps, narrow no interval: 1 for values that are not skew.
     """
+    from scipy import stats  # half a second, which what looks at no residuals need not wait for
+
     x = x[:5000]
-    w, p = shapiro_wilk(x)
+    w, p = stats.shapiro(x)
     d = x - x.mean()
     d /= max(float(np.abs(d).max()), 1e-300)  # of data without noise these are any size
     m2, m3, m4 = (float(np.mean(d**k)) for k in (2, 3, 4))  # central moments: kurtosis m4/m2^2 - 3, skewness m3/m2^1.5
     light = m4 < 3.0 * m2**2 and abs(m3) < 2.0 * math.sqrt(6.0 / x.size) * m2**1.5
-    return w, 1.0 if light else p
+    return float(w), 1.0 if light else float(p)
 
 
 def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
@@ -179,22 +180,15 @@ def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> dict[str, A
     f [Hz], S [unit of the data squared per Hz].  The averaging windows act as a filter sinc^2(f T), not divided out.
     Empty as the Allan deviation.
     """
+    from scipy import signal
+
     chosen, window = _alike(parts, minimum)
     if not chosen:
         return {}
     n = min(p.size for p in chosen)
-    mean = np.mean([_welch(p, window, n) for p in chosen], axis=0)
-    return {"f": np.fft.rfftfreq(n, window)[1:].tolist(), "S": mean[1:].tolist(), "f_unit": "Hz"}
-
-
-def _welch(x: Array, window: float, n: int) -> Array:
-    """Return the mean density (n // 2 + 1,) of stretches of n values that overlap by half, under Hann's window."""
-    hann = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, n + 1)[:-1])
-    stretches_of = np.lib.stride_tricks.sliding_window_view(x, n)[:: n - n // 2]
-    power = np.abs(np.fft.rfft(stretches_of * hann)) ** 2 * (window / np.sum(hann**2))
-    power[:, 1 : None if n % 2 else -1] *= 2.0  # one side has the density of both, but at zero and the highest
-    out: Array = power.mean(axis=0)
-    return out
+    both = [signal.welch(p, 1.0 / window, nperseg=n, detrend=False) for p in chosen]
+    mean = np.mean([s for _, s in both], axis=0)
+    return {"f": both[0][0][1:].tolist(), "S": mean[1:].tolist(), "f_unit": "Hz"}
 
 
 def _alike(parts: list[tuple[float, Array]], minimum: int) -> tuple[list[Array], float]:
