@@ -124,7 +124,7 @@ def test_false_alarms_and_coverage(sigma: tuple[float, ...], dof: tuple[float, .
 def test_false_alarms_of_a_whole_suite() -> None:
     """Nine coefficients by three methods: one alarm in any of them in 5 % of suites, as p is adjusted."""
     n, rng, names = (
-        1000,
+        400,
         np.random.default_rng(11),
         ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS"),
     )

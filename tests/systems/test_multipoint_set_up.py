@@ -101,7 +101,7 @@ def test_errors_that_are_not_stated_leave_the_estimates_alone(head: Session) -> 
 
 
 def test_stated_errors_of_the_head_are_held(head: Session) -> None:
-    """Sixty records of 24 positions in both mounts, noise of 1 ug, each with readings that are off by 2 arcsec once a
+    """Thirty records of 24 positions in both mounts, noise of 1 ug, each with readings that are off by 2 arcsec once a
     turn (sine, cosine: 9.7 ug/g^2 in k4 and k5): stated, 0.90 or more of the intervals hold; not stated, those of k5
     mostly do not.
     """
@@ -113,7 +113,7 @@ def test_stated_errors_of_the_head_are_held(head: Session) -> None:
     held, k5 = np.zeros(8), 0
     mean, angle = windows["mean"].copy(), windows["angle_start"]
     scale = float(record.run.parameters["accelerometer.scale"]) / frames.G0
-    for _ in range(60):
+    for _ in range(30):
         a, b = 2.0 * ARCSEC * rng.normal(size=2)
         e = a * np.sin(angle) + b * np.cos(angle)
         windows["mean"] = mean + (gamma * np.cos(angle) * e * 1.002 + 1e-6 * rng.normal(size=mean.size)) / scale
@@ -123,5 +123,5 @@ def test_stated_errors_of_the_head_are_held(head: Session) -> None:
         r = stated.reduce(type(record)(windows, record.channels, record.run.replace(options=options)))
         held += [abs(c.estimate - c.truth) <= c.k * c.u for c in r.coefficients]
         k5 += abs(plain["k5"].estimate - K5 / 1e-6) <= plain["k5"].k * plain["k5"].u
-    assert held.min() >= 54 and held.mean() <= 59.5 and k5 < 20
+    assert held.min() >= 27 and held.mean() <= 29.75 and k5 < 10
     assert all(n in r.names for n in KS)

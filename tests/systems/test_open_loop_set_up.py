@@ -65,13 +65,13 @@ def test_an_error_is_predicted_and_taken_out(
 
 
 def test_stated_errors_of_the_encoder_are_held(session: Session) -> None:
-    """Sixty encoders off by 60 arcsec once a turn, readings to 1e-8 rad: stated, 0.88 or more of the intervals hold
+    """Thirty encoders off by 60 arcsec once a turn, readings to 1e-8 rad: stated, 0.86 or more of the intervals hold
     what an ideal one gives, not stated less than half.
     """
     record = session.run(values(session, {}), seed=1)
     ideal = session.system.reduce(record)["ω_d"].estimate
     rng, held = np.random.default_rng(6), np.zeros(2)
-    for _ in range(60):
+    for _ in range(30):
         a, b = SIZE * rng.normal(size=2)
         windows = dict(record.windows)
         noise = 1e-8 * rng.normal(size=len(windows["mean"]))
@@ -82,4 +82,4 @@ def test_stated_errors_of_the_encoder_are_held(session: Session) -> None:
             run = record.run.replace(options={**record.run.options, "u_angle1": size})
             c = session.system.reduce(Record(windows, record.channels, run))["ω_d"]
             held[k] += abs(c.estimate - ideal) <= c.k * c.u
-    assert held[0] >= 53 and held[1] < 30
+    assert held[0] >= 26 and held[1] < 15

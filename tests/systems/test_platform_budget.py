@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gyrobench.engine.session import run
+from gyrobench.engine.session import Session
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import System, load_system
 
@@ -16,14 +16,27 @@ STILL = {f"gyro.D_{n}": 0.0 for n in ("F", "I", "O", "S", "II", "SS", "IO", "IS"
 TITLE = "Error budget of the ride"
 
 
-def ridden(seed: int = 1, **values: Any) -> tuple[Any, dict[str, float], float]:
+Ridden = tuple[Any, dict[str, float], float]
+
+
+def ridden(**values: Any) -> Ridden:
     """Result, rows of the budget (″) and measured platform error (″) of a ride of 30 s without any other phase."""
+    (found,) = each(1, **values)
+    return found
+
+
+def each(runs: int, **values: Any) -> list[Ridden]:
+    """The same of runs with the seeds 1, 2, ..."""
     system: System = load_system("platform_single_axis")
     plan = [LoopPhase("ride", "motion", "sine", 1, values.get("base", 0.0), 1.0, 2.0, 30.0)]
     system.phases = lambda: plan  # type: ignore[attr-defined]
-    result = system.reduce(run(system, values={**OFF, **STILL, **values}, seed=seed))
-    table = next((t for t in result.tables if t["title"].startswith(TITLE)), {"rows": []})
-    return result, {row[0]: row[3] for row in table["rows"]}, result["platform error"].estimate
+    found = []
+    with Session(system) as session:
+        for seed in range(1, runs + 1):
+            result = system.reduce(session.run({**OFF, **STILL, **values}, seed=seed))
+            table = next((t for t in result.tables if t["title"].startswith(TITLE)), {"rows": []})
+            found.append((result, {row[0]: row[3] for row in table["rows"]}, result["platform error"].estimate))
+    return found
 
 
 @pytest.mark.parametrize(
@@ -40,8 +53,7 @@ def test_noise_of_one_source(source: str, values: dict[str, float]) -> None:
     Each run has its own seed; the pickoff's amplitude keeps the torquer from its limit.
     """
     squares = []
-    for seed in range(1, 5):
-        _, rows, measured = ridden(seed=seed, **values)
+    for _, rows, measured in each(4, **values):
         squares.append(measured**2)
         assert {n for n in rows if n.split()[0] not in ("together", "platform", "not")} == {source}
     assert rows[source] == pytest.approx(math.sqrt(sum(squares) / 4.0), rel=0.06)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.engine.session import run
+from gyrobench.engine.session import Session, run
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import load_system
 
@@ -21,15 +21,22 @@ DRY = {f"platform.friction[{k}]": 0.02 for k in AXES} | {"platform.presliding": 
 BASE_Y, BASE_Z, COMMAND = "base about y, 0.7 Hz", "base about z, 0.9 Hz", "command about z, 1 Hz"
 
 
-def ridden(*phases: LoopPhase, seed: int = 1, wires: str = "", **values: Any) -> tuple[Any, dict[tuple[str, str], Any]]:
+def ridden(*phases: LoopPhase, wires: str = "", **values: Any) -> tuple[Any, dict[tuple[str, str], Any]]:
     """Result, and (motion, source) -> row of the budget, of these phases without noise of the gyros."""
+    (found,) = each(1, *phases, wires=wires, **values)
+    return found
+
+
+def each(runs: int, *phases: LoopPhase, wires: str = "", **values: Any) -> list[tuple[Any, dict[tuple[str, str], Any]]]:
+    """The same of runs with the seeds 1, 2, ..."""
     system: Any = load_system("platform_three_axis")
     system.phases = lambda: list(phases)
     if wires:
         system.wires = wires
-    result = system.reduce(run(system, values={**IDEAL, **values}, seed=seed))
-    table = next((t for t in result.tables if t["title"].startswith("Error budget")), {"rows": []})
-    return result, {(r[0], r[1]): r[2:] for r in table["rows"]}
+    with Session(system) as session:
+        results = [system.reduce(session.run({**IDEAL, **values}, seed=seed)) for seed in range(1, runs + 1)]
+    tables = [next((t for t in r.tables if t["title"].startswith("Error budget")), {"rows": []}) for r in results]
+    return [(r, {(x[0], x[1]): x[2:] for x in t["rows"]}) for r, t in zip(results, tables, strict=True)]
 
 
 def swing(axis: int, f: float, size: float = 0.08) -> LoopPhase:
@@ -90,11 +97,10 @@ def test_output_axes_switched_off_take_their_share() -> None:
 def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float) -> None:
     """A hold of 4 s at rest: the mean square of three axes and six seeds; of a random walk about mean and slope nearly
     all is in a few independent parts an axis, so it scatters by about sqrt(2/(3 6 4)) = 17 %, the rms by 8."""
-    squares = []
-    for seed in range(seeds):
-        values = {f"{g}.{noise}": 2e-6 for g in GYROS}
-        _, rows = ridden(LoopPhase("drift", "hold", settle=1.0, dwell=4.0), seed=seed, **values)
-        squares.append(rows["drift", "measured"][0] ** 2)
+    values = {f"{g}.{noise}": 2e-6 for g in GYROS}
+    found = each(seeds, LoopPhase("drift", "hold", settle=1.0, dwell=4.0), **values)
+    squares = [rows["drift", "measured"][0] ** 2 for _, rows in found]
+    rows = found[-1][1]
     assert rows["drift", source][0] == pytest.approx((sum(squares) / seeds) ** 0.5, rel=scatter)
     assert rows["drift", source][1] == pytest.approx(100.0)
 
