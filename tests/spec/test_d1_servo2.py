@@ -205,7 +205,7 @@ def test_rank_and_best_pairs() -> None:
 
 
 # ------------------------------------------------------------------------------------------ recovery
-@pytest.mark.parametrize(("seed", "terms"), [(1, 8), (2, 9), (3, 9)])
+@pytest.mark.parametrize(("seed", "terms"), [(1, 8), (2, 9)])
 def test_recovery_to_1e_8(seed: int, terms: int) -> None:
     """SERVO2-E2E: 24 h each in two mounts, 120 s windows, random gyro and latitude: all coefficients to 1e-8 deg/h."""
     rng = np.random.default_rng(seed)
