@@ -175,11 +175,11 @@ def _phase_axis(ax: Any) -> None:
 
 
 def _frequency_axis(ax: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator
 
     from gyrobench.report.numbers import write_number
 
     low, high = ax.get_xlim()
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 300 else (1.0, 2.0, 5.0), numticks=12))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.minorticks_off()

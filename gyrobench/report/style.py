@@ -60,6 +60,8 @@ _RC: Any = {
     "axes.axisbelow": True,
     "grid.color": GRID,
     "grid.linewidth": 0.5,
+    "xtick.bottom": False,  # the grid marks the place
+    "ytick.left": False,
     "xtick.major.size": 0.0,
     "ytick.major.size": 0.0,
     "xtick.minor.size": 0.0,
