@@ -31,7 +31,7 @@ VALUES = {
     "rebalance.meter": 0.0,
     "rebalance.resolution": 0.0,
 }
-STEP = 1e-3
+STEP = 2e-3
 
 
 @pytest.fixture(scope="module")
@@ -95,12 +95,12 @@ def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: 
     fmpy = estimates(system, record)
     reduced = gb.load("tumble_single_axis", VALUES).reduce_result(found)  # by the names of the array
     assert {c.name: c.estimate for c in reduced.result.coefficients} == fmpy
-    assert reduced.record.run.step == 2 * STEP and "0.002 s" in reduced.record.run.notes[-1]
+    assert reduced.record.run.step == 2 * STEP and "0.004 s" in reduced.record.run.notes[-1]
     assert len(ours["coefficients"]) == 9
     for name, c in ours["coefficients"].items():
         coupling = 2.0 * (double[name] - single[name])  # of the double step
         assert abs(double[name] - coupling - c) < 0.05 * abs(coupling) + 2e-5, name  # deg/h
-        assert abs(single[name] - c) < 1e-3, name  # 600 times the rate of the test: 0.44 rad/s
+        assert abs(single[name] - c) < 1.0 * STEP, name  # deg/h a s; 600 times the rate of the test: 0.44 rad/s
         assert abs(fmpy[name] - double[name]) < 1e-7, name
 
 
