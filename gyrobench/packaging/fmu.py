@@ -38,19 +38,19 @@ def guid_of(digest: str) -> str:
 
 
 @functools.cache
-def _tool_text() -> str:
-    """Return all files whose text determines what a build writes; they stay as they are while the process runs."""
+def _tool_hash() -> str:
+    """Return the hash of all files whose text determines what a build writes; they stay while the process runs."""
     here = Path(__file__).parent
     after = ("__init__", "instance", "linked_parts", "reference", "validate")  # these use what was built
     files = [f for f in sorted(here.glob("*.py")) if f.stem not in after] + sorted(here.glob("*.[ch]"))
     files = [f for f in files if f.name != "system_core.h"] + [*python_target.RUNTIME, here.parent / "units.py"]
-    return "".join(f.read_text(encoding="utf-8") for f in files)
+    return content_hash(*(f.read_text(encoding="utf-8") for f in files))
 
 
 def _content(cls: type[Component], name: str, target: str, fmi: int) -> str:
     """Return the hash of all that determines what an FMU computes."""
     texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in sources(cls).items()]
-    return content_hash(*texts, _tool_text(), target, str(fmi), name)
+    return content_hash(*texts, _tool_hash(), target, str(fmi), name)
 
 
 def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
