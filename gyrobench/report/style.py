@@ -12,8 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from gyrobench.report.figure_layout import place, ruler
-
 MM = 1.0 / 25.4
 WIDE = 170 * MM  # the text width of A4, inch
 HALF = 82 * MM
@@ -99,12 +97,11 @@ def styled() -> Iterator[None]:
 def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
     """Return a figure without a window, and its axes (an array of two dimensions)."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    height = height_mm * MM
-    fig = Figure(figsize=(width, height), dpi=72)
+    fig = Figure(figsize=(width, height_mm * MM), layout=ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02))
     fig.patch.set_visible(False)
-    about = {"left": 0.5 / width, "right": 1.0 - 0.05 / width, "bottom": 0.35 / height, "top": 1.0 - 0.1 / height}
-    axes = fig.subplots(squeeze=False, gridspec_kw=about if min(width, height) > 0.6 else None, **grid)
+    axes = fig.subplots(squeeze=False, **grid)
     for ax in axes.flat:
         ax.patch.set_visible(False)
     return fig, axes
@@ -117,7 +114,6 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    place(fig)
     buffer = io.StringIO()  # not by savefig, which draws everything twice
     canvas: Any = FigureCanvasSVG(fig)
     canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
@@ -198,8 +194,9 @@ def envelope(x: Any, y: Any, buckets: int = 1500) -> tuple[list[float], list[flo
 
 def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
     """Shade every second span of the x axis and write its label above, in rows so that none overlap."""
-    fig, renderer = ax.figure, ruler()
-    place(fig)
+    fig = ax.figure
+    fig.get_layout_engine().execute(fig)
+    renderer = fig.canvas.get_renderer() if hasattr(fig.canvas, "get_renderer") else None
     low, high = ax.get_xlim()
     width = ax.get_window_extent(renderer).width
     ends: list[float] = []
@@ -212,7 +209,7 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size
         left = min(max(left, 0.0), max(width - size, 0.0))
-        row = next((r for r, e in enumerate(ends) if e + 4.32 < left), len(ends))
+        row = next((r for r, e in enumerate(ends) if e + 6 < left), len(ends))
         if row == len(ends):
             ends.append(0.0)
         ends[row] = left + size
