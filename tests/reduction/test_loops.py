@@ -124,12 +124,12 @@ def test_scatter_of_a_change_knows_slow_noise() -> None:
 @pytest.mark.parametrize("lasting", [0, 40, 400])
 def test_interval_of_a_change_after_a_short_rest(samples: int, lasting: int) -> None:
     """A change over 3000 samples, the rest 1.3 to 13 times as long: white noise and Gauss-Markov drift of 40 and 400
-    samples, 300 records each.  With the u of white noise 0.02 to 0.14 of the intervals held at 14000 samples and less.
+    samples, 150 records each.  With the u of white noise 0.02 to 0.14 of the intervals held at 14000 samples and less.
     """
     before, gap, after = 1000, 2000, 200
     rng = np.random.default_rng(samples + lasting)
     held = 0
-    for _ in range(300):
+    for _ in range(150):
         e = rng.standard_normal(samples + before + gap)
         if lasting:
             a = math.exp(-1.0 / lasting)
@@ -139,7 +139,7 @@ def test_interval_of_a_change_after_a_short_rest(samples: int, lasting: int) -> 
         u = step_noise_std(e[:samples], before, gap, after)
         assert u is not None
         held += abs(y[-after:].mean() - y[:before].mean()) < 1.96 * u
-    assert held >= 0.91 * 300
+    assert held >= 0.91 * 150
 
 
 # ------------------------------------------------------------------------------------------- drift

@@ -14,17 +14,19 @@ from tumbling import DPH, NAMES, SHORT, load, quiet
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Result
-from gyrobench.system.system import System, load_system
+from gyrobench.system.system import load_system
 
 ARCSEC = math.pi / 648000.0
 GYRO = {"D_F": -0.3, "D_I": -0.9, "D_O": 0.1, "D_S": -0.7, "D_II": -0.05, "D_SS": 0.04}  # deg/h/g^n
 
 
-def reduced(session: Session, system: System, values: dict[str, Any], corrections: str = "", seed: int = 1) -> Result:
-    given = {**values, "corrections": corrections}
-    return system.with_values(given).reduce(session.run(given, seed=seed))
+def corrected(record: Record, corrections: str = "") -> Result:
+    """The result of a run in which these are stated."""
+    run = record.run.replace(options={**record.run.options, "corrections": corrections})
+    return load_system(run.system).reduce(Record(record.windows, record.channels, run))
 
 
 def check(plain: Result, wrong: Result, right: Result, part: float, least: float) -> None:
@@ -56,14 +58,20 @@ TUMBLE = [
 ]
 
 
+TUMBLED = {**SHORT, **quiet(load()), **{f"gyro.{n}": GYRO.get(n, 0.0) * DPH for n in NAMES}}
+TUMBLED |= {"gyro.white": 3e-9, "nuisances": "none"}
+
+
+@pytest.fixture(scope="module")
+def plain(session: Session) -> Result:
+    return corrected(session.run(TUMBLED, seed=1))
+
+
 @pytest.mark.parametrize(("error", "source", "size"), TUMBLE)
-def test_tumble(session: Session, error: dict[str, Any], source: str, size: float) -> None:
+def test_tumble(session: Session, plain: Result, error: dict[str, Any], source: str, size: float) -> None:
     """Even an input axis tilted by 20 arcsec, which without the correction is taken for slow noise in part."""
-    gyro = {f"gyro.{n}": GYRO.get(n, 0.0) * DPH for n in NAMES}
-    values = {**SHORT, **quiet(load()), **gyro, "gyro.white": 3e-9, "nuisances": "none"}
-    plain = reduced(session, load(), values)
-    wrong = reduced(session, load(), {**values, **error})
-    right = reduced(session, load(), {**values, **error}, f"{source} = {size}(1) arcsec")
+    record = session.run({**TUMBLED, **error}, seed=1)
+    wrong, right = corrected(record), corrected(record, f"{source} = {size}(1) arcsec")
     check(plain, wrong, right, 0.05 if "angle" in source else 0.02, 2e-5)  # an encoder moves the windows too
     (table,) = [t for t in right.tables if t["title"] == "Corrections"]
     assert table["rows"][0][:2] == [source, pytest.approx(size * ARCSEC)]
@@ -74,7 +82,8 @@ def test_the_correction_brings_its_own_uncertainty(session: Session) -> None:
     gyro = {f"gyro.{n}": 0.0 for n in NAMES}
     values = {**SHORT, **quiet(load()), **gyro, "gyro.white": 3e-9, "u_axis": 10.0 * ARCSEC}
     source = "table axis off the pole, about east"
-    plain, known = (reduced(session, load(), values, text) for text in ("", f"{source} = 0(2) arcsec"))
+    record = session.run(values, seed=1)
+    plain, known = (corrected(record, text) for text in ("", f"{source} = 0(2) arcsec"))
     gamma = frames.normal_gravity(math.radians(45.75)) / frames.G0
     per = frames.EARTH_RATE / DPH / (gamma * math.cos(math.radians(45.75)))
     for result, size in ((plain, 10.0), (known, 2.0)):
@@ -100,11 +109,9 @@ def test_servo_table(level: Session, axis: int, source: str) -> None:
     """
     sign = 1.0 if axis == 2 else -1.0
     values = {**QUIET, **{f"gyro.{n}": 0.0 for n in NAMES}, "dwell": 60.0, "settle": 2.0, "cycles": 1, "tracking": 0.0}
-    system = load_system("servo_vertical_level")
     wrong = {**values, "gyro.mount": turned(axis, sign * 60.0 * ARCSEC)}
-    plain, off = (reduced(level, system, v) for v in (values, wrong))
-    right = reduced(level, system, wrong, f"{source} = 60(1) arcsec")
-    check(plain, off, right, 0.02, 1e-3)
+    plain, off = (level.run(v, seed=1) for v in (values, wrong))
+    check(corrected(plain), corrected(off), corrected(off, f"{source} = 60(1) arcsec"), 0.02, 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -120,6 +127,5 @@ def test_servo_table(level: Session, axis: int, source: str) -> None:
 def test_refused(session: Session, text: str, words: str) -> None:
     values = {**SHORT, **quiet(load()), "gyro.white": 3e-9}
     record = session.run(values, seed=1)
-    run = record.run.replace(options={**record.run.options, "corrections": text})
     with pytest.raises(ReductionError, match=re.escape(words)):
-        load().reduce(type(record)(record.windows, {}, run))
+        corrected(record, text)
