@@ -19,6 +19,19 @@ def session() -> Iterator[Session]:
         yield prepared
 
 
+@pytest.fixture
+def no_arma(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drift record is described without ARMA and ARIMA models, which take two thirds of its reduction."""
+    from gyrobench.reduction.series import drift_model
+    from gyrobench.reduction.series.checks import SeriesError
+
+    def refused(*_: object) -> None:
+        raise SeriesError("not looked at here")
+
+    for name in ("fit_arma", "arima310"):
+        monkeypatch.setattr(drift_model, name, refused)
+
+
 @pytest.fixture(scope="session")
 def foreign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Builds a foreign FMU of tests/foreign once."""

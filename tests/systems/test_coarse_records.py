@@ -17,6 +17,7 @@ from gyrobench.result import DriftRecordResult
 from gyrobench.system.system import load_system
 
 NAME = "drift_record"
+pytestmark = pytest.mark.usefixtures("no_arma")
 N_UNIT = math.sqrt(1.0 / 3600.0)  # deg/sqrt(h) of arcsec/sqrt(s): 3600 arcsec are a degree, 3600 s an hour
 
 

@@ -110,6 +110,7 @@ def test_a_channel_of_a_run(run: Record, result: DriftRecordResult, tmp_path: Pa
 
 
 # ------------------------------------------------------------------------------------------- files
+@pytest.mark.usefixtures("no_arma")
 def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     """Two gyros in one file: one in deg/s with a line and a temperature, one as angle; a gap in both."""
     n = 6000
@@ -134,6 +135,7 @@ def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     assert facts["gaps"] == 1 and facts["samples missing in gaps"] == 101 and "sin(π f T)" in b.texts["acquisition"][0]
 
 
+@pytest.mark.usefixtures("no_arma")
 def test_lines_are_taken_out_where_they_are(tmp_path: Path) -> None:
     """A line is in the deviations of the record; taken out, over a gap too, it is not: its phase is right."""
     n = 4000
@@ -148,6 +150,7 @@ def test_lines_are_taken_out_where_they_are(tmp_path: Path) -> None:
     assert out["N"].interval[0] < 0.01 / 60.0 < out["N"].interval[1]
 
 
+@pytest.mark.usefixtures("no_arma")
 def test_means_of_a_long_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where means are held, deviations are those of every sample, and the coefficients those of the same noise."""
     n = 8192
@@ -186,6 +189,7 @@ def test_noise_that_the_terms_do_not_describe(tmp_path: Path) -> None:
     assert all(row[4] < row[2] < row[5] for row in others["rows"])
 
 
+@pytest.mark.usefixtures("no_arma")
 def test_a_coarse_counter(tmp_path: Path) -> None:
     """15.36 counts of 0.5 arcsec a sample: two steps in three are the same, and none is a reset or wild.
 
