@@ -9,6 +9,7 @@ import functools
 import hashlib
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -86,15 +87,25 @@ class DamagedFmuError(GyrobenchError):
     """An FMU that cannot be unzipped."""
 
 
+#: folders of binaries, of FMI 2.0 and 3.0, by the beginning of the platform's name in Python
+BINARIES = {
+    "linux": ("linux32", "linux64", "aarch64-linux", "x86-linux", "x86_64-linux"),
+    "win": ("win32", "win64", "aarch64-windows", "x86-windows", "x86_64-windows"),
+    "darwin": ("darwin64", "aarch64-darwin", "x86_64-darwin"),
+}
+FOREIGN = [f"binaries/{n}/" for system, names in BINARIES.items() if not sys.platform.startswith(system) for n in names]
+NOT_RUN = ("sources/", "documentation/", *FOREIGN)
+
+
 def unzip_fmu(path: Path, folder: Path) -> None:
-    """Unzip what a run needs of an FMU: all but its sources and its documentation, which are most of its files.
+    """Unzip what a run needs of an FMU: all but sources, documentation and binaries of other operating systems.
 
     Raises DamagedFmuError, and OSError for a failure of the machine.
     """
     from fmpy import extract
 
     try:
-        extract(str(path), str(folder), include=lambda name: not name.startswith(("sources/", "documentation/")))
+        extract(str(path), str(folder), include=lambda name: not name.startswith(NOT_RUN))
     except Exception as error:  # of the zip archive, of names and compressed data in it, or FMPy's own
         if isinstance(error, OSError) and error.errno in MACHINE:
             raise

@@ -11,13 +11,16 @@ directional derivatives.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from gyrobench.component import Component
 from gyrobench.packaging.loading import ROOM, BuildError, sources
 
 TOOL = Path(__file__).parent.parent
-RUNTIME = (*sorted((TOOL / "component").rglob("*.py")), TOOL / "errors.py")  # what a Python FMU carries of gyrobench
+RUNTIME = (*sorted((TOOL / "component").rglob("*.py")), TOOL / "errors.py")  # what a Python FMU may carry of gyrobench
+BLOCK = re.compile(r"\bgyrobench\.component\.blocks\.(\w+)")
+BLOCKS = re.compile(r"\bgyrobench\.component(?:\.blocks import\b| import .*\bblocks\b)")
 
 SLAVE = '''\
 """Python FMU of {cls} {version}: the plain part behind the FMI calls."""
@@ -115,10 +118,23 @@ def renamed(text: str, unique: str) -> str:
     return re.sub(rf"^(\s*)from {ROOM}\b", rf"\1from {unique}.{ROOM}", text, flags=re.M)
 
 
+def _runtime(parts: Iterable[str]) -> dict[str, str]:
+    """Return the files of :data:`RUNTIME` by name, but for the blocks that parts of these texts do not use."""
+    texts = {f.relative_to(TOOL).as_posix(): f.read_text(encoding="utf-8") for f in RUNTIME}
+    blocks = {n.removeprefix("component/blocks/").removesuffix(".py"): n for n in texts if "/blocks/" in n}
+    used, new = {"__init__"}, list(parts)
+    while new:
+        text = new.pop()
+        named = set(blocks if BLOCKS.search(text) else BLOCK.findall(text)) - used
+        used |= named
+        new += [texts[blocks[n]] for n in named if n in blocks]
+    return {n: text for n, text in texts.items() if n not in {blocks[b] for b in blocks.keys() - used}}
+
+
 def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
     """Return (module name, files under resources/).  Raises BuildError if the model imports what it cannot carry."""
     unique = f"gb_{cls.__name__.lower()}_{guid.replace('-', '')[:12]}"
-    texts = {f.relative_to(TOOL).as_posix(): f.read_text(encoding="utf-8") for f in RUNTIME}
+    texts: dict[str, str] = {}
     for name, path in sources(cls).items():
         text = path.read_text(encoding="utf-8")
         for module in re.findall(r"^(?:from|import) gyrobench\.([\w.]+)", text, flags=re.M):
@@ -128,6 +144,7 @@ def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
                     "can carry it"
                 )
         texts[f"{name.replace('.', '/')}.py"] = text
+    texts = _runtime(texts.values()) | texts
     files = {f"{unique}/{n}": renamed(t, unique) for n, t in texts.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 from toybench import FORMS, HEAD, PARTS, TARGETS, TOYS
 
 from gyrobench.component import Component
+from gyrobench.files import temporary_folder, unzip_fmu
 from gyrobench.packaging import build, load_part
 from gyrobench.packaging.instance import Fmu, Instance, Plain, Unzipped
 
@@ -38,20 +38,18 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def unzipped() -> Iterator[Callable[[Path], Unzipped]]:
+def unzipped() -> Callable[[Path], Unzipped]:
     """Files and description of an FMU, shared by the instances of the session."""
     found: dict[Path, Unzipped] = {}
 
     def unzip(path: Path) -> Unzipped:
         if path not in found:
-            found[path] = Unzipped(
-                fmpy.read_model_description(str(path), validate=False), Path(fmpy.extract(str(path)))
-            )
+            folder = temporary_folder()
+            unzip_fmu(path, folder)
+            found[path] = Unzipped(fmpy.read_model_description(str(path), validate=False), folder)
         return found[path]
 
-    yield unzip
-    for one in found.values():
-        shutil.rmtree(one.folder, ignore_errors=True)
+    return unzip
 
 
 @pytest.fixture
