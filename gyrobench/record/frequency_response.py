@@ -34,7 +34,10 @@ def _reached(a: Array, b: Array) -> NDArray[np.bool_]:
     """Return the states that the inputs move, directly (b) or through others (a): (n,)."""
     reached: NDArray[np.bool_] = np.any(b != 0.0, axis=1)
     for _ in range(len(reached)):
-        reached = reached | np.any(a[:, reached] != 0.0, axis=1)
+        further = reached | np.any(a[:, reached] != 0.0, axis=1)
+        if np.array_equal(further, reached):
+            break
+        reached = further
     return reached
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 from dataclasses import asdict
@@ -47,25 +48,18 @@ def equation_svg(source: str, key: str) -> str:
 
 def html(page: Page, bench: Path | None = None) -> str:
     """Return the page as one self-contained HTML file."""
-    import jinja2
     import markupsafe
 
     name = "templates/report.html.j2"
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(content_dir(bench, name)),  # from its file, which then stands in a traceback
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    template = environment.get_template(name)
+    template = _environment(content_dir(bench, name)).get_template(name)
     data = asdict(page)
     for section in data["sections"]:
         for block in section["blocks"]:
             _theme(block)
     css = markupsafe.Markup(read_content("templates/report.css", bench))
     script = markupsafe.Markup(read_content("templates/zoom.js", bench))
-    return template.render(page=_Attributes.of(data), css=css, script=script)
+    text: str = template.render(page=_Attributes.of(data), css=css, script=script)
+    return text
 
 
 def pdf(page: Page, bench: Path | None = None) -> bytes:
@@ -102,6 +96,20 @@ def _strip(block: dict[str, Any]) -> None:
         picture["width"] = float(match.group(1)) if match else 480.0
     for inner in block.get("blocks", []):
         _strip(inner)
+
+
+@functools.lru_cache(maxsize=8)
+def _environment(folder: Path) -> Any:
+    """Return jinja2 with the templates of a folder, compiled once and again when they change."""
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder),  # from its file, which then stands in a traceback
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
 
 
 class _Attributes(dict[str, Any]):

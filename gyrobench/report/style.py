@@ -133,7 +133,7 @@ def clean_svg(text: str, key: str) -> str:
     text = re.sub(r'\bid="', f'id="{key}-', text)
     text = re.sub(r'href="#', f'href="#{key}-', text)
     text = re.sub(r"url\(#", f"url(#{key}-", text)
-    text = re.sub(r"(?<![\d(])(\d+\.\d\d)\d+", r"\1", text)  # not in "scale(0.015625)"
+    text = re.sub(r"(?<![\d(])(\d+\.\d\d)\d+", lambda m: m[1], text)  # not in "scale(0.015625)"
     text = re.sub(r"\n\s*", "\n", text)
     return text.replace("<svg ", '<svg stroke-linejoin="round" ', 1)
 

@@ -129,10 +129,14 @@ class Point:
 
 def phasor(t: Array, y: Array, f: float) -> complex:
     """Complex amplitude of the sine of f Hz in y, least squares, beside a mean and a slope: A cos + B sin -> A - jB."""
+    return _phasors(t, f, y)[0]
+
+
+def _phasors(t: Array, f: float, *signals: Array) -> list[complex]:
     w = 2.0 * np.pi * f
     columns = np.column_stack([np.cos(w * t), np.sin(w * t), np.ones(t.size), t - t.mean()])
-    a, b, *_ = np.linalg.lstsq(columns, y, rcond=None)[0]
-    return complex(a, -b)
+    each = (np.linalg.lstsq(columns, y, rcond=None)[0] for y in signals)
+    return [complex(a, -b) for a, b, *_ in each]
 
 
 def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False) -> Point:
@@ -149,10 +153,10 @@ def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False
         raise ReductionError(f"{f:g} Hz: the record of {t[-1] - t[0]:g} s is shorter than one period")
     if f * dt > 0.25:
         raise ReductionError(f"{f:g} Hz: a sample every {dt:g} s is too coarse; record at least 4 a period")
-    whole = phasor(t, x, f)
+    whole, moved = _phasors(t, f, x, y)
     if not abs(whole) > 1e-12 * float(np.max(np.abs(x)) or 1.0):
         raise ReductionError(f"{f:g} Hz: the reference signal has no component at this frequency")
-    value = phasor(t, y, f) / whole
+    value = moved / whole
     if periods < 2:
         return Point(f, value, None, 1.0)
     xs, ys = segment_phasors(t, f, x, y)
@@ -190,7 +194,7 @@ def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.comp
     parts = [
         slice(int(np.searchsorted(t, a - 0.5 * dt)), int(np.searchsorted(t, b - 0.5 * dt))) for a, b in pairwise(edges)
     ]
-    return [np.array([phasor(t[s], y[s], f) for s in parts]) for y in signals]
+    return [np.array(p) for p in zip(*(_phasors(t[s], f, *(y[s] for y in signals)) for s in parts), strict=True)]
 
 
 # ------------------------------------------------------------------------------------------- steps
