@@ -363,3 +363,10 @@ def provenance(seed: int, width: float) -> dict:
         "timing": dict.fromkeys(slots, 0.41),
         "versions": {"gyrobench": "0.1.0", "fmpy": "0.3.26", "numpy": "2.4.6"},
     }
+
+
+def unplotted(result: DriftTestResult) -> DriftTestResult:
+    """The result without what its figures of data are drawn from, for a test of the words around them."""
+    result.series, result.correlation, result.budget = [], [], []
+    result.acf, result.allan, result.psd = {}, {}, {}
+    return result

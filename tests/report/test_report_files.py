@@ -6,13 +6,12 @@ import math
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 from reading import Written, pdf_text
-from simulated import tumble
+from simulated import tumble, unplotted
 
 from gyrobench import report
 from gyrobench import result as result_module
@@ -204,7 +203,7 @@ def test_self_contained(written):
 
 
 def test_no_specification_is_said_and_is_no_pass(tmp_path):
-    r = tumble(windows=12, limits=False)
+    r = unplotted(tumble(windows=12, limits=False))
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
     assert "<strong>no specification given</strong>" in w.html
     assert "✓" not in re.sub(r"<style>.*?</style>", "", w.html, flags=re.S)
@@ -213,7 +212,7 @@ def test_no_specification_is_said_and_is_no_pass(tmp_path):
 
 
 def test_measured_data_has_no_truth(tmp_path):
-    r = tumble(windows=12)
+    r = unplotted(tumble(windows=12))
     r.simulated = False
     for c in r.coefficients:
         c.truth = c.z = None
@@ -258,7 +257,7 @@ def test_all_text_is_escaped(tmp_path):
 
 
 def test_an_equation_that_typst_cannot_read_is_shown_as_it_is(tmp_path):
-    r = tumble(windows=12)
+    r = unplotted(tumble(windows=12))
     r.equation = "k i = $ #broken( <b>"
     w = Written(report.write(r, tmp_path))
     assert "k i = $ #broken( &lt;b&gt;" in w.html
@@ -281,7 +280,7 @@ def test_figures_keep_extremes_of_long_records():
 def test_channels_of_a_run_are_drawn(tmp_path):
     time_ = np.arange(0.0, 20_000.0, 0.5)
     record = {"time": time_, "gyro.u": np.sin(time_ / 500.0), "table.angle": time_ * 7e-4}
-    w = Written(report.write(tumble(windows=12), tmp_path, formats=("json", "html"), record=record))
+    w = Written(report.write(unplotted(tumble(windows=12)), tmp_path, formats=("json", "html"), record=record))
     assert "figure-channels" in w.html
     assert len(w.html) < 3_000_000
 
@@ -302,7 +301,7 @@ def test_others_are_written_when_one_format_fails(tmp_path):
     (bench / "reports" / "templates").mkdir(parents=True)
     (bench / "reports" / "templates" / "report.html.j2").write_text("{{ nothing.there }}")
     with pytest.raises(report.ReportError, match=r"report\.html") as caught:
-        report.write(tumble(windows=12), tmp_path / "out", bench=bench)
+        report.write(unplotted(tumble(windows=12)), tmp_path / "out", bench=bench)
     assert set(caught.value.written) == {"json", "pdf"}
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["report.pdf", "result.json"]
 
@@ -310,7 +309,7 @@ def test_others_are_written_when_one_format_fails(tmp_path):
 def test_a_bench_may_bring_its_own_style(tmp_path):
     (tmp_path / "reports" / "templates").mkdir(parents=True)
     (tmp_path / "reports" / "templates" / "report.css").write_text("body { color: teal; }")
-    w = Written(report.write(tumble(windows=12), tmp_path / "out", formats=("json", "html"), bench=tmp_path))
+    w = Written(report.write(unplotted(tumble(windows=12)), tmp_path / "out", formats=("json", "html"), bench=tmp_path))
     assert "color: teal" in w.html
 
 
@@ -319,15 +318,15 @@ def test_unknown_format_is_refused(tmp_path):
         report.write(tumble(windows=12), tmp_path, formats=("docx",))
 
 
-def test_same_result_same_bytes(tmp_path):
-    a = report.write(tumble(windows=12), tmp_path / "a")
-    b = report.write(tumble(windows=12), tmp_path / "b")
-    for kind in a:
-        assert Path(a[kind]).read_bytes() == Path(b[kind]).read_bytes()
+def test_same_result_same_bytes(written, tmp_path):
+    again = report.write(tumble(), tmp_path)
+    assert set(again) == set(written.paths) == {"json", "html", "pdf"}
+    for kind, path in again.items():
+        assert path.read_bytes() == written.paths[kind].read_bytes()
 
 
 def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
-    r = tumble(windows=12)
+    r = unplotted(tumble(windows=12))
     r.tables = [
         {
             "title": "Least squares and closed form",
@@ -361,7 +360,7 @@ def test_wiring_drawing_stands_alone():
 
 
 def test_delays_and_cuts_are_said(tmp_path):
-    r = tumble(windows=12)
+    r = unplotted(tumble(windows=12))
     r.provenance["cuts"] = ["rebalance.i -> gyro.i: one step delay (no output depends on it at once)"]
     r.provenance["delays"] = {"rebalance.i -> gyro.i": 0.001, "table.angle -> sampler.angle": 0.002}
     w = Written(report.write(r, tmp_path, formats=("json", "html")))
