@@ -1,8 +1,7 @@
-"""TEST-TUMBLE1-SDF: recovery, errata, refusals, folding, budget."""
+"""TEST-TUMBLE1-SDF: recovery, errata, refusals, folding; test_d1_tumble_result.py has the rest."""
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -12,25 +11,13 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import harmonic
-from gyrobench.result import Result
 
 sys.path.insert(0, str(Path(__file__).parent))
 import tumble as T
 
 DPH = T.DPH
-NAMES = drift.terms(9)
-
-
-def random_truth(seed: int, names: tuple[str, ...] = NAMES) -> dict[str, float]:
-    return dict(zip(names, np.random.default_rng(seed).uniform(0.1, 1.0, len(names)) * DPH, strict=True))
-
-
-def white(size: float, seed: int = 1) -> Any:
-    """Noise of ``size`` deg/h in every window."""
-    rng = np.random.default_rng(seed)
-    return lambda t0, t1: rng.normal(size=t0.size) * size * DPH
+NAMES = T.NAMES
 
 
 def message(windows: Any, setup: Any) -> str:
@@ -43,7 +30,7 @@ def message(windows: Any, setup: Any) -> str:
 @pytest.mark.parametrize("latitude", [12.0, 45.75, -33.0, 78.0])
 @pytest.mark.parametrize(("turn", "rate"), [(72, -10.0), (25, 7.0), (12, -10.0)])
 def test_least_squares_and_closed_formulas_recover_to_1e_9(latitude: float, turn: int, rate: float) -> None:
-    truth = random_truth(int(latitude) + turn + 90)
+    truth = T.random_truth(int(latitude) + turn + 90)
     s = T.setup(latitude, truth=truth)
     r = T.reduction.reduce(T.record(s, truth, turn=turn, rate=rate), s)
     for c in r.coefficients:
@@ -68,7 +55,7 @@ def test_averaging_windows_are_allowed_for() -> None:
 
 def test_opposite_polarity() -> None:
     """Current of Hu 1981, k i = omega_d - omega_IA: the same coefficients from the negated current."""
-    truth = random_truth(4)
+    truth = T.random_truth(4)
     s = T.setup(truth=truth)
     w = T.record(s, truth)
     w["mean"] = -w["mean"]
@@ -104,7 +91,7 @@ def test_uncertainties_follow_the_formulas_of_the_method() -> None:
 @pytest.fixture(scope="module")
 def amplitudes() -> tuple[dict[str, float], dict[str, float], float, float, dict[str, float]]:
     """A0 A1 B1 A2 B2 of both mounts, the dwells and the truth, in deg/h, at 41 deg and g = g0."""
-    truth = random_truth(9)
+    truth = T.random_truth(9)
     s = T.setup(41.0, gravity=frames.G0, truth=truth)
     w = T.record(s, truth)
     y = -s.k * w["mean"] / DPH
@@ -162,7 +149,7 @@ def test_printed_formulas_fail(amplitudes: Any) -> None:
 # ------------------------------------------------------------------------------------------ D_OO
 def test_d_oo_is_refused_without_fold_and_folds_exactly_with_it() -> None:
     """[TUM1-YY, RANK-1g-FOLD] D_F + D_OO gamma^2, D_II - D_OO, D_SS - D_OO; the others unbiased."""
-    truth = random_truth(2, drift.NAMES)
+    truth = T.random_truth(2, drift.NAMES)
     s = T.setup(truth=truth)
     w = T.record(s, truth)
     assert "cannot be told from D_F, D_II and D_SS; set fold" in message(w, s)
@@ -180,7 +167,7 @@ def test_d_oo_is_refused_without_fold_and_folds_exactly_with_it() -> None:
 
 
 def test_ten_terms() -> None:
-    truth = random_truth(2, drift.NAMES)
+    truth = T.random_truth(2, drift.NAMES)
     s = T.setup(terms=10)
     assert "ten terms have rank 9" in message(T.record(s, truth), s)
     r = T.reduction.reduce(T.record(s, truth), T.setup(terms=10, fold=True, truth=truth))
@@ -188,12 +175,12 @@ def test_ten_terms() -> None:
 
 
 def test_fewer_terms() -> None:
-    truth = {n: v for n, v in random_truth(3).items() if n in drift.terms(4)}
+    truth = {n: v for n, v in T.random_truth(3).items() if n in drift.terms(4)}
     s = T.setup(terms=4, truth=truth)
     r = T.reduction.reduce(T.record(s, truth), s)
     assert [c.name for c in r.coefficients] == ["D_F", "D_I", "D_S", "D_IS"]
     assert all(abs(c.estimate - c.truth) < 1e-10 for c in r.coefficients)
-    full = random_truth(3)
+    full = T.random_truth(3)
     r = T.reduction.reduce(T.record(T.setup(), full), T.setup(terms=8, truth=full))
     assert any("D_O is simulated but not in the 8-term model" in text for text in r.warnings)
 
@@ -212,12 +199,12 @@ def test_singular_latitudes_name_what_is_lost() -> None:
     assert "outside" in T.reduction.refusals(math.nan)[0]
     assert T.reduction.refusals(math.radians(5.0)) == T.reduction.refusals(math.radians(-85.0)) == []
     s = T.setup()
-    assert "rank 7 of 9" in message(T.record(s, random_truth(1)), T.setup(0.0))
+    assert "rank 7 of 9" in message(T.record(s, T.random_truth(1)), T.setup(0.0))
 
 
 def bad(change: Any) -> str:
     s = T.setup()
-    w = T.record(s, random_truth(1), turn=12, dwell=3)
+    w = T.record(s, T.random_truth(1), turn=12, dwell=3)
     change(w)
     return message(w, s)
 
@@ -253,13 +240,13 @@ def test_bad_records(change: Any, text: str) -> None:
 
 def test_few_windows_a_turn() -> None:
     s = T.setup()
-    w = T.record(s, random_truth(1), turn=4, turns=5)
+    w = T.record(s, T.random_truth(1), turn=4, turns=5)
     assert "4 windows a turn, at least 5" in message(w, s)
 
 
 def test_one_mount_or_no_dwells() -> None:
     s = T.setup()
-    w = T.record(s, random_truth(1), turn=36)
+    w = T.record(s, T.random_truth(1), turn=36)
     no_dwell = T.setup(faces={p: f for p, f in s.faces.items() if p in (2, 4)})
     keep = {n: v[np.isin(w["phase"], (2, 4))] for n, v in w.items()}
     assert "no dwells with the output axis vertical" in message(keep, no_dwell)
@@ -277,13 +264,15 @@ def test_one_mount_or_no_dwells() -> None:
 ])  # fmt: skip
 def test_bad_setup(changes: dict[str, Any], text: str) -> None:
     s = T.setup()
-    assert text in message(T.record(s, random_truth(1), turn=12, dwell=3), T.setup(**changes))
+    assert text in message(T.record(s, T.random_truth(1), turn=12, dwell=3), T.setup(**changes))
 
 
 def test_mount_that_is_no_rotation() -> None:
     s = T.setup()
     faces = {**s.faces, 2: np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])}
-    assert "mount of mount 1: determinant is -1" in message(T.record(s, random_truth(1), turn=12), T.setup(faces=faces))
+    assert "mount of mount 1: determinant is -1" in message(
+        T.record(s, T.random_truth(1), turn=12), T.setup(faces=faces)
+    )
 
 
 def test_all_problems_at_once() -> None:
@@ -295,7 +284,7 @@ def test_all_problems_at_once() -> None:
 
 
 def test_partial_turns_have_no_closed_formulas() -> None:
-    truth = random_truth(6)
+    truth = T.random_truth(6)
     s = T.setup(truth=truth)
     w = T.record(s, truth)
     keep = np.ones(w["phase"].size, dtype=bool)
@@ -308,170 +297,10 @@ def test_partial_turns_have_no_closed_formulas() -> None:
 
 def test_other_attitudes_have_no_closed_formulas() -> None:
     """Mounts turned by 20 degrees about the input axis: general attitudes go by least squares."""
-    truth = random_truth(6)
+    truth = T.random_truth(6)
     tilt = frames.rotation([1, 0, 0], math.radians(20)).T
     s0 = T.setup()
     s = T.setup(truth=truth, faces={p: tilt @ f for p, f in s0.faces.items()})
     r = T.reduction.reduce(T.record(s, truth), s)
     assert all(abs(c.estimate - c.truth) < 1e-8 for c in r.coefficients)
     assert r.coefficients[0].closed is None and any("attitudes of Hu 1981: least squares only" in x for x in r.warnings)
-
-
-# ------------------------------------------------------------------------------------------ the rest of a result
-def test_sensitivities_of_the_method() -> None:
-    """[TUM1-SENS-IA] eps W sin(phi)/gamma in D_O by the closed formulas; [TUM1-SENS-AXIS] W delta/(gamma cos phi) in
-    D_I (the axis tilts about east) and 2 W delta/(gamma^2 sin 2 phi) in D_OS (about p x east)."""
-    truth = dict.fromkeys(NAMES, 0.0)
-    s = T.setup(gravity=frames.G0, truth=truth)
-    phi, eps, W = s.latitude, 1e-4, frames.EARTH_RATE / DPH
-
-    def closed(real: Any) -> dict[str, float]:
-        r = T.reduction.reduce(T.record(real, truth), s)
-        return {c.name: c.closed for c in r.coefficients}
-
-    tilt = frames.rotation([0, 0, 1], eps).T
-    found = closed(T.setup(gravity=frames.G0, faces={p: tilt @ f for p, f in s.faces.items()}))
-    assert abs(found.pop("D_O")) == pytest.approx(eps * W * math.sin(phi), rel=1e-6)
-    assert max(map(abs, found.values())) < 1e-6
-    off = T.setup(gravity=frames.G0)
-    for axis, name, size in ((0, "D_I", W / math.cos(phi)), (1, "D_OS", 2 * W / math.sin(2 * phi))):
-        tilted = off.base @ frames.rotation(off.base[axis], eps).T
-        assert abs(closed(T.setup(gravity=frames.G0, base=tilted))[name]) == pytest.approx(eps * size, rel=1e-3)
-
-
-def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
-    """Each line's sensitivity equals the change of the estimates when the record is made with that error in it.  The
-    errors are stated so small that they move no weights: stated in full, each record would have weights of its own.
-    """
-    truth, faint = random_truth(8), 1e-9
-    sizes = {"u_axis": 1e-5, "u_mount": 1e-5, "u_scale_factor": 1e-4, "u_nonlinearity": 1e-4, "u_current": 1e-9}
-    s = T.setup(truth=truth, **{n: v * faint for n, v in sizes.items()})
-    w = T.record(s, truth, noise=white(1e-6))
-    r = T.reduction.reduce(w, s)
-    base = {c.name: c.estimate for c in r.coefficients}
-
-    def change(windows: Any) -> dict[str, float]:
-        found = T.reduction.reduce(windows, s)
-        return {c.name: c.estimate - base[c.name] for c in found.coefficients}
-
-    line = {(b.source, b.coefficient): b for b in r.budget}
-    gained = change({**w, "mean": w["mean"] * (1 + 1e-4)})
-    assert line["torquer scale factor", "D_I"].contribution / faint == pytest.approx(abs(gained["D_I"]), rel=1e-3)
-    offset = change({**w, "mean": w["mean"] + 1e-9})
-    assert line["offset of the current reading", "D_F"].contribution / faint == pytest.approx(
-        abs(offset["D_F"]), rel=1e-3
-    )
-    tilted = T.setup(base=s.base @ frames.rotation(s.base[0], 1e-5).T)
-    off = change(T.record(tilted, truth, noise=white(1e-6)))
-    mine = line["table axis off the pole, about east", "D_I"]
-    assert mine.contribution / faint == pytest.approx(abs(off["D_I"]), rel=1e-3)
-    tilt = frames.rotation([0, 0, 1], 1e-9).T  # small against the noise, else it would be taken for slow noise
-    turned = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
-    off = change(T.record(turned, truth, noise=white(1e-6)))
-    assert line["input axis towards output axis", "D_O"].sensitivity == pytest.approx(off["D_O"] / 1e-9, rel=2e-2)
-    full = T.reduction.reduce(w, T.setup(truth=truth, **sizes))
-    for c in full.coefficients:
-        total = math.sqrt(sum(b.contribution**2 for b in full.budget if b.coefficient == c.name))
-        assert c.u == pytest.approx(total, rel=1e-9)
-        assert c.u > c.u_a
-
-
-def test_tilt_of_the_input_axis_can_be_estimated() -> None:
-    """Both mounts see it with the table rate, the dwells with Earth rate alone: a tenth unknown, and D_O unharmed."""
-    truth, eps = random_truth(8), 1e-4
-    s = T.setup(truth=truth, tilt=True, u_mount=1e-4)
-    tilt = frames.rotation([0, 0, 1], eps).T
-    tilted = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
-    r = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), s)
-    found = {c.name: c for c in r.coefficients}
-    assert found["ε_IO"].estimate == pytest.approx(math.degrees(eps) * 3600, rel=1e-3) and found["ε_IO"].unit == "″"
-    assert all(abs(c.estimate - c.truth) < 5e-4 for c in r.coefficients if c.truth is not None)  # eps times D
-    size = {b.coefficient: b.contribution for b in r.budget if b.source == "input axis towards output axis"}
-    assert size["D_O"] < 1e-4 * 1.01  # only eps D_I, no rate any more
-    loose = T.reduction.reduce(T.record(tilted, truth, noise=white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
-    assert abs(loose.coefficients[2].z) < 2  # the steps between the mounts are taken for slow noise
-    plain = T.reduction.reduce(T.record(s, truth, noise=white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
-    assert any("tilt=yes" in text for text in plain.warnings)
-
-
-def test_result_is_whole_and_json() -> None:
-    s = T.setup(truth=drift.STANDARD, specification={"D_F": (-0.5, 0.5), "D_I": (None, -1.0), "D_S": (-0.701, None)})
-    r = T.reduction.reduce(T.record(s, drift.STANDARD, turns=2, noise=white(0.003)), s)
-    text = json.dumps(r.as_dict(), allow_nan=False)
-    assert Result.from_dict(json.loads(text)).coefficients[0].estimate == r.coefficients[0].estimate
-    verdicts = {c.name: c.verdict for c in r.coefficients}
-    assert verdicts["D_F"] == "pass" and verdicts["D_I"] == "fail" and verdicts["D_II"] == "no specification given"
-    assert r.verdict == "fail"
-    assert (
-        len(r.series) == 4
-        and len(r.series[1].x) == 144
-        and len(r.series[1].shown_fit_x) == len(r.series[1].shown_fit_y)
-    )
-    assert {t.name for t in r.tests} >= {"Ljung-Box, residuals", "turn to turn", "harmonics 3 and higher"}
-    assert r.allan["tau"] and r.psd["f"] and r.acf["rho"][0] == pytest.approx(1.0)
-    assert r.repeatability["p"] > 1e-3
-    assert len(r.tables) == 2 and r.tables[1]["rows"][0][:2] == ["mount 1", 1]
-    assert len(r.summary) == 3
-    for c in r.coefficients:
-        assert c.interval[1] - c.interval[0] == pytest.approx(2 * c.k * c.u)
-        assert abs(c.estimate - c.closed) < 5 * c.u
-    assert r.correlation[0][0] == 1.0 and len(r.correlation) == 9
-
-
-def test_model_errors_are_found() -> None:
-    """A third harmonic, and a drift that changes between turns, show in their tests and nowhere else."""
-    s = T.setup()
-    w = T.record(s, drift.STANDARD, turns=2, noise=white(0.003))
-    mount = np.isin(w["phase"], (2, 4))
-    angle = (w["angle_start"] + w["angle_end"]) / 2
-    third = {**w, "mean": w["mean"] + np.where(mount, 0.003 * DPH / s.k * np.cos(3 * angle), 0.0)}
-    p = {t.name: t.p for t in T.reduction.reduce(third, s).tests}
-    assert p["harmonics 3 and higher"] < 1e-3 < p["turn to turn"]
-    two = np.flatnonzero(w["phase"] == 2)[72:]
-    changed = np.array(w["mean"])
-    changed[two] += 0.005 * DPH / s.k * np.sin(2 * angle[two])
-    p = {t.name: t.p for t in T.reduction.reduce({**w, "mean": changed}, s).tests}
-    assert p["turn to turn"] < 1e-2 < p["harmonics 3 and higher"]
-
-
-def test_correlated_noise_is_seen_and_said() -> None:
-    from gyrobench.reduction.estimation import noise
-
-    def markov(t0: np.ndarray, t1: np.ndarray) -> np.ndarray:
-        root = np.linalg.cholesky(noise.process_covariance(t0, t1, 360.0))
-        return root @ np.random.default_rng(3).standard_normal(t0.size) * 0.005 * DPH
-
-    s = T.setup(truth=drift.STANDARD)
-    w = T.record(s, drift.STANDARD, noise=markov)
-    r = T.reduction.reduce(w, s)
-    p = {t.name: t.p for t in r.tests}
-    assert p["Ljung-Box, residuals"] < 1e-6 < 1e-2 < p["Ljung-Box, whitened residuals"]
-    assert r.noise["weight of white noise alone"] < 1e-3
-    low, high = r.noise["correlation time, 90 % range / s"]
-    assert low < 360.0 < high
-    assert "correlation time about" in r.summary[2]
-    quiet = T.reduction.reduce(T.record(s, drift.STANDARD, noise=white(0.005)), s)
-    assert r.coefficients[0].u > 1.5 * quiet.coefficients[0].u
-
-
-def test_from_a_run() -> None:
-    """The setup comes from run.json: options, plan, gyro parameters; an unfinished run says so."""
-    from gyrobench.record.record import Record
-
-    system = T.system.with_values({"dwell": 600.0, "windows": 36})
-    plan = system.plan().rows()
-    faces = frames.tumble_faces(system["latitude"])
-    parameters = {"gyro.k": T.K, **{f"gyro.{n}": v for n, v in drift.STANDARD.items()}}
-    document = RunDocument(
-        options=dict(system.values), plan=plan, parameters=parameters, complete=False, stopped_at=9.0
-    )
-    s = T.reduction.setup_of(document)
-    assert s.gravity == pytest.approx(frames.normal_gravity(system["latitude"]))
-    assert {p: s.turns(p) for p in s.faces} == {r["phase"]: r["mode"] == "rate" for r in plan}
-    assert s.faces[2] == pytest.approx(faces["mount 1"])
-    r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, document))
-    assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
-    assert "before the end of its plan" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
-    del document.parameters["gyro.k"]
-    with pytest.raises(T.reduction.ReductionError, match="scale factor unknown"):
-        T.reduction.setup_of(document)

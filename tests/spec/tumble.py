@@ -17,7 +17,18 @@ closed: Any = importlib.import_module(".closed", type(system).__module__)
 
 DPH = math.pi / 180.0 / 3600.0
 K = 17.2 * DPH / 1e-3
+NAMES = drift.terms(9)
 PHASES = {1: "static 3", 2: "mount 1", 3: "static 4", 4: "mount 2"}
+
+
+def random_truth(seed: int, names: tuple[str, ...] = NAMES) -> dict[str, float]:
+    return dict(zip(names, np.random.default_rng(seed).uniform(0.1, 1.0, len(names)) * DPH, strict=True))
+
+
+def white(size: float, seed: int = 1) -> Any:
+    """Noise of ``size`` deg/h in every window."""
+    rng = np.random.default_rng(seed)
+    return lambda t0, t1: rng.normal(size=t0.size) * size * DPH
 
 
 def setup(latitude: float = 45.75, **changes: Any) -> Any:
