@@ -30,7 +30,7 @@ def modules(name: str, *parts: str) -> list[Any]:
     return [sys.modules[f"{package}.{p}"] for p in parts]
 
 
-CLOSED, REFUSALS, MODEL = modules("servo_polar", "closed", "refusals", "model")
+CLOSED, REFUSALS = modules("servo_polar", "closed", "refusals")
 VL_CLOSED, VL_REFUSALS = modules("servo_vertical_level", "closed", "refusals")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import re
@@ -12,22 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pickoffs import ARCMIN, DPH, NAME, R, load, made
 
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.reduction.window_checks import ReductionError
-from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]
-NAME = "pickoff_scale_factor"
-DPH, ARCMIN = math.pi / 648000.0, math.pi / 10800.0
-
-
-def load() -> System:
-    return load_system(NAME)
-
-
-R: Any = importlib.import_module(".reduction", type(load()).__module__)
 
 
 @pytest.fixture(scope="module")
@@ -42,25 +32,6 @@ def quiet() -> dict[str, Any]:
 
 def named(result: Any) -> dict[str, Any]:
     return {c.name: c for c in result.coefficients}
-
-
-def made(
-    slope: float = 12.0, gain: float = 1.0, drift: float = 0.7, both: bool = True, bend: float = 0.0, n: int = 11
-) -> dict[str, Any]:
-    """Ideal readings every 0.4 s, zero 3 mV: u = 3 mV + slope (gd(gain a)/gain - drift t), bend per rad^3."""
-    a = np.linspace(-20.0, 20.0, n) * ARCMIN
-    a = np.concatenate([a, a[-2::-1]]) if both else a
-    t = 0.4 * np.arange(a.size)
-    seen = np.arctan(np.sinh(gain * a)) / gain  # the Gudermannian
-    u = 3e-3 + slope * (seen - drift * DPH * (t - t.mean())) + bend * a**3
-    return {
-        "phase": np.arange(a.size) + 1.0,
-        "t_start": t,
-        "t_end": t + 0.1,
-        "angle_start": a,
-        "angle_end": a,
-        "mean": u,
-    }
 
 
 def test_ideal_input() -> None:

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from pickoffs import DPH, NAME, R, load, made
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import Result
-from gyrobench.system.system import System, load_system
 
-NAME = "pickoff_scale_factor"
-DPH, ARCSEC, ARCMIN = math.pi / 648000.0, math.pi / 648000.0, math.pi / 10800.0
+ARCSEC = math.pi / 648000.0
 MINUTE = 60.0 * ARCSEC  # 2.909e-4 rad
-
-
-def load() -> System:
-    return load_system(NAME)
-
-
-R: Any = importlib.import_module(".reduction", type(load()).__module__)
 
 
 @pytest.fixture(scope="module")
@@ -81,16 +72,14 @@ def test_angles_gone_over_once_take_the_earth_for_slope(stepping: Session) -> No
     assert off > 0.0 and abs(left) < 1e-2 * off
 
 
-def record(rng: np.random.Generator, encoder: float, slope: float = 12.0) -> dict[str, Any]:
+def record(rng: np.random.Generator, encoder: float) -> dict[str, Any]:
     """Readings there and back, 1 uV of noise, of an encoder that reads too much by random sines once a turn."""
-    a = np.linspace(-20.0, 20.0, 21) * ARCMIN
-    a = np.concatenate([a, a[-2::-1]])
-    t = 0.2 * np.arange(a.size)
+    ideal = made(n=21, every=0.2)
+    a = ideal["angle_start"]
     p, q = encoder * rng.normal(size=2)
     read = a + p * np.sin(a) + q * np.cos(a)
-    u = slope * np.arctan(np.sinh(a)) - slope * 0.7 * DPH * (t - t.mean()) + 1e-6 * rng.normal(size=a.size)
-    return {"phase": np.arange(a.size) + 1.0, "t_start": t, "t_end": t + 0.1, "angle_start": read, "angle_end": read,
-            "mean": u}  # fmt: skip
+    u = ideal["mean"] + 1e-6 * rng.normal(size=a.size)
+    return {**ideal, "angle_start": read, "angle_end": read, "mean": u}
 
 
 def test_stated_errors_of_the_encoder_are_held() -> None:
