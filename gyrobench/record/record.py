@@ -67,6 +67,15 @@ def _arrow(column: Array) -> Any:
     return pa.Array.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), [None, pa.py_buffer(column)])
 
 
+def _numpy(column: Any) -> Array:
+    """Return a column of Arrow's, as :func:`_arrow` takes one: to_numpy() imports pandas, too."""
+    dtype = np.dtype(column.type.to_pandas_dtype())
+    if dtype.kind not in "fiu" or column.null_count or not column.num_chunks:
+        return np.asarray(column.to_numpy())
+    parts = (np.frombuffer(c.buffers()[1], dtype)[c.offset : c.offset + len(c)] for c in column.chunks)
+    return np.concatenate(list(parts))
+
+
 def _write_csv(header: list[str], columns: list[Array], path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as f:
         writer = csv.writer(f)
@@ -88,7 +97,7 @@ def read_table(stem: Path) -> dict[str, Array] | None:
 
         with pq.ParquetFile(parquet) as file:
             table = file.read()
-        return {name: table.column(name).to_numpy() for name in table.column_names}
+        return {name: _numpy(table.column(name)) for name in table.column_names}
     if text.exists():
         with text.open(newline="", encoding="utf-8") as f:
             names, *rows = list(csv.reader(f))
