@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.metadata
-import os
 import shutil
 import tempfile
 import zipfile
@@ -13,7 +12,7 @@ from pathlib import Path
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
-from gyrobench.files import make_once
+from gyrobench.files import make_once, write_whole
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
@@ -60,17 +59,17 @@ def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
 
 def write_archive(path: Path, entries: dict[str, bytes]) -> None:
     """Write a zip archive; the same entries give the same file."""
+
+    def write(temporary: Path) -> None:
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as z:
+            for name in sorted(entries):
+                info = zipfile.ZipInfo(name, EPOCH)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = 0o644 << 16
+                z.writestr(info, entries[name])
+
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    os.close(handle)
-    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as z:
-        for name in sorted(entries):
-            info = zipfile.ZipInfo(name, EPOCH)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = 0o644 << 16
-            z.writestr(info, entries[name])
-    os.chmod(temporary, 0o644)
-    os.replace(temporary, path)  # a build that is stopped leaves no half file
+    write_whole(path, write)  # a build that is stopped leaves no half file
 
 
 def native_entries(files: dict[str, str], name: str, platforms: tuple[str, ...], fmi: int) -> dict[str, bytes]:
@@ -159,10 +158,15 @@ def build(
 
     make_once(cached, write)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    os.close(handle)
-    shutil.copyfile(cached, temporary)
-    os.chmod(temporary, 0o644)
-    os.replace(temporary, path)
+    if not _is_copy(path, cached):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, lambda temporary: shutil.copy2(cached, temporary))
     return path
+
+
+def _is_copy(path: Path, of: Path) -> bool:
+    """Return whether a file has the size and the time of another, as its copy has until something writes to it."""
+    if not path.exists():
+        return False
+    one, other = path.stat(), of.stat()
+    return (one.st_size, one.st_mtime_ns) == (other.st_size, other.st_mtime_ns)

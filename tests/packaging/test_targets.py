@@ -14,7 +14,7 @@ from toybench import TOYS
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component
-from gyrobench.packaging import compiler, load_part, reference
+from gyrobench.packaging import build, compiler, load_part, reference
 from gyrobench.packaging.instance import Fmu, InstanceError, Unzipped
 from gyrobench.packaging.reference import Reference, compare, read_reference, run_reference, write_reference
 from gyrobench.units import base_unit, unit
@@ -71,6 +71,18 @@ def test_a_difference_is_told(tmp_path: Path) -> None:
     path.write_text("time,u\n0,1\n")
     with pytest.raises(ValueError, match="is not a reference file"):
         run_reference(path, part="lag", bench=TOYS)
+
+
+def test_a_build_copies_what_has_changed(tmp_path: Path) -> None:
+    """A file that is the part's FMU stays as it is; one that was written to, or is another part's, does not."""
+    path = build("lag", out=tmp_path, bench=TOYS)
+    number, content = path.stat().st_ino, path.read_bytes()
+    assert build("lag", out=tmp_path, bench=TOYS) == path
+    assert path.stat().st_ino == number  # a file that is written takes the place of the old one
+    path.write_bytes(content[:-1] + b"x")
+    assert build("lag", out=tmp_path, bench=TOYS).read_bytes() == content
+    path.write_bytes(build("noisy", out=tmp_path, bench=TOYS).read_bytes())
+    assert build("lag", out=tmp_path, bench=TOYS).read_bytes() == content
 
 
 # -------------------------------------------------------------------------------------- description
