@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import json
 import math
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from undiagnosed import reduce_undiagnosed
 
 from gyrobench import drift, frames
 from gyrobench.bench import Bench
@@ -344,13 +344,6 @@ def test_bad_laboratory_files(session: Session, tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------ days
-def undiagnosed(record: Record) -> Result:
-    """The result of a record in which no handling errors are sought, which takes fifty reductions of a laboratory's."""
-    from_record = importlib.import_module(".reduction", type(load()).__module__).from_record
-    result: Result = from_record.__wrapped__(record)
-    return result
-
-
 def test_days_of_turn_on(session: Session, tmp_path: Path) -> None:
     """Five days whose turn-on constants are drawn with 0.1 deg/h about x: R_y scatters by that, u_x does not; the list
     of the runs and a laboratory's file with a column day give the same.
@@ -376,7 +369,7 @@ def test_days_of_turn_on(session: Session, tmp_path: Path) -> None:
 
     day = {p.phase: 1 + [f.name for f in folders].index(p.day) for p in combined.run.plan}
     (tmp_path / "lab.csv").write_text(laboratory(combined, day=day), encoding="utf-8")
-    again = undiagnosed(load().read_measured(tmp_path / "lab.csv", {}))
+    again = reduce_undiagnosed(load().read_measured(tmp_path / "lab.csv", {}))
     for c in again.coefficients:
         assert c.estimate == pytest.approx(by[c.name].estimate, abs=1e-7), c.name
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
@@ -10,13 +9,13 @@ import numpy as np
 from servoing import DAY50, DPH, polar_at_2_ms
 from servoing_two_axes import day
 from stated import FAINT
+from undiagnosed import reduce_undiagnosed
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.effects import REMOUNT
 from gyrobench.result import DriftTestResult, Specification
-from gyrobench.system.system import load_system
 
 ARCSEC = math.pi / 648000.0
 HOUR = 3600.0
@@ -26,11 +25,7 @@ def reduced(
     record: Record, limits: Specification | None = None, measured: bool = False, **options: Any
 ) -> DriftTestResult:
     run = record.run.replace(options={**record.run.options, **options}, measured=measured)
-    reduction = importlib.import_module(".reduction", type(load_system(record.run.system)).__module__)
-    examined = getattr(reduction, "_examined", reduction.from_record)
-    result = examined.__wrapped__(Record(record.windows, {}, run), limits)  # without diagnosis of handling errors
-    assert isinstance(result, DriftTestResult)
-    return result
+    return reduce_undiagnosed(Record(record.windows, {}, run), limits)
 
 
 def with_columns(record: Record, **columns: Any) -> Record:
