@@ -42,7 +42,7 @@ def test_asymmetry_in_a_tumble() -> None:
     current is left, which tells 3 % (flagrant) and no sound torquer; a scale factor is what all coefficients share."""
     unbalanced = {"gyro.D_I": -10.0 * DPH, "gyro.D_S": 10.0 * DPH}
     with Session("tumble_single_axis") as session:
-        strong, standard = (session.run(v, seed=1, step=4e-3) for v in (unbalanced, {}))
+        strong, standard = (session.run(v, seed=1, step=5e-3) for v in (unbalanced, {}))
     clean = reduced(strong)
     holds(clean)
     found = reduced(asymmetric(strong, mean=3e-3))
@@ -60,7 +60,7 @@ def test_turn_ons_of_a_tumble() -> None:
     large as there.
     """
     with Session("tumble_single_axis") as session:
-        record = session.run({"turns": 2, "rate": 2.1876e-3}, seed=3, step=4e-3)
+        record = session.run({"turns": 2, "rate": 2.1876e-3}, seed=3, step=5e-3)
     count = len(record.windows["mean"])
     number = 1.0 + (12 * np.arange(count)) // count
     drawn = 0.035 * np.random.default_rng(1).normal(size=13)
