@@ -45,7 +45,8 @@ def reduced(session, **values):
 @pytest.fixture(scope="module")
 def short():
     """The sines of the base in the run without other values, with T2 and without."""
-    with only(NAME, "base ") as a, only(NAME, "base ", parts=NO_T2) as b:
+    slowest = ("base x 0.5 Hz", "base y", "base z")
+    with only(NAME, *slowest) as a, only(NAME, *slowest, parts=NO_T2) as b:
         return {True: reduced(a), False: reduced(b)}
 
 
@@ -145,9 +146,10 @@ def test_command_turns_the_platform_its_way():
         assert np.corrcoef(rate, record.channels[f"exciter.command[{k}]"][inside])[0, 1] > 0.999
 
 
-def test_margins_of_the_sweep_are_those_of_the_linear_parts(sessions):
+def test_margins_of_the_sweep_are_those_of_the_linear_parts():
     """Within 1 dB and 3 degrees up to twice the crossover, on each axis; the delays are in the model."""
-    _, result, found = reduced(sessions[True], sweeps=True, swing=0.0)
+    with only(NAME, "loop") as session:
+        _, result, found = reduced(session, sweeps=True, swing=0.0)
     rows = next(t for t in result.tables if t["title"].startswith("Linear models"))["rows"]
     assert len(rows) == 6  # three axes, with and without the step
     for model, _, count, db, degrees, _loop in rows:
@@ -169,8 +171,7 @@ def test_platform_drifts_as_its_gyros_do():
 
 def test_singular_secant_and_lock_are_said(sessions):
     values = {"pitch": "75deg", "decoupler.theta_f_max": "60deg", "swing": 0.0}
-    with Session(NAME) as session:
-        _, result, _ = reduced(session, **values)
+    _, result, _ = reduced(sessions[True], **values)
     assert any("secant of the decoupler" in w and "pitch 75" in w for w in result.warnings)
 
 
