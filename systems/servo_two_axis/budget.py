@@ -6,7 +6,8 @@ with its sign where the readings are wrong, with the opposite one where the axes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -37,46 +38,59 @@ def effects(
     def moved(other: Track) -> Array:
         return found.error(other.inertial(site)[:, channel] - y, other.design(site, names) - X) / SMALL
 
-    def mount(k: int) -> Array:
-        return one_by_one(-moved(replace(seen, base=_turned(k) @ seen.base)), phase)
-
-    def read(axis: int, error: Callable[[Array], Array], slope: Callable[[Array], Array]) -> Array:
-        angle, rate = seen.angle.copy(), seen.rate.copy()
-        at = seen.angle[..., axis]
-        angle[..., axis] += SMALL * error(at)
-        rate[..., axis] += SMALL * slope(at) * seen.rate[..., axis]
-        return moved(replace(seen, angle=angle, rate=rate))
-
-    def order(axis: int, n: int) -> Array:
-        return np.array([
-            read(axis, lambda a: np.sin(n * a), lambda a: n * np.cos(n * a)),
-            read(axis, lambda a: np.cos(n * a), lambda a: -n * np.sin(n * a)),
-        ])  # fmt: skip
-
+    other = _others(seen)
     each, mounts = "each mount set up by itself", tuple(f"mount {p}" for p in np.unique(phase))
     out = [
-        Effect(f"table set up, about {a}", sizes["u_axis"], "rad", mount(k), each, mounts) for k, a in enumerate("XYZ")
+        Effect(f"table set up, about {a}", sizes["u_axis"], "rad", one_by_one(-moved(one), phase), each, mounts)
+        for a, one in zip("XYZ", other["base"], strict=True)
     ]
     out += [
-        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(replace(seen, body=_turned(k))))
-        for k, a in enumerate("xyz")
+        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(one))
+        for a, one in zip("xyz", other["body"], strict=True)
     ]
-    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(replace(seen, square=SMALL))))
+    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(*other["square"])))
     for n, often in ((1, "once"), (2, "twice")):
-        out += [
-            Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", order(k, n), "encoder", SINES)
-            for k, name in enumerate(AXES)
-        ]
-    for k, name in enumerate(AXES):
-        both = [replace(seen, wobble=(SMALL * (k == 0), SMALL * (k == 1), p)) for p in (0.0, np.pi / 2.0)]
-        change = -np.array([moved(one) for one in both])
+        for name in AXES:
+            change = np.array([moved(one) for one in other[f"{name} {n}"]])
+            out.append(
+                Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", change, "encoder", SINES)
+            )
+    for name in AXES:
+        change = -np.array([moved(one) for one in other[f"{name} wobble"]])
         out.append(
             Effect(
                 f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase", PHASES
             )
         )
-    slow = replace(seen, rate=(1.0 - SMALL) * seen.rate)
-    return [*out, Effect("time base", sizes["u_time"], "1", moved(slow), "relative")]
+    return [*out, Effect("time base", sizes["u_time"], "1", moved(*other["time"]), "relative")]
+
+
+@functools.lru_cache(maxsize=1)
+def _others(seen: Track) -> dict[str, list[Track]]:
+    """Return what is seen with each error of the size SMALL, the same for both channels and for every fit of them."""
+
+    def read(axis: int, n: int) -> list[Track]:
+        sine, cosine = np.sin(n * seen.angle[..., axis]), np.cos(n * seen.angle[..., axis])
+        both = []
+        for error, slope in ((sine, n * cosine), (cosine, -n * sine)):
+            angle, rate = seen.angle.copy(), seen.rate.copy()
+            angle[..., axis] += SMALL * error
+            rate[..., axis] += SMALL * slope * seen.rate[..., axis]
+            both.append(replace(seen, angle=angle, rate=rate))
+        return both
+
+    out = {
+        "base": [replace(seen, base=_turned(k) @ seen.base) for k in range(3)],
+        "body": [replace(seen, body=_turned(k)) for k in range(3)],
+        "square": [replace(seen, square=SMALL)],
+        "time": [replace(seen, rate=(1.0 - SMALL) * seen.rate)],
+    }
+    for k, name in enumerate(AXES):
+        for n in (1, 2):
+            out[f"{name} {n}"] = read(k, n)
+        phases = (0.0, np.pi / 2.0)
+        out[f"{name} wobble"] = [replace(seen, wobble=(SMALL * (k == 0), SMALL * (k == 1), p)) for p in phases]
+    return out
 
 
 def _turned(k: int) -> Array:

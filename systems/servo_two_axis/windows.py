@@ -8,7 +8,7 @@ share a reading.  Averages are Gauss-Legendre sums over 8 nodes in time.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -28,7 +28,7 @@ MIDDLE = np.array([np.prod([-b / (a - b) for b in NODES if b != a]) for a in NOD
 ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Track:
     """Angles and rates of both axes at the nodes (n, nodes, 2), rad and rad/s, rows X, Y, Z of the mount of each window
     in ENU (n, 3, 3), times (n,) s.  body: gyro axes in those of the plate.  square: the inner axis turned about Z.
@@ -43,6 +43,7 @@ class Track:
     body: Array | None = None
     square: float = 0.0
     wobble: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    _seen: dict[Site, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def turns(self) -> list[tuple[Array, Array]]:
         """From the mount to the gyro: passive rotations (..., 3, 3) in turn and the rate (..., 3) each adds."""
@@ -70,10 +71,18 @@ class Track:
 
     def inertial(self, site: Site) -> Array:
         """Means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
-        w = (self.base @ frames.earth_rate_local(site.latitude, site.earth_rate))[:, None, :]
-        for R, rate in self.turns():
-            w = (R @ w[..., None])[..., 0] + rate
-        return average(w)
+        return self._along(site)[0]
+
+    def _along(self, site: Site) -> tuple[Array, Array]:
+        """Means of the inertial rate (n, 3) and -f/g0 at the nodes (n, nodes, 3), which both channels ask for."""
+        if site not in self._seen:
+            w = (self.base @ frames.earth_rate_local(site.latitude, site.earth_rate))[:, None, :]
+            g = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
+            for R, rate in self.turns():
+                w = (R @ w[..., None])[..., 0] + rate
+                g = (R @ g[..., None])[..., 0]
+            self._seen[site] = average(w), g
+        return self._seen[site]
 
     def middle(self) -> tuple[Array, Array, Array, Array]:
         """Outer and inner angle and their rates at the middle of each window, (n,) each."""
@@ -83,10 +92,7 @@ class Track:
 
     def force(self, site: Site) -> Array:
         """-f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
-        g: Array = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
-        for R, _ in self.turns():
-            g = (R @ g[..., None])[..., 0]
-        return g
+        return self._along(site)[1]
 
     def design(self, site: Site, names: tuple[str, ...]) -> Array:
         """Means (n, p) of the regressors ``names`` of a channel."""
