@@ -11,6 +11,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
+from ctypes import c_double, c_uint
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -117,6 +118,8 @@ class _Access(NamedTuple):
     """A call that sets or gets variables of one FMI type.
 
     number: type of its values.  names: of all elements of the variables.  in_part: some of these are not asked for.
+    values: those of doubles, and arguments: of the FMI functions that get and set them there, which are called without
+    FMPy's detour by lists; None of other types.
     """
 
     kind: str
@@ -124,6 +127,8 @@ class _Access(NamedTuple):
     references: list[int]
     names: list[str]
     in_part: bool
+    values: Any = None
+    arguments: tuple[Any, ...] = ()
 
 
 @dataclass
@@ -217,7 +222,7 @@ class Fmu:
             for v in self._variables(names):
                 groups.setdefault(v.type, []).append(v)
             self._known[names] = [
-                _Access(
+                self._access(
                     kind,
                     {"Real": float, "Float64": float, "Boolean": bool}.get(kind, int),
                     [v.valueReference for v in of],
@@ -228,7 +233,26 @@ class Fmu:
             ]
         return self._known[names]
 
+    def _access(self, kind: str, number: type, references: list[int], names: list[str], in_part: bool) -> _Access:
+        if number is not float:
+            return _Access(kind, number, references, names, in_part)
+        values = (c_double * len(names))()
+        places = (c_uint * len(references))(*references)
+        size = (len(names),) if self.three else ()
+        arguments = (self.fmu.component, places, len(references), values, *size)
+        return _Access(kind, number, references, names, in_part, values, arguments)
+
+    def _direct(self, verb: str, access: _Access) -> None:
+        """Get or set doubles."""
+        self.messages.clear()
+        function = getattr(self.fmu.dll, f"fmi{3 if self.three else 2}{verb.title()}{access.kind}")
+        if (status := function(*access.arguments)) > 1:
+            raise InstanceError(verb, status, self.messages)
+
     def _values(self, access: _Access) -> dict[str, float]:
+        if access.values is not None:
+            self._direct("get", access)
+            return dict(zip(access.names, access.values, strict=True))
         size = {"nValues": len(access.names)} if self.three else {}
         values = self._call("get", getattr(self.fmu, f"get{access.kind}"), access.references, **size)
         return dict(zip(access.names, map(float, values), strict=True))
@@ -237,6 +261,10 @@ class Fmu:
         for access in self._calls(tuple(values)):
             given = {**self._values(access), **values} if access.in_part else values  # an array is set as a whole
             numbers = [access.number(given[n]) for n in access.names]
+            if access.values is not None:
+                access.values[:] = numbers
+                self._direct("set", access)
+                continue
             self._call("set", getattr(self.fmu, f"set{access.kind}"), access.references, numbers)
 
     def get(self, names: Sequence[str]) -> list[float]:
