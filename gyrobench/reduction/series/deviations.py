@@ -98,13 +98,19 @@ class _Stage:
         use = fresh if end else fresh[:, :even]
         cells = np.concatenate([self.tail, use], axis=1)
         old = self.tail.shape[1]
-        if cells[2].min(initial=1.0) >= 1.0:
+        if not self._reached(cells.shape[1] + 1):
+            pass  # too short for any difference
+        elif cells[2].min(initial=1.0) >= 1.0:
             self._complete(cells, old, end)
         else:
             self._with_gaps(cells, old)
         self.tail = cells[:, max(cells.shape[1] - self.keep, 0) :]
         self.fresh, self.waiting = [fresh[:, even:]], self.waiting - even
         return _pairs(fresh[:, :even], self.stride)
+
+    def _reached(self, angles: int) -> list[int]:
+        """Return the steps of which so many angles have a difference."""
+        return [m for m in self.steps if 2 * m < angles]
 
     def _add(self, kind: str, m: int, z: Array, scale: float) -> None:
         entry = self.sums[kind, m]
@@ -114,7 +120,7 @@ class _Stage:
     def _complete(self, cells: Array, old: int, end: bool) -> None:
         # a constant rate is in no difference; without it the sums stay small
         angle = np.concatenate([[0.0], np.cumsum(cells[0] - cells[0].mean())]) * self.stride
-        for m in self.steps:
+        for m in self._reached(angle.size):
             h = m * self.stride
             if "hadamard" in self.kinds:
                 second = _second(angle[max(old + 1 - 3 * m, 0) :], m)
@@ -131,7 +137,7 @@ class _Stage:
             if end and self.stride == 1:  # the last angle has no cell
                 mean = np.append(mean, angle[-1])
             area = np.concatenate([[0.0], np.cumsum(mean - mean.mean())])
-            for m in self.steps:
+            for m in self._reached(area.size):
                 second = _second(area[max(old + 1 - 3 * m, 0) :], m)
                 self._add("modified", m, second[m:] - second[:-m], 2.0 * (m * m * self.stride) ** 2)
 
