@@ -1,4 +1,4 @@
-"""For the tests of the gimballed platforms: the systems without noise and drift, and with other flights."""
+"""For the tests of loops: systems with other plans or flights; gimballed platforms without noise and drift."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STILL = {f"gyro_{g}.{n}_{c}": 0.0 for g in "ab" for n in ("turn_on", "markov", "
 
 
 def session(name: str, legs: list[Leg] | None = None, parts: dict[str, str] | None = None, **methods: Any) -> Session:
-    """The system with these legs, and with other methods."""
+    """The system with these legs where there are some, and with other methods."""
     system = load_system(name)
     if legs is not None:
         methods["legs"] = lambda self: legs

@@ -12,6 +12,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from gimballed import session as with_methods
 from scipy.integrate import solve_ivp
 
 from gyrobench.engine.session import Session
@@ -39,12 +40,8 @@ closed: Any = importlib.import_module(".closed", MODULE)
 
 def session(*phases: LoopPhase) -> Session:
     """The system with another plan."""
-    system = load()
-    base = type(system)
     plan = LoopPlan(list(phases))
-    other = type(base.__name__, (base,), {"plan": lambda self: plan, "__module__": base.__module__})()
-    other.name, other.folder = system.name, system.folder
-    return Session(other)
+    return with_methods(NAME, plan=lambda self: plan)
 
 
 def polynomial(p: Any) -> Any:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gimballed import session as with_methods
 
 from gyrobench.engine.session import ParameterRefusedError, RunError, Session
 from gyrobench.record.csv_reader import DataError
@@ -38,12 +39,8 @@ R: Any = importlib.import_module(".reduction", type(load()).__module__)
 
 def session(*phases: LoopPhase) -> Session:
     """The system with another plan."""
-    system = load()
-    base = type(system)
     plan = LoopPlan(list(phases))
-    other = type(base.__name__, (base,), {"plan": lambda self: plan, "__module__": base.__module__})()
-    other.name, other.folder = system.name, system.folder
-    return Session(other)
+    return with_methods(NAME, plan=lambda self: plan)
 
 
 STEP = LoopPhase("load step", "torque", "step", 1, 1.0, settle=0.1, dwell=1.5)
