@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import errno
 import functools
@@ -12,6 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from multiprocessing.util import Finalize
 from pathlib import Path
 
 from gyrobench.errors import GyrobenchError
@@ -196,7 +196,7 @@ def _temporary_root(process: int) -> Path:
             lock.release()
             shutil.rmtree(root, ignore_errors=True)
 
-    atexit.register(remove)
+    Finalize(None, remove, exitpriority=0)  # as atexit, and in forks of multiprocessing, which leave atexit out
     return root
 
 

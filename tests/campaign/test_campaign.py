@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ from gyrobench.bench import UsageError
 from gyrobench.campaign import campaign_execution
 from gyrobench.campaign.clusters import local_cluster
 from gyrobench.campaign.store import Campaign, CampaignError
+from gyrobench.files import TEMPORARY
 from gyrobench.workflow.user_errors import exit_code
 
 BENCH = Path(__file__).with_name("bench")
@@ -78,12 +80,15 @@ def test_workers_and_order_change_no_bit_and_nothing_is_done_twice(two: Any, tmp
     asked = {"system": "weighing", "over": AXES, "seeds": 3, "set": {"duration": "0.05s", "times": str(times)}}
     gb.campaign(asked, client=two, out=tmp_path / "two")
     with local_cluster(1) as one:
+        (worker,) = one.run(os.getpid).values()
         gb.campaign(asked, client=one, out=tmp_path / "one")
         half = {**asked, "over": {**AXES, "temperature": "300 K"}}
         gb.campaign(half, client=one, out=tmp_path / "parts")
         assert len(times.read_text().split()) == 18 + 18 + 9
         gb.campaign(asked, client=two, out=tmp_path / "parts")  # runs added to the file run alone
         assert len(times.read_text().split()) == 18 + 18 + 18
+    owners = [f.read_text() for f in Path(tempfile.gettempdir()).glob(f"{TEMPORARY}*/.lock")]
+    assert str(worker) not in owners and str(os.getpid()) in owners
     gb.campaign(asked, out=tmp_path / "two")  # nothing to do: not even a cluster
     assert len(times.read_text().split()) == 54
     assert rows(tmp_path / "two") == rows(tmp_path / "one") == rows(tmp_path / "parts")
