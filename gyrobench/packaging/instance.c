@@ -28,8 +28,9 @@ const Model model = {N_REFERENCES, U0, sizeof(Saved), names, extents};
 
 COLD Instance *new_instance(const char *name, const Face *face) {
     Whole *const whole = (Whole *)calloc(1, sizeof *whole);
-    Instance *const m = &whole->instance;
+    Instance *m;
     if (!whole) return NULL;
+    m = &whole->instance;
     begin(&m->part, name);
     m->fresh = m->part.n;
     whole->face = *face;
