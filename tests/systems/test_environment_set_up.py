@@ -94,7 +94,7 @@ def test_scales_by_hand(session: Session) -> None:
 
 
 def test_stated_mounts_are_held(session: Session) -> None:
-    """Twenty mounts of 60 arcsec about each axis, noise of 1e-4 deg/h in a window: stated, 0.85 or more of the
+    """Forty mounts of 60 arcsec about each axis, noise of 1e-4 deg/h in a window: stated, 0.85 or more of the
     intervals of ω_0, s_E and s_N hold; not stated, less than a quarter of those of ω_0.
     """
     record = session.run(values(session, {}), seed=1, step=5e-3)
@@ -105,7 +105,7 @@ def test_stated_mounts_are_held(session: Session) -> None:
     sE, sN = 1.5 * G * DPH, -2.0 * G * DPH
     truth = {c.name: c.truth for c in session.system.reduce(record).coefficients}
     held = np.zeros((2, 3))
-    for _ in range(20):
+    for _ in range(40):
         a, b, c = 60.0 * ARCSEC * rng.normal(size=3)
         more = a * sE - b * (north + qE * up + np.gradient(qN, middle)) + b * (sE * qN - sN * qE)
         more = more - c * (up - qE * north) - c * sN + 1e-4 * DPH * rng.normal(size=middle.size)
@@ -114,4 +114,4 @@ def test_stated_mounts_are_held(session: Session) -> None:
             run = record.run.replace(options={**record.run.options, "u_mount": size})
             r = session.system.reduce(Record(windows, record.channels, run))
             held[j] += [abs(r[n].estimate - truth[n]) <= r[n].k * r[n].u for n in ("ω_0", "s_E", "s_N")]
-    assert held[0].min() >= 17 and held[1, 0] < 5
+    assert held[0].min() >= 34 and held[1, 0] < 10
