@@ -179,6 +179,11 @@ def _lock(handle: int, wait: bool = False) -> None:
     fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
 
 
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def temporary_folder() -> Path:
     """Make a folder for files of this process; what processes left that were killed is removed once."""
     return Path(tempfile.mkdtemp(dir=_temporary_root(os.getpid())))

@@ -250,6 +250,26 @@ def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_pa
     assert code == 1 and out
 
 
+def test_parts_are_built_side_by_side(gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same files as one after the other; one that cannot be built is named, and those before it are there."""
+    from gyrobench import packaging
+
+    monkeypatch.setenv("GYROBENCH_CACHE", str(tmp_path / "a"))
+    names = ["meter", "site", "sampler"]
+    code, out, _ = gyrobench("build", *names, "--out", "o")
+    assert (code, out) == (0, "o/meter.fmu\no/site.fmu\no/sampler.fmu\n")
+    monkeypatch.setenv("GYROBENCH_CACHE", str(tmp_path / "b"))
+    for name in names:
+        alone = packaging.build(name, out=tmp_path / "alone")
+        assert alone.read_bytes() == (tmp_path / "o" / f"{name}.fmu").read_bytes()
+    assert gyrobench("init", "mine", "--copy", "site")[0] == 0
+    with (tmp_path / "mine" / "components" / "site" / "model.py").open("a", encoding="utf-8") as model:
+        model.write("        oops\n")
+    monkeypatch.chdir(tmp_path / "mine")
+    code, out, err = gyrobench("build", *names)
+    assert code != 0 and out == "fmus/meter.fmu\n" and "site/model.py:22: IndentationError" in err
+
+
 def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     values = (*TINY, "--set", "gyro.D_I=0.7deg/h/g")
     assert gyrobench("run", NAME, *values, "--seed", 7, "--out", "r")[0] == 0

@@ -166,7 +166,7 @@ def test_many_runs(command: Callable[[str], None], tmp_path: Path, monkeypatch: 
 
     from gyrobench.campaign import clusters
 
-    monkeypatch.setattr(clusters, "_cores", lambda: 1)  # the tests share the cores
+    monkeypatch.setattr(clusters, "cores", lambda: 1)  # the tests share the cores
     names, _ = follow(GUIDES / "campaigns.md", command)
     first = pandas.read_parquet(tmp_path / "first" / "runs")
     assert len(first) == 12 and set(first["state"]) == {"done"}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gyrobench.bench import UsageError
 from gyrobench.campaign.store import CampaignError
-from gyrobench.files import temporary_folder
+from gyrobench.files import cores, temporary_folder
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -42,7 +42,7 @@ def connect(
             notes([f"dashboard: {connected.dashboard_link}"])
             yield connected
         return
-    with local_cluster(min(workers or _cores(), runs)) as local:
+    with local_cluster(min(workers or cores(), runs)) as local:
         notes([f"dashboard: {local.dashboard_link}{_without_bokeh()}"])
         yield local
 
@@ -51,10 +51,6 @@ def _without_bokeh() -> str:
     import importlib.util
 
     return "" if importlib.util.find_spec("bokeh") else " (its pages need bokeh: pip install bokeh)"
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
@@ -93,6 +94,7 @@ def build(
     Example: gyrobench build floated_gyro --target python
     """
     from gyrobench import packaging
+    from gyrobench.files import cores
     from gyrobench.packaging.compiler import PLATFORMS
 
     bench = Bench.find()
@@ -104,6 +106,10 @@ def build(
     unknown = [p for p in platform or [] if p not in PLATFORMS]
     if unknown:
         raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
-    for name in names:
-        path = packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
-        echo(display_path(path))
+
+    def build_one(name: str) -> Path:
+        return packaging.build(name, target.value, fmi, out or bench.products, bench.folder, tuple(platform or ()))
+
+    with ThreadPoolExecutor(cores()) as pool:  # the compiler's processes are nearly all of it
+        for path in pool.map(build_one, names):
+            echo(display_path(path))

@@ -10,6 +10,7 @@ import hashlib
 import importlib.util
 import inspect
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,8 @@ from gyrobench.errors import GyrobenchError
 
 ROOM = "components"
 _loaded: dict[str, tuple[type[Component], dict[Path, str]]] = {}  # by file: the class, and the hashes of its sources
+
+_loading = threading.RLock()  # the modules of one part stand for ``components`` at a time; parts may load others
 
 
 class BuildError(GyrobenchError):
@@ -72,6 +75,11 @@ def content_imports(folder: Path, part: Path | None = None) -> Iterator[dict[str
 
 def load_part(name: str, bench: Path | None = None) -> type[Component]:
     """Return the Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
+    with _loading:
+        return _load(name, bench)
+
+
+def _load(name: str, bench: Path | None) -> type[Component]:
     home = Bench.find(bench)
     path = home.part_folder(name) / "model.py"
     known = _loaded.get(f"{home.folder}:{path.resolve()}")
