@@ -57,7 +57,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def forks() -> Iterator[None]:
     """Runs fork, as those of a command do: the threads of a test process that are there before its tests hold no lock.
 
-    Each run would start Python anew, for a third of a second.
+    Each run would start Python anew, for a quarter of a second.
     """
     from gyrobench.engine import supervision
 

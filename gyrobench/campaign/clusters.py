@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -58,10 +59,9 @@ def local_cluster(workers: int) -> Iterator[Client]:
     """Yield a client of that many local processes, which end with this one.
 
     On Linux a process that has imported what a worker needs stays, and the workers are its forks: the next cluster, and
-    a worker in place of one that a run has ended, need not import it again for a second and a half.
+    a worker in place of one that a run has ended, need not import it again for a second.
     """
     import logging
-    import sys
 
     import dask
     from distributed import Client, LocalCluster
@@ -101,8 +101,6 @@ def local_cluster(workers: int) -> Iterator[Client]:
 @contextlib.contextmanager
 def _without_main() -> Iterator[None]:
     """Let processes start without the user's script, which has no need to be imported there, nor a guard."""
-    import sys
-
     main = sys.modules["__main__"]
     held = {n: getattr(main, n) for n in ("__file__", "__spec__") if hasattr(main, n)}
     main.__spec__ = None
