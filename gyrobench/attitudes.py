@@ -9,12 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames, reading
+from gyrobench.arrays import Array
 from gyrobench.frames import E, N, U
-
-Array = NDArray[np.float64]
 
 
 def directions(latitude: float) -> dict[str, Array]:

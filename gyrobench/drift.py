@@ -26,10 +26,8 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyrobench import units
-from gyrobench.units import DEG, G0
+from gyrobench.units import DPH, G0
 
-DPH = units.factor("deg/h")
 NAMES = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_OO", "D_SS", "D_IO", "D_OS", "D_IS")
 TERM_SETS: dict[int, tuple[str, ...]] = {
     3: ("D_F", "D_I", "D_S"),
@@ -337,12 +335,11 @@ def merge(coefficients: Mapping[str, float], H: float, m: float, physical: Mappi
     return {n: {**coefficients, **derived}[n] for n in NAMES if n in coefficients or n in derived}
 
 
-_DPH = DEG / 3600.0
 #: The standard gyro, rad/s per g0^n.  R = 0.3, U_z = 0.9, U_x = -0.7 deg/h(/g), K_zz-K_xx = 0.15, K_zx =
 #: 0.05, K_xz = 0.04, K_zy = 0.03, K_xy = -0.02 deg/h/g2 in torque sign (ranges of Hu 1981)
 #: turned into precession sign; D_O = 0.1 deg/h/g is empirical (no rigid-body cause); D_OO = 0.
 STANDARD: dict[str, float] = {
-    n: v * _DPH
+    n: v * DPH
     for n, v in {
         "D_F": -0.3,
         "D_I": -0.9,

@@ -15,9 +15,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.units import EARTH_RATE, G0
 
 __all__ = [
@@ -43,7 +44,6 @@ __all__ = [
     "tumble_faces",
 ]
 
-Array = NDArray[np.float64]
 
 E = np.array([1.0, 0.0, 0.0])
 N = np.array([0.0, 1.0, 0.0])

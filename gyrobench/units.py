@@ -28,6 +28,8 @@ BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  #: base units in the orde
 G0 = 9.80665  #: standard acceleration, m/s2; "per g" means per this
 EARTH_RATE = 7.2921159e-5  #: rad/s; the unit ERU
 DEG = math.pi / 180.0
+ARCSEC = math.pi / 648000.0  #: rad
+DPH = math.pi / 648000.0  #: 1 deg/h in rad/s
 
 
 class UnitError(GyrobenchError, ValueError):

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from gyrobench.campaign.measures import Array, Json, Measures, numbers, quantities
+from gyrobench.arrays import Array
+from gyrobench.campaign.measures import Json, Measures, numbers, quantities
 from gyrobench.reduction.ranking import LEVEL, adjusted
 
 Codes = NDArray[np.intp]

@@ -22,17 +22,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
-from gyrobench.campaign.measures import (
-    SEED_KINDS,
-    Array,
-    Json,
-    Measures,
-    error,
-    normalized_error,
-    numbers,
-    shared_seeds,
-)
+from gyrobench.campaign.measures import SEED_KINDS, Json, Measures, error, normalized_error, numbers, shared_seeds
 from gyrobench.campaign.store import Campaign
 from gyrobench.reduction.ranking import LEVEL, ROUNDING, adjusted
 from gyrobench.report.numbers import write_number

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
 
 CONTENT = 0.95  # share of the population inside a tolerance interval
 CONFIDENCE = 0.95

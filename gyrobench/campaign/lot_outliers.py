@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, stats
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 Mask = NDArray[np.bool_]
 
 LEVEL = 0.01  # chance of naming any instrument of a lot without outliers

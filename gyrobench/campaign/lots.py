@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from scipy import special, stats
 
+from gyrobench.arrays import Array
 from gyrobench.campaign.intervals import tolerance_interval
 from gyrobench.campaign.lot_attention import common_warnings, contradictions, instruments
 from gyrobench.campaign.lot_outliers import LEVEL, robust_outliers
-from gyrobench.campaign.measures import Array, Json, Measures, numbers
+from gyrobench.campaign.measures import Json, Measures, numbers
 from gyrobench.reduction.ranking import LEVEL as CHANGE_LEVEL
 from gyrobench.reduction.ranking import adjusted
 

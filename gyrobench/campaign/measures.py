@@ -8,9 +8,9 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 Json = dict[str, Any]
 SEED_KINDS = ("seed", "seeds")
 CONSTANT = 1e-9  # relative; what varies less does not vary

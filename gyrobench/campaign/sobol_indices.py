@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from gyrobench.arrays import Array
 from gyrobench.campaign.axis_effects import ROUNDING, Codes, crossed_seeds, levels
-from gyrobench.campaign.measures import SAMPLED_KINDS, Array, Json, Measures, numbers, quantities
+from gyrobench.campaign.measures import SAMPLED_KINDS, Json, Measures, numbers, quantities
 
 MIN_RUNS = 64  # of a sampled design
 DRAWS = 400  # of the noise of a factorial design, for its intervals

@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.bench import display_path
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import RunState, read_outputs
-from gyrobench.engine.run_board import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 

@@ -26,11 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.engine.checkpoint import ResumeError
 from gyrobench.engine.execution import Ending, Job, execute
 from gyrobench.engine.fmi3_instance import new_instance
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
-from gyrobench.engine.run_board import Array, RunBoard
+from gyrobench.engine.run_board import RunBoard
 from gyrobench.engine.run_driver import SIGNALS, EngineStopped
 from gyrobench.files import write_whole
 

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import PartProgram, Program, RecordRow, VariableGroup
-from gyrobench.engine.run_board import Array, RunBoard
+from gyrobench.engine.run_board import RunBoard
 
 TIMED_EVERY = 1009  # a prime, so that periodic work of the parts is sampled evenly
 TIMED_FIRST = 504  # not step 0, which finds everything cold

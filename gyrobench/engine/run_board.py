@@ -9,13 +9,12 @@ import ctypes
 import mmap
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.engine.program import TYPES, Program
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 BLOCK = 4096  # rows
 #: calls of an FMU by number; engine.c knows those that set or get values, by the code of their type, and doStep
 CALLS = (

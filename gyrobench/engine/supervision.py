@@ -18,11 +18,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from gyrobench.arrays import Array
 from gyrobench.engine.child import Desk, Loads, read_ending, run_job
 from gyrobench.engine.execution import Ending, Job
 from gyrobench.engine.fmu_instance import FmuCallError
 from gyrobench.engine.reference_engine import RunState
-from gyrobench.engine.run_board import CALLS, Array, RunBoard
+from gyrobench.engine.run_board import CALLS, RunBoard
 from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressReport
 
 LOOK = 0.05  # s between two looks at the child

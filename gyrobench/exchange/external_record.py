@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import AnyArray
 from gyrobench.exchange.result_files import Block, ResultFile, listed
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import WHOLE, Record
@@ -25,7 +26,6 @@ from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
 
-Array = np.ndarray[Any, Any]
 DIGITS = 6  # of the numbers in the CSV of libcosim
 COARSE = 1e-3  # of a window: an error of its ends by rounding that is refused
 FINE = 1e-7  # that is not told
@@ -43,7 +43,7 @@ class Series:
     bound: Bound
     held: bool = True
 
-    def si(self, block: Block, rows: Array) -> Array:
+    def si(self, block: Block, rows: AnyArray) -> AnyArray:
         if self.name is None:
             return np.full(len(rows), self.bound.constant, dtype=float)
         return np.asarray(self.bound.si(np.asarray(block[self.name][rows], dtype=float)), dtype=float)
@@ -99,8 +99,8 @@ class ResultReader:
     result: ResultFile
     series: Mapping[str, Series]
     step: float  # s, of the system
-    windows: dict[str, list[Array]] = field(default_factory=dict)
-    channels: dict[str, list[Array]] = field(default_factory=dict)
+    windows: dict[str, list[AnyArray]] = field(default_factory=dict)
+    channels: dict[str, list[AnyArray]] = field(default_factory=dict)
     last: tuple[float, float] | None = None  # time and count of the row before
     done: bool | None = None  # None: the file does not have the end of the plan
     single: bool = False  # numbers of single precision
@@ -131,14 +131,14 @@ class ResultReader:
     def _fail(self, problem: str) -> DataError:
         return DataError(self.result.name, [problem])
 
-    def _check_time(self, time: Array) -> None:
+    def _check_time(self, time: AnyArray) -> None:
         before = self.last[0] if self.last else time[0]
         steps = np.diff(time, prepend=before)
         if not np.all(np.isfinite(time)) or np.any(steps < 0.0):
             k = int(np.argmax(~np.isfinite(time) | (steps < 0.0)))
             raise self._fail(f"the time {time[k]:.9g} s comes after {time[k] - steps[k]:.9g} s")
 
-    def _windows(self, block: Block, time: Array) -> None:
+    def _windows(self, block: Block, time: AnyArray) -> None:
         windows = self.system.windows
         assert windows is not None
         all_rows = np.arange(len(time))
@@ -187,7 +187,7 @@ class ResultReader:
         lengths = [p.window for p in getattr(plan, "phases", ()) if getattr(p, "mode", "") != "rate" and p.window > 0.0]
         return min(lengths, default=self.step)
 
-    def _channels(self, block: Block, time: Array, names: list[str]) -> None:
+    def _channels(self, block: Block, time: AnyArray, names: list[str]) -> None:
         """Take the rows at whole multiples of the channels' period, the last of those of one time."""
         if not names:
             return
@@ -228,7 +228,7 @@ class ResultReader:
         run.steps = round(self.last[0] / run.step)
         return Record(windows, channels, run)
 
-    def _step_of(self, windows: Mapping[str, Array], run: RunDocument) -> None:
+    def _step_of(self, windows: Mapping[str, AnyArray], run: RunDocument) -> None:
         """Take the communication step from the numbers of samples in the windows."""
         if not {"t_start", "t_end", "n"} <= windows.keys() or not np.all(windows["n"] > 0.0):
             return
@@ -239,7 +239,7 @@ class ResultReader:
             )
             run.step = float(f"{step:.6g}")
 
-    def _check_plan(self, windows: Mapping[str, Array], run: RunDocument) -> None:
+    def _check_plan(self, windows: Mapping[str, AnyArray], run: RunDocument) -> None:
         if not {"phase", "t_start", "t_end"} <= windows.keys():
             return
         plan = {row.phase: row for row in run.plan}
@@ -263,7 +263,7 @@ class ResultReader:
                     f"{wanted:.6g} {unit}; {hint}"
                 )
 
-    def _check_digits(self, windows: Mapping[str, Array], run: RunDocument) -> None:
+    def _check_digits(self, windows: Mapping[str, AnyArray], run: RunDocument) -> None:
         """Refuse ends of windows that rounding moves by much of a window; tell of less."""
         numbers = np.concatenate([c for n, c in windows.items() if n not in WHOLE])
         few = all(float(f"{x:.{DIGITS}g}") == x for x in numbers.tolist())
@@ -325,7 +325,7 @@ def check_parameters(result: ResultFile, bindings: Mapping[str, Binding], parame
     return len(found)
 
 
-def record_from_series(system: System, series: Mapping[str, Array], run: RunDocument | None = None) -> Record:
+def record_from_series(system: System, series: Mapping[str, AnyArray], run: RunDocument | None = None) -> Record:
     """Return the record of a run that another tool did.
 
     series: "slot.output" -> samples at every communication step, for the watched output and all columns of

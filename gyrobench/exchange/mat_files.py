@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import AnyArray
 from gyrobench.reading import LARGEST
 from gyrobench.record.csv_reader import DataError
 
-Array = np.ndarray[Any, Any]
 SEVEN_THREE = "MATLAB 7.3 (HDF5), which is not read; save it with save(..., '-v7')"
 MOST = 1 << 31  # bytes of the arrays together
 LAYOUT = ("Aclass", "name", "dataInfo", "data_1", "data_2")
@@ -37,7 +37,7 @@ def is_mat(begin: bytes) -> bool:
     return kind >= 0 and digits[0] < 5 and digits[1] == 0 and digits[3] < 3 and imaginary in (0, 1) and 0 < length < 256
 
 
-def read_mat(file: Path) -> tuple[dict[str, Array], dict[str, float]]:
+def read_mat(file: Path) -> tuple[dict[str, AnyArray], dict[str, float]]:
     """Return columns, and values that are constant, by name.  Raises DataError."""
     if file.stat().st_size > 8 * LARGEST:
         raise DataError(file, [f"larger than {8 * LARGEST >> 20} MB; save the series that a record needs as Parquet"])
@@ -57,9 +57,9 @@ def read_mat(file: Path) -> tuple[dict[str, Array], dict[str, float]]:
     return _arrays(content), {}
 
 
-def _arrays(content: Mapping[str, Any], prefix: str = "") -> dict[str, Array]:
+def _arrays(content: Mapping[str, Any], prefix: str = "") -> dict[str, AnyArray]:
     """Return vectors by name, those in structs as "struct.field"."""
-    columns: dict[str, Array] = {}
+    columns: dict[str, AnyArray] = {}
     for name, value in content.items():
         if not isinstance(value, np.ndarray) or value.size == 0:
             continue
@@ -71,7 +71,7 @@ def _arrays(content: Mapping[str, Any], prefix: str = "") -> dict[str, Array]:
     return columns
 
 
-def _trajectory(file: Path, content: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, float]]:
+def _trajectory(file: Path, content: Mapping[str, Any]) -> tuple[dict[str, AnyArray], dict[str, float]]:
     def wrong(what: str) -> DataError:
         return DataError(file, [f"the trajectories of a Modelica tool, but {what}"])
 
@@ -85,7 +85,7 @@ def _trajectory(file: Path, content: Mapping[str, Any]) -> tuple[dict[str, Array
     names = ["".join(str(c) for c in row).strip(" \0") for row in texts]
     if info.shape[0] != len(names) or info.shape[1] < 2 or info.dtype.kind not in "iuf":
         raise wrong("dataInfo does not have a row for each name")
-    columns: dict[str, Array] = {}
+    columns: dict[str, AnyArray] = {}
     constants: dict[str, float] = {}
     for k, name in enumerate(names):
         table, signed = int(info[k, 0]), int(info[k, 1])

@@ -12,15 +12,14 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import AnyArray
 from gyrobench.exchange.mat_files import SEVEN_THREE, is_mat, read_mat
 from gyrobench.record.csv_reader import Column, DataError, Head, read_head
 
-Array = np.ndarray[Any, Any]
-Block = dict[str, Array]
+Block = dict[str, AnyArray]
 ROWS = 1 << 16  # of a block
 TIME = ("time", "simulation_time", "tout", "t")
 LIBCOSIM = re.compile(r"(.+)_\d{8}_\d{6}_\d+\.csv")  # slot, date, time, microseconds
@@ -42,7 +41,7 @@ class ResultFile:
     constants: Mapping[str, float] = field(default_factory=dict)
 
 
-def open_result(source: Path | Array) -> ResultFile:
+def open_result(source: Path | AnyArray) -> ResultFile:
     """Return the series of a file, of a folder of libcosim, or of a structured array.  Raises DataError."""
     if isinstance(source, np.ndarray):
         return _of_array("the array", source)
@@ -151,7 +150,7 @@ def _rebatched(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 # ------------------------------------------------------------------------------------------------- binary formats
-def _of_columns(file: Path | str, columns: Mapping[str, Array], constants: Mapping[str, float]) -> ResultFile:
+def _of_columns(file: Path | str, columns: Mapping[str, AnyArray], constants: Mapping[str, float]) -> ResultFile:
     time = _time_of(file, list(columns))
     rows = len(columns[time])
     columns = {
@@ -160,7 +159,7 @@ def _of_columns(file: Path | str, columns: Mapping[str, Array], constants: Mappi
     return ResultFile(str(file), list(columns), time, lambda wanted: _parts(columns, wanted, rows), constants)
 
 
-def _parts(columns: Mapping[str, Array], wanted: Sequence[str], rows: int) -> Iterator[Block]:
+def _parts(columns: Mapping[str, AnyArray], wanted: Sequence[str], rows: int) -> Iterator[Block]:
     for first in range(0, rows, ROWS):
         yield {n: np.asarray(columns[n][first : first + ROWS]) for n in dict.fromkeys(wanted)}
 
@@ -173,12 +172,12 @@ def _of_npy(file: Path) -> ResultFile:
     return _of_array(str(file), array)
 
 
-def _of_array(name: str, array: Array) -> ResultFile:
+def _of_array(name: str, array: AnyArray) -> ResultFile:
     if array.dtype.names is None or array.ndim != 1:
         raise DataError(
             name, ["an array without names of columns; save the structured array that simulate_fmu returns"]
         )
-    columns: dict[str, Array] = {}
+    columns: dict[str, AnyArray] = {}
     for n in array.dtype.names:
         column = array[n]
         for element in np.ndindex(column.shape[1:]):  # an array variable of FMI 3

@@ -11,13 +11,12 @@ import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import Step, sampled_step
 
-Array = NDArray[np.float64]
 KEPT = 256  # parts at a point
 
 

@@ -26,8 +26,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.block import Block, block_of, step_of
@@ -38,7 +38,6 @@ from gyrobench.system.sockets import socket
 from gyrobench.system.values import flatten
 from gyrobench.system.wiring import Assembly, Connection
 
-Array = NDArray[np.float64]
 PASSES = 3  # along the wires, to find the operating point
 
 

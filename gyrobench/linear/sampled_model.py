@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.component import Component, ComponentError
 
-Array = NDArray[np.float64]
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
 MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the same one step later

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 MOST = 1 << 22  # means that are held for each column
 PART = 1 << 18  # samples that are filled in at a time
 

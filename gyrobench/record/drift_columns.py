@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import Column, DataError, Head, header_places, read_head
 from gyrobench.record.record import Record
 from gyrobench.record.time_series import read_blocks
 
-Array = NDArray[np.float64]
 Blocks = Iterator[dict[str, Array]]
 TIME, FLAG = "time", "flag"
 ROWS = 1 << 18  # of a block of a Parquet file

@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.block_means import Held
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import FLAG, RATE, TIME, Signal, Table, columns_of
 from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
 
-Array = NDArray[np.float64]
 GAP = 1.5  # steps
 CHUNK = 200  # samples whose median step is held against the usual one
 MIXED = 0.1  # of the step: a larger change of it is another sampling rate

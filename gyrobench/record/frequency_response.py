@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.run_document import LinearModel
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 SLOW = 1e-2  # rad/s: a pole nearer to the origin is an integrator of the model (an attitude, a time)
 TOLERANCE = 0.05  # relative, of a crossover against the requested one

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gyrobench.arrays import AnyArray
 from gyrobench.bench import UsageError
 from gyrobench.files import sha256, write_whole
 from gyrobench.notebook import Displayed, data_frame
@@ -27,7 +28,6 @@ from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocumen
 if TYPE_CHECKING:
     import pandas
 
-Array = np.ndarray[Any, Any]
 WHOLE = ("phase", "n", "flagged")  # integer columns
 SUFFIXES = (".parquet", ".csv")
 
@@ -40,7 +40,7 @@ def _have_parquet() -> bool:
     return True
 
 
-def write_table(stem: Path, columns: dict[str, Array]) -> Path:
+def write_table(stem: Path, columns: dict[str, AnyArray]) -> Path:
     """Write ``stem``.parquet, or ``stem``.csv without pyarrow; remove the other form; return the path."""
     parquet, text = stem.with_suffix(".parquet"), stem.with_suffix(".csv")
     if _have_parquet():
@@ -57,17 +57,17 @@ def write_table(stem: Path, columns: dict[str, Array]) -> Path:
     return text
 
 
-def _arrow(column: Array) -> Any:
+def _arrow(column: AnyArray) -> Any:
     """Return a column as Arrow has it.  pa.array() and pq.read_table() import pandas where it is there: 0.3 s."""
     import pyarrow as pa
 
     if column.dtype.kind not in "fiu":
         return pa.array(column)
     column = np.ascontiguousarray(column)
-    return pa.Array.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), [None, pa.py_buffer(column)])
+    return pa.AnyArray.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), [None, pa.py_buffer(column)])
 
 
-def _numpy(column: Any) -> Array:
+def _numpy(column: Any) -> AnyArray:
     """Return a column of Arrow's, as :func:`_arrow` takes one: to_numpy() imports pandas, too."""
     dtype = np.dtype(column.type.to_pandas_dtype())
     if dtype.kind not in "fiu" or column.null_count or not column.num_chunks:
@@ -76,7 +76,7 @@ def _numpy(column: Any) -> Array:
     return np.concatenate(list(parts))
 
 
-def _write_csv(header: list[str], columns: list[Array], path: Path) -> None:
+def _write_csv(header: list[str], columns: list[AnyArray], path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as f:
         writer = csv.writer(f)
         writer.writerow(header)
@@ -89,7 +89,7 @@ def remove_table(stem: Path) -> None:
         stem.with_suffix(suffix).unlink(missing_ok=True)
 
 
-def read_table(stem: Path) -> dict[str, Array] | None:
+def read_table(stem: Path) -> dict[str, AnyArray] | None:
     """Return the columns of ``stem``.parquet or ``stem``.csv; None if there is neither."""
     parquet, text = stem.with_suffix(".parquet"), stem.with_suffix(".csv")
     if parquet.exists():
@@ -117,8 +117,8 @@ class Record(Displayed):
     record.to_csv(folder)                                windows.csv and channels.csv, units in the header
     """
 
-    windows: dict[str, Array] = field(default_factory=dict)
-    channels: dict[str, Array] = field(default_factory=dict)
+    windows: dict[str, AnyArray] = field(default_factory=dict)
+    channels: dict[str, AnyArray] = field(default_factory=dict)
     run: RunDocument = field(default_factory=lambda: RunDocument())
     folder: Path | None = None
 
@@ -161,7 +161,7 @@ class Record(Displayed):
         state = "" if self.complete else ", incomplete"
         return f"<Record of {self.run.system}: {windows} windows, {signals} channels of {samples} samples{state}>"
 
-    def table(self, name: str) -> tuple[dict[str, Array], dict[str, str]]:
+    def table(self, name: str) -> tuple[dict[str, AnyArray], dict[str, str]]:
         """Return the columns of "windows" or "channels" and their SI units, "" where not known.  Raises UsageError."""
         tables = {"windows": (self.windows, self.run.window_units), "channels": (self.channels, self.run.units)}
         if name not in tables:
@@ -224,7 +224,7 @@ def _check_tables(folder: Path, run: RunDocument) -> None:
             raise RecordError(f"{file}: not a table of this record (run.json does not name it); remove it")
 
 
-def rows_to_columns(rows: list[Array], names: list[str], time: bool) -> dict[str, Array]:
+def rows_to_columns(rows: list[AnyArray], names: list[str], time: bool) -> dict[str, AnyArray]:
     """Return blocks of rows [t, columns...] as named columns; with ``time`` the first one is kept as "time"."""
     blocks = [r if r.ndim == 2 else r[None, :] for r in rows]
     table = np.concatenate(blocks) if blocks else np.empty((0, 1 + len(names)))

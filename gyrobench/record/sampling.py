@@ -16,11 +16,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 
-Array = NDArray[np.float64]
 LEAST = 200  # samples, below which nothing is said
 FLAT = 0.1  # from 1, of the ratio
 

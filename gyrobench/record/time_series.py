@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import Column, DataError, Head, check_utf8, header_places
 from gyrobench.record.sampling import Successive
 
-Array = NDArray[np.float64]
 Block = Mapping[str, Array]
 BLOCK = 1 << 20  # bytes of text read at a time
 DATE = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\s*\d{1,2}:\d{2}:")

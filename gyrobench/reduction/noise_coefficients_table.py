@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.noise_coefficients import JUST, fit
 from gyrobench.result import DriftTestResult
+from gyrobench.units import DPH
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 LEAST = 400  # windows of a long test
 #: coefficient -> unit of the report, SI of one of it, meaning
 TERMS: Mapping[str, tuple[str, float, str]] = {

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames
+from gyrobench import drift, frames, units
+from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import Remount
@@ -25,8 +25,6 @@ from gyrobench.reduction.run_metadata import Site, phases, remount_of, sizes
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Specification
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +130,7 @@ class RebalanceSetup(SiteSetup):
             "Drift ω_d in precession sign; for the sign of an indicated rate invert the sign of all coefficients.",
             "X, Y, Z = −f/g0 along the input, output and spin reference axes (sign of Hu 1981: a body axis that "
             "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
-            f"Torquer current: {sign}; k = {k * 1e-3 / drift.DPH:.6g} °/h/mA.",
+            f"Torquer current: {sign}; k = {k * 1e-3 / units.DPH:.6g} °/h/mA.",
         ]
 
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 
-Array = NDArray[np.float64]
 AXES = ("angle", "outer", "inner")
 SAME = 0.1  # of the mean motion of a window: angles that are the same
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean")

@@ -8,13 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units as printed
+from gyrobench.arrays import Array
 from gyrobench.report.numbers import superscript
 from gyrobench.report.style import CYCLE, SHADE, WIDE, axis_label, envelope, figure, span_labels, svg, time_axis
 
-Array = NDArray[np.float64]
 MOST = 6  # panels of a system that does not say which channels it shows
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.2)), (0, (2, 0.8)), (0, (6, 1, 1, 1)))
 

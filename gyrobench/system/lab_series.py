@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gyrobench import units
+from gyrobench.arrays import AnyArray
 from gyrobench.record import sampling
 from gyrobench.record.csv_reader import Column, DataError, Head, conditions
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
@@ -23,7 +24,6 @@ from gyrobench.system.plan import Phase
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
-Array = np.ndarray[Any, Any]
 FLAG = Column("flag", "1", "other than 0: the sample is suspect", required=False)
 
 
@@ -74,7 +74,7 @@ class _Names:
 def windows_of_series(
     system: System, file: Path, head: Head, columns: Sequence[Column], said: Mapping[str, str],
     attitudes: Mapping[str, str] | None,
-) -> tuple[dict[str, Array], dict[str, str], list[str]]:  # fmt: skip
+) -> tuple[dict[str, AnyArray], dict[str, str], list[str]]:  # fmt: skip
     """Return the windows, the comments ``phase N`` (those found by the motion too), and warnings: what was left out,
     samples that may be aliased.
 
@@ -121,10 +121,10 @@ def windows_of_series(
 
 
 def _as_windows(
-    series: Mapping[str, Array], names: _Names, keys: Sequence[str], columns: Sequence[Column]
-) -> dict[str, Array]:
+    series: Mapping[str, AnyArray], names: _Names, keys: Sequence[str], columns: Sequence[Column]
+) -> dict[str, AnyArray]:
     """Return the columns named as those of a file of windows, in their order."""
-    made: dict[str, Array] = {k: series[k].astype(np.int64) for k in keys}
+    made: dict[str, AnyArray] = {k: series[k].astype(np.int64) for k in keys}
     for column, name in {**names.signals, **names.optional}.items():
         if name in series:
             there = np.isfinite(series[name])
@@ -181,8 +181,8 @@ def _recognise(
 
 
 def _numbered(
-    block: dict[str, Array], stretches: Sequence[table_motion.Stretch], phases: Sequence[Phase], step: float
-) -> dict[str, Array]:
+    block: dict[str, AnyArray], stretches: Sequence[table_motion.Stretch], phases: Sequence[Phase], step: float
+) -> dict[str, AnyArray]:
     """Add the column phase: of each stretch what is left after settling, which began up to a step before it."""
     t, phase = block["time"], np.zeros_like(block["time"])
     for k, (s, p) in enumerate(zip(stretches, phases, strict=True), 1):

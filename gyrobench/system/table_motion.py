@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.system.plan import Phase
 
-Array = NDArray[np.float64]
 POSITION = math.radians(1.0)  # a position may be this far from the plan's
 RATE = 0.1  # a rate may differ by this part of the plan's; at rest: less than this part of the lowest
 REMAINDER = 0.02  # at rest between positions: moves less than this part of their distance in a cell

@@ -7,10 +7,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gyrobench.arrays import Array
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.exchange.external_record import ResultReader, check_parameters, find_series
-from gyrobench.exchange.result_files import Array, ResultFile, open_result
+from gyrobench.exchange.result_files import ResultFile, open_result
 from gyrobench.exchange.ssp_export import recorded
 from gyrobench.files import sha256
 from gyrobench.record.record import Record

@@ -11,11 +11,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gyrobench.arrays import Array
 
 from . import geometry
-
-Array = NDArray[np.float64]
 
 
 def design(sensor: int, alpha: Array, gamma: float) -> Array:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
@@ -19,7 +19,6 @@ from gyrobench.system.visits import format_time
 
 from . import geometry
 
-Array = NDArray[np.float64]
 POINTS = range(16, 25)
 
 

@@ -13,11 +13,10 @@ misalignment eta of each; a_O = d a_I/d alpha for every sensor.  [ACCEL-MODEL, T
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 
-Array = NDArray[np.float64]
 SENSORS = (1, 2, 3, 4)
 BASE = np.array([frames.E, frames.U, np.cross(frames.E, frames.U)])  # rows: head axes in (E, N, U) at angle 0
 TERMS = ("K_F", "K_I", "K_O", "K_IO", "K_II")

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -39,7 +39,6 @@ from . import chain, geometry
 
 __all__ = ["FourSetup", "ReductionError", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
 ARCSEC, G0 = units.factor("arcsec"), frames.G0
 MEANING = {
     "K_F": ("bias", "V"),

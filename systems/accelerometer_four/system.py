@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import SITE
-from gyrobench.system.families.table_test import Array, TableTest, on_table, sampled
+from gyrobench.system.families.table_test import TableTest, on_table, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows

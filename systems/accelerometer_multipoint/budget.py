@@ -15,8 +15,8 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation.effects import SINES, Effect
 from gyrobench.reduction.estimation.findings import Findings
@@ -25,7 +25,6 @@ from . import closed
 from .geometry import specific_force
 from .model import Model, Setup, Visits
 
-Array = NDArray[np.float64]
 STEP = 1e-4
 
 

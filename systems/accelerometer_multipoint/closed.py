@@ -23,11 +23,11 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gyrobench.arrays import Array
 
 from .geometry import CROSS
 
-Array = NDArray[np.float64]
 EQUAL = 1e-5  # rad, largest departure from equal spacing
 LEAST = 7  # equally spaced positions for three harmonics  [ACC-MINPTS]
 

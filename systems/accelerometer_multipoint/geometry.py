@@ -16,11 +16,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gyrobench import frames
-
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
 
 BASE = np.array([frames.E, frames.U, np.cross(frames.E, frames.U)])  # rows: table axes in (E, N, U) at angle 0
 FACES: dict[str, Array] = {  # rows: accelerometer axes x, y, z in table axes

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.reduction import setups
 
 from . import closed
 from .geometry import CROSS, specific_force
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

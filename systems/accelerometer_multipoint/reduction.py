@@ -18,8 +18,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
@@ -31,6 +31,7 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import ARCSEC
 
 from . import closed
 from .budget import effects
@@ -40,8 +41,7 @@ from .refusals import four_positions, position_problems, record_problems, setup_
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
-UG, ARCSEC = 1e-6, math.pi / 648000.0
+UG = 1e-6
 KS = ("k0", "k1", "k2", "k3", "k4", "k5")
 MEANING = {
     "k0": ("bias", "µg", UG),

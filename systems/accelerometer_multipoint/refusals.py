@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 
 from .closed import spacing
 from .geometry import FACES
@@ -17,7 +18,6 @@ from .geometry import FACES
 if TYPE_CHECKING:
     from .model import Setup
 
-Array = NDArray[np.float64]
 ZERO = math.radians(1.0)  # largest theta_0
 STILL = 1e-6  # rad, largest motion within a window
 

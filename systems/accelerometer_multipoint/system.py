@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
-from gyrobench.system.families.table_test import Array, TableTest, on_table
+from gyrobench.system.families.table_test import TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot

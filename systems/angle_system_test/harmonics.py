@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 LEAST = 0.2  # of 2: below it an order is not separated
 PITCH_ORDER, POLE_PAIRS = 12, 360
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import Column, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -18,7 +19,6 @@ from gyrobench.system.system import MeasuredData, System
 
 from .readings import in_turn, middle
 
-Array = NDArray[np.float64]
 ERU = units.factor("ERU")
 METHODS = ("two_heads", "reversal")
 FAR = 0.1  # rad: a reading does not follow the position

@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.window_checks import ReductionError
 
 from .harmonics import waves
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 POSITIONS, MEANS, FIRST, TURNED = "two readings", "mean less reference", "first turn", "scale turned"
 RATES, GATES, DEGREES = "at rates", "gates", "degrees"

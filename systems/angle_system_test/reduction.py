@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -42,7 +43,6 @@ from .readings import (
     assemble,
 )
 
-Array = NDArray[np.float64]
 ARCSEC, ERU = units.factor("arcsec"), frames.EARTH_RATE
 COLUMNS = (
     *("phase", "t_start", "t_end", "reading", "t_reading", "reading_2", "reference", "t_reference"),

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial.transform import Rotation
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification, Test
+from gyrobench.units import DPH
 
-Array = NDArray[np.float64]
-DEG, DPH = math.pi / 180.0, math.pi / 648000.0
+DEG = math.pi / 180.0
 SHOWN = 800  # points of a drawn line
 CALM = ("rest", "rocking")  # phases in which the models of the filters hold: no acceleration of the vehicle before
 LEVEL = 1e-3  # p below which a filter is called inconsistent

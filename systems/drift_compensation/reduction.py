@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -17,11 +18,10 @@ from gyrobench.reduction.loops.estimator_result import Measures
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification, Test
+from gyrobench.units import ARCSEC, DPH
 
 from .closed_form import Expected, Model, expected
 
-Array = NDArray[np.float64]
-ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 SHOWN = 400  # points of a drawn line
 ENOUGH = 1e-3  # p below which a filter is called inconsistent
 

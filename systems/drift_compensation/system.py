@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from gyrobench.component.blocks.gyro import DEG_H
 from gyrobench.system.connectors import Socket, inp, limit_flag, out
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
+from gyrobench.units import ARCSEC
 
 TABLE = Socket(
     "DriftingTable",
@@ -41,7 +41,6 @@ COMPENSATOR = Socket(
         limit_flag("saturated", "1 while the torquer is at its limit"),
     ),
 )
-ARCSEC = math.pi / 648000.0
 
 
 class DriftCompensation(System):

@@ -8,7 +8,6 @@ from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.record import sampling
@@ -20,12 +19,11 @@ from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficients, slopes
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.report.numbers import write_number, write_p
+from gyrobench.units import ARCSEC, DPH
 
 from .preparation import Prepared
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
-DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
 STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
 WILD = 20.0  # standard deviations
 COUNTS = 3.0  # steps of the values' resolution within which a sample is not called wild

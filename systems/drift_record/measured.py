@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record import sampling
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import (
@@ -29,7 +29,6 @@ from gyrobench.reduction.series.quantization import angle_quantization, quantiza
 from gyrobench.system.lab_record import TEXTS, measured_run
 from gyrobench.system.system import MeasuredData, System
 
-Array = NDArray[np.float64]
 ATTITUDE = "at rest"
 EXACT = 1e-15  # of an angle: to which decimals of a file are exact
 LONG = 1 << 22  # missing samples from which on a deviation does not reach across a gap

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench import units
 from gyrobench.reduction.series.autoregression import Autoregression
 from gyrobench.reduction.series.drift_model import DriftModel
 from gyrobench.reduction.series.stationarity import RunsTest
+from gyrobench.units import DPH
 
 from .description import Json, number, table
 
-DPH = units.factor("deg/h")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 RAN = {"runs": "runs of block statistics", "up_down": "runs up and down", "trend": "trend", "unit_root": "unit root",
        "normality": "normality"}  # fmt: skip

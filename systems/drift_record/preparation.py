@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import frames, units
+from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -19,11 +19,10 @@ from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Line
 from gyrobench.reduction.setups import attitude_of
 from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.units import DPH
 
 from .regressors import Regression, block_means_of, regress
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 WHOLE = 0.5  # part of the samples that a stretch without a gap must hold
 LEAST = 512  # samples of it
 OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged"}

@@ -20,9 +20,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -36,19 +35,18 @@ from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoeffic
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
+from gyrobench.units import DPH
 
 from . import description, model_tables
 from .preparation import LEAST, WHOLE, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
 
-Array = NDArray[np.float64]
 SHOWN, SHOWN_LAGS = 1500, 40  # intervals of the record, lags that are drawn
 RESIDUAL = (
     "The deviations are those of the rate without what lines and other columns explain: where these fits have taken "
     "slow drift along, the deviations are too small at long averaging times."
 )
-DPH = units.factor("deg/h")
 FIELDS = ("tau", "deviation", "low", "high", "edf", "count", "exponent")
 KINDS = {"allan": "Allan", "modified": "modified Allan", "hadamard": "Hadamard"}
 

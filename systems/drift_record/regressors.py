@@ -18,8 +18,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.drift_columns import harmonic_names
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.series.checks import SeriesError
@@ -28,7 +28,6 @@ from gyrobench.reduction.series.orthogonal import orthonormal
 from gyrobench.reduction.series.stepwise import backward, joint_test
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 ALPHA = 0.05
 BLOCKS, MOST_BLOCKS = 200, 4000  # means that are fitted; more where a column moves within them
 LEFT = 0.9  # part of the rms of a column that its means keep

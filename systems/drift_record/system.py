@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench import units
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
+from gyrobench.units import ARCSEC, DPH
 
 from .measured import ATTITUDE as FACE
 from .measured import MEASURED
 
-DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
 #: of the gyro unless set: B 0.005 deg/h, K 0.03 deg/h/sqrt(h), Q 0.02 arcsec; N is that of the part
 FLICKER, WALK, ANGLE = 0.005 * DPH, 0.03 * DPH / 60.0, 0.02 * ARCSEC
 

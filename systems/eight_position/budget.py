@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Windows, sources
 from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 
 from . import model, positions
 
-Array = NDArray[np.float64]
 SMALL = 1e-5  # rad
 STATED = "positive where the stated one is too large"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

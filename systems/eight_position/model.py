@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.findings import Estimates, Findings
@@ -35,7 +36,6 @@ from gyrobench.reduction.window_checks import ReductionError
 
 from . import positions
 
-Array = NDArray[np.float64]
 MEANING = {
     "k_x": "scale factor of the torquer about x",
     "k_y": "scale factor of the torquer about y",

@@ -19,11 +19,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import E, N, U
-
-Array = NDArray[np.float64]
 
 _AXES = {1: (E, N), 2: (N, -E), 3: (-E, -N), 4: (-N, E), 5: (U, E), 6: (-E, U), 7: (-U, -E), 8: (E, -U)}
 #: position -> rows x, y, z in E, N, U

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
@@ -31,14 +32,13 @@ from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import budget, model, positions, refusals, tables
 from .model import Setup
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 AVERAGED = 4  # cycles from which on the readings of a position are averaged first
 SOURCES = [
     "TEST-8POS, POS8-MODEL+REDUCE; Hu 1981, eq. 3-1..3-11, corrected by E17, E18",

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.system.values import InvalidValueError
 
 from . import positions
 
-Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 LATITUDE, NEAR = 85.0 * DEG, 80.0 * DEG
 ATTITUDE = 1.0 * DEG  # largest error of a position

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import repeatability as repeats
 from gyrobench.result import DriftTestResult
 
 from . import model, positions
 
-Array = NDArray[np.float64]
 Table = dict[str, Any]
 DPH, KU = units.factor("deg/h"), units.factor("deg/h/mA")
 ORDER = ("k_x", "k_y", "R_x", "u_x", "u_zx", "R_y", "u_y", "u_zy")  # as in Table 3-1

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
@@ -21,7 +21,6 @@ from gyrobench.result import LoopResult, Response, Specification
 
 from .benchmarks import BENCHMARKS
 
-Array = NDArray[np.float64]
 SHOWN, COMPARED = 1000, 1000  # intervals of the whole time, and readings of the close-up
 
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift, frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
@@ -35,7 +35,6 @@ from gyrobench.result import DriftTestResult, Specification
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
 DPH, DEG = units.factor("deg/h"), units.factor("deg")
 LEAST = 8  # readings
 STATED = "positive where the stated one is too large"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_measures import Gate
@@ -16,7 +16,6 @@ from gyrobench.result import LoopResult, Response, Specification
 
 from .field import FieldError, field_at
 
-Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 
 

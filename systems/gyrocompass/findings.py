@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
@@ -14,7 +14,6 @@ from gyrobench.reduction.loops.loop_result import LoopFindings
 from .linear import LinearCompass, Steaming
 from .oscillation import Oscillation, fit
 
-Array = NDArray[np.float64]
 SAMPLES = 160  # of a fit
 KNOWN = 0.05  # relative, of poles between courses, where a phase holds no swing of its own
 

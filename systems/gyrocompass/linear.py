@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate, optimize
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 
-Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 

@@ -14,12 +14,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, optimize, special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-Array = NDArray[np.float64]
 LEAST = 30  # samples
 ROUNDS = 3  # of noise and of poles in turn
 BENT = 0.05  # uncertainty of the settled value by a trend, of its change over the samples

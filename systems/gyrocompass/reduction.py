@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.uncertainty import withhold
 from gyrobench.reduction.loops.loop_measures import Gate
@@ -18,7 +18,6 @@ from .findings import KNOWN, CompassFindings, error, means, steaming, wrap, wrap
 from .linear import LinearCompass, Steaming
 from .oscillation import Oscillation
 
-Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 SHOWN = 600  # points of a figure
 SMALL = 4.0 * DEG  # swing that is fitted

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
 from gyrobench.campaign.design.visit_protocol import gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
@@ -18,8 +18,6 @@ from gyrobench.system.visits import format_time
 
 from . import plans
 from .reduction import method_of
-
-Array = NDArray[np.float64]
 
 
 def _options(method: str, length: float) -> Mapping[str, Any]:

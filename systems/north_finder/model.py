@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 LEAST = {"two": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
 STEEP = math.radians(85.0)
 

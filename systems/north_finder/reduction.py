@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -39,7 +39,6 @@ from .model import Place, Problem, attitude, of_windows, tilted_heading
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
 DPH, DEG, ARCMIN = units.factor("deg/h"), units.factor("deg"), units.factor("arcmin")
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure

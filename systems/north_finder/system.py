@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.system.families.moving_bases import BASES
 from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
-from gyrobench.system.families.table_test import Array, TableTest, on_table, sampled
+from gyrobench.system.families.table_test import TableTest, on_table, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows

@@ -24,9 +24,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
@@ -39,14 +39,12 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import SiteSetup, attitude_of
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import ARCSEC, DPH
 
 from . import refusals
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
-ARCSEC = units.factor("arcsec")
 LEAST = 9  # readings
 
 

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
-from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
+from gyrobench.system.families.table_test import FACE, ON_TABLE, OpenLoopTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option

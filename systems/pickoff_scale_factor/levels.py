@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.result import Coefficient, Series
 
-Array = NDArray[np.float64]
 ARCMIN = units.factor("arcmin")
 
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift as drift_model
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
@@ -44,7 +44,6 @@ from .refusals import drift_problems, record_problems
 
 __all__ = ["PickoffSetup", "ReductionError", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
 DPH, ARCSEC, ARCMIN = units.factor("deg/h"), units.factor("arcsec"), units.factor("arcmin")
 EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
 SMALL = 1e-5  # rad, step of the sensitivities to the angle readings

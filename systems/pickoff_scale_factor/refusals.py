@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import units
+from gyrobench.arrays import Array
+from gyrobench.units import ARCSEC, DPH
 
-Array = NDArray[np.float64]
-DPH, ARCSEC = units.factor("deg/h"), units.factor("arcsec")
 POINTS = 10
 SHARE = 0.01  # of the span, largest drift angle
 STILL = 1e-6  # rad, largest motion within a reading

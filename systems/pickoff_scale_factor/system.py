@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
-from gyrobench.system.families.table_test import FACE, ON_TABLE, Array, OpenLoopTest
+from gyrobench.system.families.table_test import FACE, ON_TABLE, OpenLoopTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 

@@ -20,11 +20,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 
-Array = NDArray[np.float64]
 DPH, UG = units.factor("deg/h"), 9.80665e-6
 LEVEL, COARSE, TURN, SECOND, TO_NORTH, FAST, SLOW = range(1, 8)
 STAGES = ("levelling", "coarse heading", "half a turn", "second window", "turn to north", "gyrocompass, fast",

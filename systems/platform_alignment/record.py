@@ -6,16 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 
 from . import plans
 
-Array = NDArray[np.float64]
 ARCMIN, ARCSEC, DEG = units.factor("arcmin"), units.factor("arcsec"), math.pi / 180.0
 K = uncertainty.NORMAL
 

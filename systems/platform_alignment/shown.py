@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.result import BudgetLine, Response
 
 from . import plans
-from .record import ARCMIN, ARCSEC, DEG, Array, K, Run
+from .record import ARCMIN, ARCSEC, DEG, K, Run
 
 GOALS = (60.0, 30.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5)  # ′
 SHOWN = 700  # points of a drawn line

@@ -10,11 +10,11 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, over_time, rate_servo_limits, spans
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC, DPH
 
-DPH = math.pi / 180.0 / 3600.0
 AXES = ("pitch", "roll", "azimuth")
 REST = "drift"  # label of the drift hold; the other phases without excitation are legs
 STEEP = math.sin(5.0 * DEG)  # |cos(pitch)| below which the fourth gimbal has no authority

@@ -18,15 +18,14 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench.record.frequency_response import model_response
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import base_ways
+from gyrobench.units import ARCSEC
 
-Array = NDArray[np.float64]
 LOWEST = 0.02  # Hz, where the integral over the noise begins: the running mean takes what is slower
 WRONG = 0.2  # relative: a measured ride that differs more from the computed one is not the linear model's
 TITLE = "Error budget of the ride, by source"

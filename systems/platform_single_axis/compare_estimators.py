@@ -18,13 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 import gyrobench as gb
+from gyrobench.arrays import Array
 from gyrobench.component.blocks import wavelet_bank
-
-Array = NDArray[np.float64]
 
 NAMES = (
     "none", "moving_average", "alpha_beta_gamma", "kalman_ar", "kalman_rate", "kalman_robust", "sage_husa", "wavelet",

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue, rms
 from gyrobench.reduction.loops.loop_measures import Gate, Point, phasor, segment_phasors
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.open_loop import open_loop_point
+from gyrobench.units import ARCSEC
 
 from .contest import BENDING, GAP_PERIOD, LINE, RIDES, WILD_PERIOD
 
-Array = NDArray[np.float64]
 ANGLE, VOLTAGE = "platform.attitude", "stabilizer.v"
 PERIODS = {RIDES["gaps"]: GAP_PERIOD, RIDES["wild"]: WILD_PERIOD}
 #: coefficient -> what the smallest is the choice for

@@ -9,9 +9,10 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_measures import Gate, Point
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins, told
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC
 
 from .budget import ride_budget
 from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, period

@@ -33,14 +33,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import model_response
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.rides import still
 from gyrobench.reduction.series.gyro_noise import slow_density
+from gyrobench.units import ARCSEC
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 AXES = (1, 2, 3)
 GYROS = ("gyro_x", "gyro_y", "gyro_z")

@@ -14,10 +14,11 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import Gate, Point, cross_axis, response
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins, told
 from gyrobench.reduction.loops.rides import share, still
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC
 
 from .budget import budget
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -45,7 +46,6 @@ from gyrobench.system.families.table_test import FACE, ON_TABLE
 from .measured import REST, TURNING
 from .truth import NAMES, true_values
 
-Array = NDArray[np.float64]
 DPH, ARCSEC, MA = units.factor("deg/h"), units.factor("arcsec"), 1e-3
 NO_QUANTUM = 1e-10  # A, below this readings are not quantized but rounded
 LEVEL = np.eye(3)  # table axes in (E, N, U)

@@ -18,13 +18,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.servo_regression import BOOK
 from gyrobench.reduction.estimation import regression
 
 from .refusals import turned
 
-Array = NDArray[np.float64]
 WHOLE = 356.0  # degrees that count as a whole turn
 Amplitudes = Mapping[str, float]
 

@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR
 from gyrobench.record.record import Record
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import OnRequest, Slot
+from gyrobench.units import DPH
 
-Array = NDArray[np.float64]
 SLOT = "coefficients"
-DPH = units.factor("deg/h")
 LEFT = "Live estimate: coefficients, had the test been left then"
 NAMES = ("A0", "A1", "B1", "A2", "B2")  # mean, cos, sin, cos 2, sin 2
 VALUES, DEVIATIONS = ([f"live_{kind}_{n}" for n in NAMES] for kind in ("value", "sd"))

@@ -13,15 +13,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.run_metadata import Site
 
-Array = NDArray[np.float64]
 FOUR = ("D_F", "D_I", "D_S", "D_IS")
 ROUTES = ("dwells", "equal", "combination")
 Mixed = tuple[tuple[str, int, int], ...]  # other coefficient, sign and power of its factor gamma sin(phi)

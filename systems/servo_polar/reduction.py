@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, units
+from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
@@ -32,12 +33,11 @@ from gyrobench.reduction.noise_coefficients_table import noise_coefficients_tabl
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import closed, live, refusals
 from .model import Model
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
 

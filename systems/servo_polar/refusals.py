@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, on_servo_table
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.run_metadata import Site
+from gyrobench.units import DPH
 
 from .model import ROUTES, Model
-
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 
 
 def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, NDArray[np.int_]]:

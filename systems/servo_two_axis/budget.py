@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.run_metadata import Site
 
 from .windows import Track
 
-Array = NDArray[np.float64]
 SMALL = 1e-5  # rad, size of the perturbations
 SIZES = ("u_axis", "u_square", "u_mount", "u_angle1", "u_angle2", "u_wobble", "u_time")
 AXES = ("outer", "inner")

@@ -17,7 +17,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 #: the coefficients of Hu 1981 of a line -> ours, and its sign against ours  [CROSS-MAP]
 BOOK = {
     "x": {

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
 from gyrobench.campaign.design.visit_protocol import Noise, gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
@@ -31,7 +32,6 @@ from gyrobench.system.visits import format_time
 from . import geometry, refusals
 from .windows import NODES, Track
 
-Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
 WINDOWS = 24  # least number in a mount
 SHORTEST, LONGEST, TIMES = 1.0 / 96.0, 2.0, 32  # times in a mount that are compared, in days of the simulated Earth

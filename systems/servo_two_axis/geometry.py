@@ -14,12 +14,12 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.attitudes import CROSS, EAST, NORTH, POLE, UP, axes
 
-Array = NDArray[np.float64]
 #: number in appendix 2 of Hu 1981, ch. 3, -> directions of X (outer axis) and Y (inner axis); Z = X cross Y
 MOUNTS = {
     1: (EAST, NORTH), 2: (EAST, UP), 3: (NORTH, EAST), 4: (NORTH, UP),

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, units
+from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
@@ -35,14 +36,13 @@ from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import budget, closed, geometry, refusals
 from .windows import ANGLES, Track, track
 
 __all__ = ["ReductionError", "from_record"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
 
 

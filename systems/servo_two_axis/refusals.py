@@ -11,17 +11,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
 from gyrobench.system.families.servo_expectation import capture_problems
+from gyrobench.units import DPH
 
 from . import geometry
 from .geometry import Rates
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 WARN, MOST, MOST_SINGLE = 100.0, 1e3, 1e4  # of the condition; a single mount is warned of, not refused [SERVO2-RANK]
 TILTED = math.cos(math.radians(30.0))  # least cosine of the gyro's x and y axes to those of the plate
 STEP_MAX = 1e-3  # s, the largest internal step of table_servo

@@ -15,12 +15,12 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift.window_regressors import reading_spline
 from gyrobench.reduction.run_metadata import Site
 
 from . import geometry
 
-Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(8)
 WEIGHTS = WEIGHTS / 2.0
 #: value at the middle of a polynomial through the nodes

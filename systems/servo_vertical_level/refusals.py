@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP, VERTICAL
 from gyrobench.reduction.drift import servo_regression
 
-Array = NDArray[np.float64]
 LIMIT = math.radians(1.0)  # of the angle in a level attitude
 #: in the order in which they are kept while the attitudes tell more
 TERMS = ("D_F", "D_I", "D_S", "D_O", "D_II", "D_SS")

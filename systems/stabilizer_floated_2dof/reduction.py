@@ -16,10 +16,11 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, told
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC
 
 from .closed import Loop
 from .system import loop_of

@@ -15,12 +15,12 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, told
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC, DPH
 
-DPH = math.pi / 648000.0
 BASE = "motion.angle[1]"  # of the base, to be added to what the gyro reads against it
 EQUATION = (
     "J_x dot.double(alpha) + C_x dot(alpha) + H dot(beta) = -K_m beta + M_x, quad "

@@ -6,20 +6,20 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import ReductionError
 from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import DPH, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import isolation, margins, told
 from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.units import DPH
 
 from . import closed
 from .closed import Axis
 
-Array = NDArray[np.float64]
 ARCMIN = math.pi / 10800.0
 SHOWN = 500  # points of a drawn curve
 EQUATIONS = {

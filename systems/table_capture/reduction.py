@@ -7,14 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
-from gyrobench.reduction.loops.loop_result import ARCSEC, LoopFindings
+from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.units import ARCSEC
 
-Array = NDArray[np.float64]
 SERVO = 2.0  # phase of the plan
 LATE = 0.2  # share of the servo phase that must be at null
 SHOWN = 600  # points of a figure

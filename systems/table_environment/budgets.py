@@ -15,11 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 
-Array = NDArray[np.float64]
 KINDS = ("normal", "uniform", "fixed")
 DRAWS = 20_000
 SMALL = math.radians(1.0)

@@ -26,13 +26,12 @@ from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity,
 from gyrobench.reduction.simulated_errors import simulated_errors
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
+from gyrobench.units import ARCSEC, DPH
 
 from . import budgets
 from .budgets import Line, Total
 from .set_up import effects
 
-DPH = units.factor("deg/h")
-ARCSEC = units.factor("arcsec")
 ERU = units.EARTH_RATE
 #: name -> column, meaning, unit of the sensitivity, option with the level, its unit
 CAUSES = {

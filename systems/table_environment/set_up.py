@@ -20,14 +20,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.run_metadata import Site
 
-Array = NDArray[np.float64]
 STATED = "relative, positive where the stated one is too large"
 
 

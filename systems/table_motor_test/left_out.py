@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, special
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 LEVEL = 1e-3  # of all terms together
 
 

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import integrate, linalg, optimize, special
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
 from gyrobench.reduction.estimation.uncertainty import NORMAL, withhold
@@ -37,7 +37,6 @@ from gyrobench.result import LoopResult, Specification
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
 
-Array = NDArray[np.float64]
 SEEN = 10.0  # standard errors: a current that is read at all
 WOUND = "J w' = K_t i + M_h - D w - M_C \"sgn\"(w) + M_0 - c x, quad U = R i + K_e w + L i'"
 SQUARE_LAW = 'J w\' = K V abs(V) + M_h - D w - M_C "sgn"(w) + M_0 - c x, quad V = U - K_e w'

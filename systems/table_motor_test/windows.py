@@ -10,11 +10,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 
-Array = NDArray[np.float64]
 ANGLE, VOLTAGE, CURRENT = "reader.angle_read", "voltmeter.reading", "ammeter.reading"
 PIECE = 0.05  # s, length T
 SLOW = 0.05  # rad/s: a window with a slower end may have been at rest, where friction is what the load is

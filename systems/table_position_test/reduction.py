@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata
@@ -29,9 +30,8 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, LoopResult, Series, Specification
+from gyrobench.units import ARCSEC
 
-Array = NDArray[np.float64]
-ARCSEC = math.pi / 648000.0
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
 JITTER = 0.005  # of the variance of a rounding is left where the loop moves the table by a count while it is read
 HEADS = ("reader", "reader_2")

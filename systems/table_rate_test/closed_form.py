@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 X, W, M, LAG, LAG_RATE, W_LAST, U_LAST, E_LAST, DEMAND = range(9)
 NEEDED = ("body.axis_J", "controller.law_J", "controller.period", "controller.law_p", "controller.law_J_ff",
           "controller.law_M_max", "controller.law_delay")  # fmt: skip

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction import run_metadata
@@ -18,11 +18,11 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Coefficient, LoopResult, Response, Specification
+from gyrobench.units import ARCSEC
 
 from .closed_form import SampledLoop
 
-Array = NDArray[np.float64]
-ERU, ARCSEC = 7.2921159e-5, math.pi / 648000.0
+ERU = 7.2921159e-5
 PPM = 1e-6
 SHOWN = 1500  # points of a drawn line
 RAMP = 0.6  # s of a change of rate that is drawn

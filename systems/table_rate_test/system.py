@@ -12,12 +12,12 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import InvalidValueError
+from gyrobench.units import ARCSEC
 
 from .closed_form import SampledLoop
 from .measured import MEASURED
 
 ERU = 7.2921159e-5  # rad/s
-ARCSEC = math.pi / 648000.0
 RATES = "0.01 0.1 1 10 100 999.99 1999.9"  # ERU
 NOMINAL = 0.18 * ARCSEC  # rad, count for which the times of the plan are made
 

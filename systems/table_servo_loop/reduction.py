@@ -12,10 +12,11 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops import margins
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
-from gyrobench.reduction.loops.loop_result import ARCSEC, NAMES, LoopFindings
+from gyrobench.reduction.loops.loop_result import NAMES, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.result import LoopResult, Specification
+from gyrobench.units import ARCSEC
 
 from .closed import ServoLoop, loop_of, sense_torque
 

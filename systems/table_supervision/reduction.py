@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
@@ -23,7 +24,6 @@ from gyrobench.result import Coefficient, LoopResult, Specification
 
 from .system import KINDS
 
-Array = NDArray[np.float64]
 #: kind -> item of the monitor that names it, reason of the supervisor that does; 0: it does not see it
 NAMED = {1: (3, 1), 2: (4, 2), 3: (2, 3), 4: (0, 4), 5: (1, 0), 6: (9, 0), 7: (10, 0), 8: (11, 0)}
 COLUMNS = (

@@ -16,13 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import SINES, Effect
 from gyrobench.reduction.estimation.findings import Findings
 
-Array = NDArray[np.float64]
 AMMETER, ZERO = "ammeter", "zero of the ammeter"
 
 

@@ -11,17 +11,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
 
 from .precession import Precession
 
-Array = NDArray[np.float64]
 DPH, KU, UNIT = units.factor("deg/h"), units.factor("deg/h/mA"), "°/h/mA"
 Number = tuple[float, float, float]  # value, standard uncertainty of type A, degrees of freedom
 

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 
-Array = NDArray[np.float64]
 SHARED = 0.5  # of the range turned, least part that both senses must cover
 
 

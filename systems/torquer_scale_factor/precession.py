@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import frames, units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
@@ -30,7 +30,6 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 
 from .budget import Sizes, effects
 
-Array = NDArray[np.float64]
 DEGREE = 4
 
 

@@ -22,10 +22,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.estimation import regression, uncertainty
@@ -41,7 +41,6 @@ from .budget import AMMETER, Sizes
 from .estimates import DPH, KU, UNIT, Estimates, Number, of_table, of_windows
 from .precession import Precession, precession
 
-Array = NDArray[np.float64]
 MA = 1e-3
 RANDOM = "random drift, angle readings and current, with the linearity error"
 

@@ -8,12 +8,11 @@ what comes out against what a torquer can be.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import p_text
 
-Array = NDArray[np.float64]
 LEVEL = 1e-3  # probability that a clean table is contradicted by chance, of each kind
 LARGEST = 0.2  # departure of a K_n from the others, of a torquer
 ASYMMETRY = 0.05  # (k+ - k-)/(k+ + k-), of a torquer

@@ -13,16 +13,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.findings import Findings
 
 from .setup import TumbleSetup
 
-Array = NDArray[np.float64]
 TILT = "ε_IO"  # the tilt of the input axis towards the output axis as an unknown
 TOWARDS_OUTPUT = "input axis towards output axis"
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)

@@ -19,13 +19,11 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0, tumble_faces
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.regression import Fit
-
-Array = NDArray[np.float64]
 
 
 def formulas(

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
 from gyrobench.campaign.design.visit_protocol import GUARD, gyro_noise, gyro_unseen
 from gyrobench.frames import EARTH_RATE
@@ -23,7 +23,6 @@ from gyrobench.system.visits import format_time
 from . import budget
 from .setup import TumbleSetup, setup_of
 
-Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
 TURNS = (1, 2, 4)
 SHARES = (0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # of a dwell against the turning of a mount

@@ -21,7 +21,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
@@ -35,6 +36,7 @@ from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import budget, closed
 from .refusals import plan_problems, refusals, setup_problems
@@ -42,8 +44,6 @@ from .setup import TumbleSetup, setup_of
 
 __all__ = ["ReductionError", "TumbleSetup", "from_record", "reduce", "refusals", "setup_of"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 TILT_MEANING = "misalignment of the input axis towards the output axis"
 FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
 

@@ -6,15 +6,13 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.setups import scale_factor_problems
 
 from .setup import TumbleSetup
-
-Array = NDArray[np.float64]
 
 
 def refusals(latitude: float) -> list[str]:

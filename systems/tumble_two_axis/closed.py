@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 
 from .geometry import frequencies
 
-Array = NDArray[np.float64]
 #: name, amplitude and what it must equal: (letter, j, sign, letter, j); B_5 and B_9 must be 0
 TIES = (
     ("A", 4, 1, "A", 12), ("A", 1, -1, "A", 10), ("A", 7, -1, "A", 11), ("B", 1, 1, "B", 10), ("B", 7, 1, "B", 11),

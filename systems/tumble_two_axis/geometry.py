@@ -12,12 +12,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
 
-Array = NDArray[np.float64]
 NAMES = drift.terms(9)
 ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")  # columns of a record
 #: Gyro axes I, O, S (rows) in plate axes: I = inner axis, O = outer axis at zero.

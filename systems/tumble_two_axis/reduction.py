@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
@@ -34,14 +34,13 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import closed, geometry
 from .geometry import ANGLES
 
 __all__ = ["ReductionError", "TwoAxisSetup", "from_record", "reduce"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 COLUMNS = ("phase", "t_start", "t_end", *ANGLES, "mean")
 STILL = 1e-4  # rad that a table may move while the current is averaged (20 arcsec: encoders jitter)
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
-from gyrobench.system.families.table_test import TWO_AXES, Array, sampled, surroundings
+from gyrobench.system.families.table_test import TWO_AXES, sampled, surroundings
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError

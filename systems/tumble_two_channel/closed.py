@@ -19,13 +19,12 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.regression import Fit
 
-Array = NDArray[np.float64]
 Amplitudes = Mapping[str, float]
 #: symbol of Hu 1981 -> coefficient of the bench and its sign
 BOOK = {

@@ -7,19 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
 from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.units import DPH
 
 from . import geometry
 from .setup import OTHER, TwoChannelSetup, design
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 

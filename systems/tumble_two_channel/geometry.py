@@ -17,12 +17,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
 
-Array = NDArray[np.float64]
 MODELS = ("simple", "nine")
 TILT = {"x": "ε_xz", "y": "ε_yz"}  # tilt of a measuring axis towards the spin axis, as an unknown
 AXIS = {"x": 0, "y": 1}

@@ -17,9 +17,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames, units
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
 from gyrobench.reduction.drift import window_regressors
@@ -34,6 +34,7 @@ from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.merge_channels import merge
 from gyrobench.reduction.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
+from gyrobench.units import DPH
 
 from . import closed, evidence, geometry
 from .refusals import plan_problems, setup_problems
@@ -41,8 +42,6 @@ from .setup import OTHER, TwoChannelSetup, design, setup_of
 
 __all__ = ["ReductionError", "TwoChannelSetup", "from_record", "reduce", "setup_of"]
 
-Array = NDArray[np.float64]
-DPH = units.factor("deg/h")
 COLUMNS = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean_x", "mean_y")
 
 

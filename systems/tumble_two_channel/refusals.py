@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.setups import scale_factor_problems
 
 from . import geometry
 
 if TYPE_CHECKING:
     from .setup import TwoChannelSetup
-
-Array = NDArray[np.float64]
 
 
 def setup_problems(s: TwoChannelSetup) -> list[str]:

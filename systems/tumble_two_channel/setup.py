@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction import run_metadata, setups
 from gyrobench.reduction.drift import window_regressors
@@ -17,7 +17,6 @@ from gyrobench.result import Specification
 
 from . import geometry
 
-Array = NDArray[np.float64]
 OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about the other axis
 
 

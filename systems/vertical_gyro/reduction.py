@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import Gate
@@ -16,7 +16,6 @@ from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.result import LoopResult, Response, Specification
 
-Array = NDArray[np.float64]
 ARCMIN, DEG = math.pi / 10800.0, math.pi / 180.0
 G0 = 9.80665
 SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks

@@ -22,11 +22,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 
-Array = NDArray[np.float64]
 CRITERIA = ("minimax", "A", "D")
 
 

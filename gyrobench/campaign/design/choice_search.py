@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
 from gyrobench.campaign.design.plan_runs import (
@@ -25,7 +24,6 @@ from gyrobench.campaign.design.plan_runs import (
 )
 from gyrobench.errors import GyrobenchError
 
-Array = NDArray[np.float64]
 ROUNDS, RUN = 5, 3  # runs of a choice; choices of known windows that are run
 CLOSE = 0.005  # of the wanted uncertainties
 FINAL, ROUGH = 160, 40  # draws of a prediction

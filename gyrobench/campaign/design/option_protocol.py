@@ -6,14 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.visit_protocol import Noise
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.campaign.design.predicted_uncertainty import predict
 from gyrobench.engine.session import Session
@@ -23,8 +23,6 @@ from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.report.result_json import plain
 from gyrobench.system.system import System
-
-Array = NDArray[np.float64]
 
 
 class DesignError(GyrobenchError):

@@ -16,15 +16,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.campaign.design.visit_protocol import Noise
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise import mean_variance
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-Array = NDArray[np.float64]
 DRAWS = 160
 #: a fit of many rows under many set-up effects is slow, and its u varies little: rows times combinations of effects up
 #: to which all draws are made, and the fewest

@@ -19,8 +19,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
 from gyrobench.campaign.design import plan_search
 from gyrobench.campaign.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
@@ -47,7 +47,6 @@ from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.system import System
 
-Array = NDArray[np.float64]
 CANDIDATES = 2  # plans that are run until their dwell is settled
 CLOSE = 0.01  # of the dwell
 ROUNDS = 12  # runs in which the dwell of a plan is found

@@ -16,13 +16,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import System
 
-Array = NDArray[np.float64]
 GUARD = 0.011  # s that sequencer and sampler take beside move, settling and dwell
 
 

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 LEAST = 10  # windows
 
 

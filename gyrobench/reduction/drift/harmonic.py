@@ -13,11 +13,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import Fit, RegressionError, least_squares
-
-Array = NDArray[np.float64]
 
 
 def columns(start: Array, end: Array, orders: Sequence[int]) -> tuple[Array, tuple[str, ...]]:

@@ -18,14 +18,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
-
-Array = NDArray[np.float64]
-
 
 SOURCES = (
     "asymmetry of the pulse currents",

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
+from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
@@ -33,7 +34,6 @@ from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.run_metadata import Site
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations
 #: least share of a misalignment's effect that the coefficients must leave: what a little turning in dwells shows of it

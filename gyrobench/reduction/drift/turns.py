@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
 
-Array = NDArray[np.float64]
 AGREE = "turn to turn"
 
 

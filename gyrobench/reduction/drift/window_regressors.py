@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
 
 from gyrobench import drift
+from gyrobench.arrays import Array
 from gyrobench.frames import G0, pole
 from gyrobench.reduction.run_metadata import Site
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-Array = NDArray[np.float64]
 NODES, _WEIGHTS = leggauss(12)
 _WEIGHTS = _WEIGHTS / 2.0
 

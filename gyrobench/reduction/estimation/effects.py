@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) = 12(2) arcsec'"
 _ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")
 REMOUNT = "drift from mount to mount"

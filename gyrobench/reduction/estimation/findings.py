@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import residual_series as series
@@ -25,7 +26,6 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
 from gyrobench.result import Series, Test
 
-Array = NDArray[np.float64]
 RAW = "Ljung-Box, residuals"
 CONTRADICTED = 0.01  # probability that the tests of a clean record speak against its model or noise
 

@@ -18,8 +18,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked, outliers, regression, uncertainty
 from gyrobench.reduction.estimation.effects import (
     TOUCHED,
@@ -37,7 +37,6 @@ from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specifica
 
 __all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "observed_fits", "plus_minus"]
 
-Array = NDArray[np.float64]
 CONDITION = 100.0  # above this a warning names the weakest direction
 _observers: ContextVar[tuple[list[tuple[Findings, Array]], ...]] = ContextVar("observers", default=())
 

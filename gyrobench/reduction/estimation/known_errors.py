@@ -27,7 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 FAINT = 1e-3  # of the residuals' rms: directions of E that are smaller move no weight
 LOUD = 30.0  # of it, too: larger ones count as so large; no weight differs, and their square would swallow the noise
 ROUNDING = 1e-9  # of the largest: what the coefficients leave of a column that is made of them

@@ -13,8 +13,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation.findings import Estimates, Findings, Group
 from gyrobench.reduction.estimation.nuisances import Candidate
@@ -22,7 +22,6 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 IDEAL = 1e-6  # residuals over data, below which there is no noise
 
 

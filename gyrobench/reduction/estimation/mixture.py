@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-Array = NDArray[np.float64]
 DOUBT = 0.05  # probability from which on a verdict must hold if the noise is slow drift, too
 RESOLVED = 1e-8  # of a variance: what is left of it beside a known part is lost in rounding below
 LIGHT = 1e-5  # candidates this much less likely than the likeliest are left out of the intervals

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
 from gyrobench.reduction.estimation.normal_equations import NormalEquations
@@ -34,7 +35,6 @@ from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-Array = NDArray[np.float64]
 JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
 SLOW = 0.125  # of the record: longer correlation times are slow drift, which a record tells from white noise badly
 

@@ -35,9 +35,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 SIZE = 1.5
 FAVOUR = 5.0
 SCATTERS = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)

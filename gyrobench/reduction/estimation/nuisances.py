@@ -16,16 +16,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisance_states
 from gyrobench.reduction.estimation.nuisance_states import Block
+from gyrobench.units import DPH
 
-Array = NDArray[np.float64]
 MOUNTS = "standard deviation of the drift from mount to mount"
 TURN_ONS = "standard deviation of the drift from turn-on to turn-on"
-DPH = units.factor("deg/h")
 FREEDOM = 10  # degrees of freedom that must be left beside all candidates
 CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
 VISIBLE = 1e-3  # least share of a column's length at right angles to the others

@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 LEVEL = 0.01  # probability that any row of a clean record is named
 MOST = 0.2  # share of the rows that may be outliers
 FEWEST = 10  # degrees of freedom that must be left

@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, special
 
+from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
-
-Array = NDArray[np.float64]
 
 
 class RegressionError(GyrobenchError, ValueError):

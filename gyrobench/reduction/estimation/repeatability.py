@@ -17,14 +17,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import nuisances, uncertainty
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

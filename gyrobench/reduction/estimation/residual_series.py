@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import deviations
 
-Array = NDArray[np.float64]
 DRAWS = 500  # of white noise, for the distribution of Q
 LARGE = 2000  # values beyond which a fit does not change it
 

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.loops import estimator_metrics
-from gyrobench.reduction.loops.estimator_metrics import Array, Consistency, UncertainValue
+from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Coefficient, Test
 

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import Response
 
-Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 SHOWN = 700  # points of a drawn line
 

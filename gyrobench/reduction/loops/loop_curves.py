@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Gate, Point
 from gyrobench.result import Response
 
-Array = NDArray[np.float64]
 CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
 

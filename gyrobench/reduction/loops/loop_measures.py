@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.window_checks import ReductionError
 
-Array = NDArray[np.float64]
 SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
 AHEAD = 4.0  # at most, of what is moved in the last tenth, is still to come

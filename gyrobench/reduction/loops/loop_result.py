@@ -15,9 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
@@ -49,9 +47,8 @@ from gyrobench.reduction.loops.open_loop import (
 )
 from gyrobench.reduction.loops.validity import why_void
 from gyrobench.result import Coefficient, LoopResult, Response, Specification
+from gyrobench.units import DPH
 
-Array = NDArray[np.float64]
-ARCSEC = DPH = math.pi / 648000.0  # rad, and rad/s
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Point
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DENSE = 2000  # points of a response on which margins are looked for
 

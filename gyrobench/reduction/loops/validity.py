@@ -17,13 +17,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.record.run_document import LinearModels
 from gyrobench.reduction.loops.loop_measures import Gate
 
-Array = NDArray[np.float64]
 PARTS = 8  # of a hold
 GROWTH = 10.0  # last eighth over first one; the rms of stationary noise does not change by that
 LINE = 0.5  # share of the variance that one sine must explain in every eighth

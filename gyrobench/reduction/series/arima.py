@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 from gyrobench.reduction.series.differencing import OverDifferencing, over_differencing
 
 LONGEST = 100_000

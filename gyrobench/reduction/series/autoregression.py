@@ -24,8 +24,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy import linalg, signal
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 Method = Literal["burg", "yule-walker"]
 RECORDS, FEWEST, LENGTH = 500, 30, 2000  # of the simulation of bias and variance

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
-
-Array = NDArray[np.float64]
 
 
 class SeriesError(GyrobenchError, ValueError):

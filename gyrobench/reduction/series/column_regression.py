@@ -22,9 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.mixture import LIGHT, Mixture
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, SeriesError
+from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.noise_spectra import folded
 
 FAINTEST, STRONGEST = 0.3, 10.0  # power of the slow part over the white one, at the first and at the last ordinate

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 BLOCK = 1 << 18  # values transformed at a time: memory is bounded, the sum is that of the whole record
 

@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 KINDS = ("allan", "modified", "hadamard")
 STARTS = 1024  # longest m that is computed from every start
 FULL, COARSE = 16384, 4096  # cells processed at a time, at the sampling interval and above

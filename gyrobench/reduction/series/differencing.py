@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 MOST_NEGATIVE = -0.45  # lag-one correlation from which on a series counts as over-differenced
 NEAR_MINUS_ONE = 0.05  # of its moving-average coefficient

@@ -28,10 +28,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.series import gauss_markov as markov
 from gyrobench.reduction.series.arima import Arima310, arima310
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar
-from gyrobench.reduction.series.checks import Array, SeriesError, block_means, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, block_means, checked, checked_step
 from gyrobench.reduction.series.correlation import Correlation, correlation
 from gyrobench.reduction.series.gauss_markov import GaussMarkov
 from gyrobench.reduction.series.lines import Lines, find_lines

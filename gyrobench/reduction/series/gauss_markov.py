@@ -22,9 +22,10 @@ import numpy as np
 from scipy import fft, optimize, signal
 from scipy.linalg import lapack
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, checked, checked_step
+from gyrobench.reduction.series.checks import checked, checked_step
 
 GAIN = 3.0  # of log likelihood against white noise, for two more parameters
 SHORTEST, LONGEST = 0.2, 10.0  # correlation time sought: of samples, of the record

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gyrobench.arrays import Array
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
-Array = NDArray[np.float64]
 FLICKER_TAU = 1e5  # s, or the length of the record: flicker begins at 0.46 / tau, below its first frequency
 FLICKER_LOW, FLICKER_HIGH = 0.46, 0.055 * 4.0**11  # over tau: from and to where the PSD is that of flicker
 ANGLE_TAU = 0.2  # of a sample: errors of readings one sample apart are correlated by e^-5 < 1 %

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.series.checks import Array, SeriesError, checked
+from gyrobench.reduction.series.checks import SeriesError, checked
 
 
 @dataclass(frozen=True)

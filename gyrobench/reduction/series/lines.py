@@ -27,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage, special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 LEVEL = 1e-3  # false-alarm probability of a whole record
 HALF = 64  # bins of the level on either side

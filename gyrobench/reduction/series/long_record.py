@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.series.noise_spectra import FastPowers
 
-Array = NDArray[np.float64]
 WHOLE = 1 << 21  # samples kept as they are
 BLOCK = 512
 LEAST = 8  # blocks of a part whose transform is used

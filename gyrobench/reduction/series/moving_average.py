@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import Array, SeriesError, checked
+from gyrobench.reduction.series.checks import SeriesError, checked
 
 LONGEST = 100_000
 FEWEST = 50  # values a coefficient

@@ -24,16 +24,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize, special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.long_record import SHORTEST, Condensed, LongRecord
 from gyrobench.reduction.series.noise_likelihood import Likelihood
 from gyrobench.reduction.series.noise_spectra import folded
 
-Array = NDArray[np.float64]
 STEPS = 100  # of the search for a maximum, at most
 DEPARTS = 0.001  # probability from which on a departure from the model is reported
 RAMPS = 13  # values of K over which the interval of the ramp is a mixture

@@ -11,13 +11,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, optimize, special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.series import noise_spectra
 from gyrobench.reduction.series.long_record import Condensed
 
-Array = NDArray[np.float64]
 LOW = 16  # first ordinates of each parity whose correlations by flicker are kept
 BAND = 1.5  # frequencies of a band of the check
 FLOOR = 1e-14  # of a variance, where that of the first differences of the record is 1

@@ -19,10 +19,10 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, special
 
-Array = NDArray[np.float64]
+from gyrobench.arrays import Array
+
 WIDTH = 0.02  # of a bin of ordinates, of the logarithm of k
 
 

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from scipy import special, stats
 
-from gyrobench.reduction.series.checks import Array, SeriesError, block_means, checked
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, block_means, checked
 from gyrobench.reduction.series.correlation import autocovariance
 
 LEAST_EFFECTIVE = 30.0  # independent values below which nothing is decided

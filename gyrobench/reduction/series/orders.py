@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked
 
 
 def criteria(variance: float, n: int, p: int, q: int = 0) -> tuple[float, float, float]:

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import RegressionError
-from gyrobench.reduction.series.checks import Array
 
 DEPENDENT = 1e-10  # of a column's length: what is left of it beside the earlier ones
 

@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 LOOKED_AT = 100_000  # values the step is found from
 DITHER = 0.5  # noise of a sample over the step from which on rounding is a white error

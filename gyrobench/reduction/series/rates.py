@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 AMBIGUOUS = 0.9  # of half a turn between samples: unwrapping may then be a turn wrong
 LEAST_GAIN = 0.1

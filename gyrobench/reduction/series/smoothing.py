@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked_step
 from gyrobench.reduction.series.gauss_markov import GaussMarkov
 
 

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from scipy import fft, special
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 FIRST = 3  # bin: below it, the straight line has taken its share
 

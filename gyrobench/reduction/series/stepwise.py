@@ -22,6 +22,7 @@ from typing import TypeVar
 import numpy as np
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import (
     Fit,
     RegressionError,
@@ -29,7 +30,6 @@ from gyrobench.reduction.estimation.regression import (
     generalized_least_squares,
     least_squares,
 )
-from gyrobench.reduction.series.checks import Array
 
 F = TypeVar("F")
 

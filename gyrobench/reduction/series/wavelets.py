@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from gyrobench.reduction.series.checks import Array, SeriesError, checked, checked_step
+from gyrobench.arrays import Array
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 # those of the part (gyrobench.component.blocks.wavelet_bank), which a reduction does not import; a test compares
 WAVELETS = ("haar", "db4", "sym4", "coif4", "bior1.5")

@@ -22,12 +22,11 @@ from dataclasses import dataclass, field
 from itertools import combinations as pairs_of
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-Array = NDArray[np.float64]
 LEVEL = 0.05  # of the consistency test
 
 

@@ -15,13 +15,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift, units
+from gyrobench.arrays import Array
 from gyrobench.reduction.suite.consistency import MethodValue
 from gyrobench.result import Coefficient, DriftTestResult
 
-Array = NDArray[np.float64]
 MODEL = {n for names in (drift.NAMES, *drift.NAMES_2DOF.values()) for n in names}
 SAME = 2e-5  # combinations closer than this are one: four seconds of arc in an attitude
 CLOSE = 1e-9  # a quantity is seen when it is put together to this fraction

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gyrobench import drift, frames, units
+from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
+from gyrobench.units import ARCSEC
 
-Array = NDArray[np.float64]
-ARCSEC = units.factor("arcsec")
 POINTS = 720  # of a turn at which its rate is looked at
 
 
@@ -93,7 +93,7 @@ def capture_problems(
     if not where or away[where] <= limit:
         return []
     return [
-        f"{where}: {table} would not capture the gyro: a drift of {rates[where][0] / drift.DPH:.3g} °/h and friction "
+        f"{where}: {table} would not capture the gyro: a drift of {rates[where][0] / units.DPH:.3g} °/h and friction "
         f"keep it {away[where] / ARCSEC:.3g}″ from null, {table}.capture_angle = {limit / ARCSEC:.3g}″ is allowed; "
         f"raise {table}.capture_rate, or lower {table}.capture_damping"
     ]

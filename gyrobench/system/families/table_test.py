@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.system.connectors import Socket
 from gyrobench.system.families.option_groups import GYRO_NOISES, SITE
 from gyrobench.system.families.physical_form import physical_drift
@@ -16,7 +17,6 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import OnRequest, Option, Slot, System, Windows
 
-Array = NDArray[np.float64]
 FACE = "input axis along the table axis"
 #: gyro axes I, O, S (rows) in table axes: I = z_T, O = x_T, S = y_T
 ON_TABLE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))

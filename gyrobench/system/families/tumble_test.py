@@ -7,8 +7,9 @@ from abc import abstractmethod
 from typing import Any, ClassVar
 
 from gyrobench import frames
+from gyrobench.arrays import Array
 from gyrobench.system.configurable import Option
-from gyrobench.system.families.table_test import Array, TableTest
+from gyrobench.system.families.table_test import TableTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import System
 

@@ -1,0 +1,11 @@
+"""The one name for an array of double precision numbers; shapes stand in the docstrings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+AnyArray = NDArray[Any]  # columns of a record: numbers, counts, labels
