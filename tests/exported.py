@@ -15,7 +15,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import prepare, recorded
 from gyrobench.record.record import Record
-from gyrobench.reduction.step_effect import step_effects
+from gyrobench.reduction.estimation.step_effect import step_effects
 from gyrobench.result import Coefficient, Result
 from gyrobench.system.system import System, load_system
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.campaign.measures import Json, Measures, numbers, quantities
-from gyrobench.reduction.ranking import LEVEL, adjusted
+from gyrobench.reduction.suite.ranking import LEVEL, adjusted
 
 Codes = NDArray[np.intp]
 

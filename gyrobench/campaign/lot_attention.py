@@ -19,7 +19,7 @@ from gyrobench.result import NO_VERDICT
 
 DOUBTFUL = ("void", "inconclusive")
 COMMON = 0.5  # share of the results from which on a warning is one of the lot
-HANDLING = "Handling error"  # opens the warning of gyrobench.reduction.handling_errors
+HANDLING = "Handling error"  # opens the warning of gyrobench.reduction.diagnosis.handling_errors
 
 
 def pattern(warning: str) -> str:

@@ -12,8 +12,8 @@ from gyrobench.campaign.intervals import tolerance_interval
 from gyrobench.campaign.lot_attention import common_warnings, contradictions, instruments
 from gyrobench.campaign.lot_outliers import LEVEL, robust_outliers
 from gyrobench.campaign.measures import Json, Measures, numbers
-from gyrobench.reduction.ranking import LEVEL as CHANGE_LEVEL
-from gyrobench.reduction.ranking import adjusted
+from gyrobench.reduction.suite.ranking import LEVEL as CHANGE_LEVEL
+from gyrobench.reduction.suite.ranking import adjusted
 
 MEDIAN_RANGE = 0.9538725524  # median of |x1 - x2| of two normal values over their sigma
 SIGMAS = 3.0

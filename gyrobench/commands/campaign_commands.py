@@ -187,9 +187,6 @@ def design(
       gyrobench design tumble_two_axis --time 1h --criterion A --set @noise.toml
       gyrobench design drift_test_suite --set tests="tumble_single_axis tumble_two_axis" --want D_I=0.001deg/h/g
     """
-    from gyrobench.campaign.design.plan_runs import DesignedTest
-    from gyrobench.campaign.design.shortest_test import design_test
-    from gyrobench.campaign.design.suite_design import DesignedSuite, design_suite
     from gyrobench.commands.arguments import (
         load_with_values,
         parse_assignments,
@@ -197,6 +194,9 @@ def design(
         parse_swaps,
         parse_time,
     )
+    from gyrobench.design.plan_runs import DesignedTest
+    from gyrobench.design.shortest_test import design_test
+    from gyrobench.design.suite_design import DesignedSuite, design_suite
     from gyrobench.system.suite import Suite
 
     settings = parse_settings(values)

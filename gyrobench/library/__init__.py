@@ -37,7 +37,7 @@ from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
 
 if TYPE_CHECKING:
-    from gyrobench.campaign.design.plan_runs import DesignedTest
+    from gyrobench.design.plan_runs import DesignedTest
 
 __all__ = [
     "Comparison",
@@ -150,7 +150,7 @@ def design(
     runs in which the prediction is counted.  values, options, parts, maps: as of :func:`load`.  ``print`` shows the
     plan as a command.  Raises errors of type GyrobenchError.
     """
-    from gyrobench.campaign.design.shortest_test import design_test
+    from gyrobench.design.shortest_test import design_test
     from gyrobench.library.experiment import mapping_files, time_of
 
     given = {**(values or {}), **options}

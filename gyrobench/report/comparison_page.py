@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.reduction.ranking import difference
+from gyrobench.reduction.suite.ranking import difference
 from gyrobench.report import comparison_summary, plots, ranking_section, replicates, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.reduction.step_effect import step_text
+from gyrobench.reduction.estimation.step_effect import step_text
 from gyrobench.report import budget_figure, plots
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.ranking import Candidate, rank
+from gyrobench.reduction.suite.ranking import Candidate, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 
 Json = dict[str, Any]
@@ -37,8 +37,8 @@ def ranking_by(docs: Sequence[Json], name: str) -> Json:
     """Return ``{"name", "unit", "meaning", "order": [{"run", "place", "value", "u", "over_best", "apart",
     "probability"}], "void": [{"run", "reason"}]}``; {} where fewer than two runs can be ordered.
 
-    place, probability: see :mod:`gyrobench.reduction.ranking`.  apart: whether the run begins a rank of its own; None
-    for the first of all.  void: runs without a value of the measure, or with the verdict void; they have no rank.
+    place, probability: see :mod:`gyrobench.reduction.suite.ranking`.  apart: whether the run begins a rank of its own;
+    None for the first of all.  void: runs without a value of the measure, or with the verdict void; they have no rank.
     """
     ranked = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
     void = [

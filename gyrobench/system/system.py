@@ -136,7 +136,7 @@ class System(Configurable):
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
     reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result
-    #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.campaign.design
+    #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read

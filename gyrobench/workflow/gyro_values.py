@@ -13,9 +13,9 @@ from gyrobench.component import Parameter
 from gyrobench.files import write_whole
 from gyrobench.packaging import load_part
 from gyrobench.record.record import Record
-from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.gyro_noise import FLICKER_HIGH, FLICKER_LOW, gyro_noise
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
+from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient, Result
 
 NEEDED = ("white", "flicker", "flicker_tau", "walk", "ramp", "quantization", "quantization_tau")

@@ -170,7 +170,7 @@ def check_step(
     import time
 
     from gyrobench.engine.session import RunInterrupted
-    from gyrobench.reduction.step_effect import step_effects
+    from gyrobench.reduction.estimation.step_effect import step_effects
 
     bindings = session.assembly.bindings
     known = {f"{slot}.{name}" for slot, binding in bindings.items() for name in binding.parameters}

@@ -12,8 +12,8 @@ from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
+from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.reduction.loops.loop_summary import renew
-from gyrobench.reduction.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System
@@ -40,9 +40,9 @@ def reduce_run(
 ) -> Result:
     """Return the result of the system's own reduction, with the run as provenance.
 
-    step_check: what the communication step does, to be part of u; see gyrobench.reduction.step_effect.
+    step_check: what the communication step does, to be part of u; see gyrobench.reduction.estimation.step_effect.
     """
-    from gyrobench.reduction.step_effect import apply_step
+    from gyrobench.reduction.estimation.step_effect import apply_step
     from gyrobench.system.wiring import parse_wires
 
     result = system.reduce(record, limits)

@@ -22,7 +22,7 @@ from gyrobench.record.run_document import (
     package_versions,
     read_run,
 )
-from gyrobench.reduction.truth_check import check_truth, set_values
+from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.report import FORMATS
 from gyrobench.result import DriftTestResult, SuiteResult
 from gyrobench.system.suite import Suite

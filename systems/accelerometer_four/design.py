@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
+from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.campaign.design.visit_protocol import Channel, Noise, VisitProtocol, phases_of
+from gyrobench.design.visit_protocol import Channel, Noise, VisitProtocol, phases_of
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 

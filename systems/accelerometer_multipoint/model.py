@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.reduction import setups
+from gyrobench.reduction.setup import setups
 
 from . import closed
 from .geometry import CROSS, specific_force

@@ -23,13 +23,14 @@ from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import ARCSEC
 
@@ -65,8 +66,7 @@ SOURCES = [
 
 
 def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
-    """Coefficients with uncertainties from the windows of a record (columns as in gyrobench.reduction.window_checks,
-    SI).
+    """Coefficients with uncertainties from the windows of a record (columns as in setup.window_checks, SI).
 
     Raises ReductionError with everything that is wrong with setup or record.
     """

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 from .harmonics import waves
 

@@ -20,11 +20,11 @@ from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import harmonics

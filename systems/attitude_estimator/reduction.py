@@ -16,7 +16,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification, Test
 from gyrobench.units import DPH
 

@@ -11,12 +11,12 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import Measures
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification, Test
 from gyrobench.units import ARCSEC, DPH
 

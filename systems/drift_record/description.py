@@ -13,10 +13,10 @@ from gyrobench import units
 from gyrobench.record import sampling
 from gyrobench.record.drift_columns import ANGLE, harmonic_names
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficients, slopes
+from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.units import ARCSEC, DPH

@@ -13,12 +13,12 @@ from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Line
-from gyrobench.reduction.setups import attitude_of
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import attitude_of
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 
 from .regressors import Regression, block_means_of, regress

@@ -24,16 +24,16 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.long_record import SHORTEST
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
 from gyrobench.units import DPH
 

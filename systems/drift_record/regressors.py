@@ -26,7 +26,7 @@ from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.column_regression import SeriesFit, SeriesRegression
 from gyrobench.reduction.series.orthogonal import orthonormal
 from gyrobench.reduction.series.stepwise import backward, joint_test
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 ALPHA = 0.05
 BLOCKS, MOST_BLOCKS = 200, 4000  # means that are fitted; more where a column moves within them

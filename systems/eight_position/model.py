@@ -31,8 +31,8 @@ from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.estimation.findings import Estimates, Findings
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setups import SiteSetup
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import positions
 

@@ -21,16 +21,17 @@ from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, repeatability, residual_series
 from gyrobench.reduction.estimation.effects import with_set_up
 from gyrobench.reduction.estimation.findings import Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.nuisances import Candidate
-from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 from gyrobench.units import DPH
 

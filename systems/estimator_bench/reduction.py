@@ -11,12 +11,12 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.loops import estimator_result
 from gyrobench.reduction.loops.estimator_result import Measures, Signals
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification
 
 from .benchmarks import BENCHMARKS

@@ -21,16 +21,17 @@ from gyrobench import drift, frames, units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import nuisances, repeatability
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setups import SiteSetup, attitude_of, scale_factor_problems
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]

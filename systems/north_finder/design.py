@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
-from gyrobench.campaign.design.visit_protocol import gyro_noise, gyro_unseen
+from gyrobench.design.option_protocol import Choice, OptionProtocol
+from gyrobench.design.visit_protocol import gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.system.system import System

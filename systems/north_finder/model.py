@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = {"two": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
 STEEP = math.radians(85.0)

@@ -23,15 +23,15 @@ from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import nuisances, uncertainty
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setups import SiteSetup
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 
 from . import plans

@@ -29,15 +29,16 @@ from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setups import SiteSetup, attitude_of
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import ARCSEC, DPH
 

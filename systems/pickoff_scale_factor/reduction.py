@@ -27,7 +27,7 @@ from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
@@ -35,8 +35,9 @@ from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setups import Setup
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
 from .levels import Levels

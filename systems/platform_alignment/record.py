@@ -11,7 +11,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import plans
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.result import Coefficient, LoopResult, Specification
 
 from . import plans, shown

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR
 from gyrobench.record.record import Record
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import OnRequest, Slot
 from gyrobench.units import DPH

@@ -19,7 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 
 FOUR = ("D_F", "D_I", "D_S", "D_IS")
 ROUTES = ("dwells", "equal", "combination")

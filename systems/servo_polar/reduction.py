@@ -22,16 +22,17 @@ from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.record.record import Record
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift import composite, harmonic, servo_regression
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.simulated_errors import simulated_errors
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
+from gyrobench.reduction.setup import run_metadata, setups
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import DPH
 

@@ -14,7 +14,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, on_servo_table
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.units import DPH
 
 from .model import ROUTES, Model

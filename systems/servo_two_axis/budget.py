@@ -17,7 +17,7 @@ from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 
 from .windows import Track
 

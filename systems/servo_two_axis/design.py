@@ -21,11 +21,11 @@ from scipy.interpolate import CubicSpline
 
 from gyrobench import drift
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
-from gyrobench.campaign.design.visit_protocol import Noise, gyro_noise, gyro_unseen
+from gyrobench.design.option_protocol import Choice, OptionProtocol
+from gyrobench.design.visit_protocol import Noise, gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 

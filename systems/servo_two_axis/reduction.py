@@ -23,18 +23,19 @@ from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata, setups
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.simulated_errors import simulated_errors
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata, setups
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import DPH
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.window_regressors import reading_spline
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 
 from . import geometry
 

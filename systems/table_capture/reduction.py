@@ -12,7 +12,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import LoopResult, Response, Specification
 from gyrobench.units import ARCSEC
 

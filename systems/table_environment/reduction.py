@@ -19,12 +19,12 @@ import numpy as np
 from gyrobench import frames, units
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
-from gyrobench.reduction.simulated_errors import simulated_errors
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 from gyrobench.units import ARCSEC, DPH
 

@@ -25,7 +25,7 @@ from scipy.interpolate import CubicSpline
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 
 STATED = "relative, positive where the stated one is too large"
 

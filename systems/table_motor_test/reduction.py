@@ -31,7 +31,7 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL, withhold
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import LoopResult, Specification
 
 from . import left_out

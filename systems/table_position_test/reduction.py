@@ -25,10 +25,10 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, LoopResult, Series, Specification
 from gyrobench.units import ARCSEC
 

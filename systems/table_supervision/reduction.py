@@ -17,9 +17,9 @@ from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, LoopResult, Specification
 
 from .system import KINDS

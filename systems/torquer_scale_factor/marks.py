@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 
 SHARED = 0.5  # of the range turned, least part that both senses must cover
 

@@ -27,13 +27,14 @@ from scipy import special
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.estimation.effects import Effect, correction_table, simulated_table, standard_changes
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import budget_lines, changes_by_source
-from gyrobench.reduction.simulated_errors import simulated_errors
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
 from . import marks, row_checks

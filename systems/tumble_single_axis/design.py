@@ -11,8 +11,8 @@ import numpy as np
 
 from gyrobench import drift
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
-from gyrobench.campaign.design.visit_protocol import GUARD, gyro_noise, gyro_unseen
+from gyrobench.design.option_protocol import Choice, OptionProtocol
+from gyrobench.design.visit_protocol import GUARD, gyro_noise, gyro_unseen
 from gyrobench.frames import EARTH_RATE
 from gyrobench.record.record import Record
 from gyrobench.reduction.drift.window_regressors import Turning

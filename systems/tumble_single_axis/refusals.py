@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.setups import scale_factor_problems
+from gyrobench.reduction.setup.setups import scale_factor_problems
 
 from .setup import TumbleSetup
 

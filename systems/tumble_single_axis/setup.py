@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata, setups
 from gyrobench.reduction.drift.pulses import Pulses
+from gyrobench.reduction.setup import run_metadata, setups
 from gyrobench.result import Specification
 
 

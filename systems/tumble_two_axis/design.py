@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.campaign.design.visit_protocol import Channel, VisitProtocol, gyro_noise, gyro_unseen, phases_of
+from gyrobench.design.visit_protocol import Channel, VisitProtocol, gyro_noise, gyro_unseen, phases_of
 from gyrobench.record.record import Record
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 

@@ -22,7 +22,7 @@ from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, with_set_up
@@ -31,8 +31,9 @@ from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setups import RebalanceSetup, scale_factor_problems
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.setups import RebalanceSetup, scale_factor_problems
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import DPH
 

@@ -21,18 +21,19 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction import handling_candidates, handling_errors, run_metadata
+from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Windows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import remounts, with_set_up
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
-from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import DriftTestResult, Specification
 from gyrobench.units import DPH
 

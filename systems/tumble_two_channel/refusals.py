@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.setups import scale_factor_problems
+from gyrobench.reduction.setup.setups import scale_factor_problems
 
 from . import geometry
 

@@ -10,9 +10,9 @@ import numpy as np
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata, setups
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
+from gyrobench.reduction.setup import run_metadata, setups
 from gyrobench.result import Specification
 
 from . import geometry

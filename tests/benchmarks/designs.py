@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 
-from gyrobench.campaign.design.shortest_test import design_test
+from gyrobench.design.shortest_test import design_test
 from gyrobench.system.system import load_system
 
 #: a day in fifty of the two-axis servo test: Earth, moves, correlation of the drift so much faster

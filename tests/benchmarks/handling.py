@@ -6,7 +6,7 @@ Each record is a co-simulation with a random instrument, latitude and noise (cov
 as a laboratory would write it (laboratory.py) with one mistake in it, and reduced with limits that every coefficient
 keeps.  Counted is what the report says: the mistake is named (with those that leave the same residuals), the verdict is
 inconclusive or the record is refused, or it passes, harmless where no estimate is off by 3 u; a wrong
-mistake named is counted by itself.  Mistakes that no residual shows (gyrobench.reduction.handling_errors) are not
+mistake named is counted by itself.  Mistakes that no residual shows (diagnosis.handling_errors) are not
 among them.  README.md here has the figures.
 """
 

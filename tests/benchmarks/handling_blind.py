@@ -7,7 +7,7 @@ paper: two labels exchanged, two columns of one unit, two groups of rows of one 
 an attitude or a block of rows times a factor of a wrong unit or of -1, a comment with the other sign.  What counts
 is whether a wrong figure leaves with a verdict "pass": "harmless" where no estimate is off by 3 u, "silent" where the
 residuals did not change (the scatter of the fit as it was within a tenth, or multiplied with all data: no reduction can
-see such a mistake; gyrobench.reduction.handling_errors lists them), "warned" where of these a coefficient is said to be
+see such a mistake; diagnosis.handling_errors lists them), "warned" where of these a coefficient is said to be
 of the size of the Earth rate, "pass" otherwise.
 """
 

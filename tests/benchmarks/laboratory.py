@@ -20,7 +20,7 @@ from coverage import CASES, Noise
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import noise
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System, load_system
 

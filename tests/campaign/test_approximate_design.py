@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gyrobench.campaign.design.approximate_design import (
+from gyrobench.design.approximate_design import (
     CRITERIA,
     SingularDesignError,
     approximate_design,

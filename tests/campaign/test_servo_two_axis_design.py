@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gyrobench import frames
-from gyrobench.campaign.design.plan_runs import last_time
+from gyrobench.design.plan_runs import last_time
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.system import InvalidConfigurationError, load_system

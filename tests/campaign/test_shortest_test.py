@@ -13,15 +13,15 @@ import pytest
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
-from gyrobench.campaign.design import choice_search, plan_search, shortest_test
-from gyrobench.campaign.design.approximate_design import approximate_design, evaluate
-from gyrobench.campaign.design.option_protocol import OptionProtocol
-from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError, Stated, Trial, Workbench, last_time
-from gyrobench.campaign.design.plan_search import Search, Want, finish, rounded
-from gyrobench.campaign.design.predicted_uncertainty import predict
-from gyrobench.campaign.design.shortest_test import design_test, protocol_of
-from gyrobench.campaign.design.suite_design import cheapest_cover, design_suite
-from gyrobench.campaign.design.visit_protocol import Channel, Noise, VisitProtocol
+from gyrobench.design import choice_search, plan_search, shortest_test
+from gyrobench.design.approximate_design import approximate_design, evaluate
+from gyrobench.design.option_protocol import OptionProtocol
+from gyrobench.design.plan_runs import DesignedTest, DesignError, Stated, Trial, Workbench, last_time
+from gyrobench.design.plan_search import Search, Want, finish, rounded
+from gyrobench.design.predicted_uncertainty import predict
+from gyrobench.design.shortest_test import design_test, protocol_of
+from gyrobench.design.suite_design import cheapest_cover, design_suite
+from gyrobench.design.visit_protocol import Channel, Noise, VisitProtocol
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.suite import Suite, load_test

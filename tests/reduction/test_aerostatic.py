@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gyrobench.reduction.aerostatic import AerostaticBearing, BearingError, flow_function
+from gyrobench.design.aerostatic import AerostaticBearing, BearingError, flow_function
 
 KGF = 9.80665
 ARCSEC = math.pi / 648000.0

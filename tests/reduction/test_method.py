@@ -12,7 +12,6 @@ from scipy import stats
 
 from gyrobench import units
 from gyrobench.record.run_document import PlanRow, RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise as noise_model
@@ -25,8 +24,9 @@ from gyrobench.reduction.estimation.fit_result import (
     linear_result,
     plus_minus,
 )
-from gyrobench.reduction.merge_channels import merge
-from gyrobench.reduction.window_checks import ReductionError, window_problems
+from gyrobench.reduction.estimation.merge_channels import merge
+from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Result
 
 Array = NDArray[np.float64]

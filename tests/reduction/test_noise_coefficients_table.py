@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.reduction import noise_coefficients_table as table_module
-from gyrobench.reduction.noise_coefficients_table import LEAST, RESIDUAL, noise_coefficients_table, on_grid
+from gyrobench.reduction.series import noise_coefficients_table as table_module
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
+from gyrobench.reduction.series.noise_coefficients_table import LEAST, RESIDUAL, noise_coefficients_table, on_grid
 
 T = 60.0  # s
 N = 0.6  # deg/h/sqrt(Hz): 0.01 deg/sqrt(h)

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from gyrobench.reduction.ranking import LEVEL, Candidate, adjusted, difference, rank
+from gyrobench.reduction.suite.ranking import LEVEL, Candidate, adjusted, difference, rank
 
 
 def of(values, seeds=None):

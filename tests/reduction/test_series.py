@@ -13,7 +13,7 @@ from gyrobench import drift, frames
 from gyrobench.reduction.drift import harmonic, window_regressors
 from gyrobench.reduction.estimation import residual_series, uncertainty
 from gyrobench.reduction.estimation.regression import RegressionError
-from gyrobench.reduction.window_checks import window_problems
+from gyrobench.reduction.setup.window_checks import window_problems
 
 rng = np.random.default_rng(3)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation.step_effect import apply_step, step_effects, step_text
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_summary import renew, told
-from gyrobench.reduction.step_effect import apply_step, step_effects, step_text
 from gyrobench.result import Coefficient, DriftTestResult, LoopResult
 from gyrobench.system.system import load_system
 

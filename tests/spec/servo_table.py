@@ -13,8 +13,8 @@ from gyrobench import frames
 from gyrobench.attitudes import on_servo_table
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.system.system import System, load_system
 
 DPH = math.pi / 180.0 / 3600.0

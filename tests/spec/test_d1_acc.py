@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from multipoint import KS, estimates, module, polynomial, reading, reduced, windows
 
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 C, MODEL = module("closed"), module("model")
 UG = 1e-6

@@ -9,7 +9,7 @@ import pytest
 
 from gyrobench import frames
 from gyrobench.reduction.drift import composite
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = math.pi / 180.0 / 3600.0
 W = frames.EARTH_RATE

@@ -32,8 +32,8 @@ from servo_table import (
 
 from gyrobench import drift, frames
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, on_servo_table
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import harmonic, servo_regression
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.system.system import load_system
 
 

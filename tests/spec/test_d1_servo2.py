@@ -32,7 +32,7 @@ from servo_two_axis import (
 )  # fmt: skip
 
 from gyrobench import frames
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 PHI = math.radians(45.75)
 DAY = 86400.0

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gyrobench import drift, frames
 from gyrobench.attitudes import on_servo_table
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.system.families.servo_test import ServoTest
 from gyrobench.system.system import System, load_system
 

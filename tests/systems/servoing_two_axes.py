@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import drift, frames
-from gyrobench.reduction import run_metadata
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.system.system import load_system
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from tumbling import DPH, NAMES, SHORT, load, quiet
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 

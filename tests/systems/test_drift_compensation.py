@@ -11,7 +11,7 @@ import pytest
 
 from gyrobench.engine.session import run
 from gyrobench.record.record import Record
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import InvalidConfigurationError, Slot, System, load_system
 
 NAME = "drift_compensation"

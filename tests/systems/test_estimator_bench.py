@@ -14,7 +14,7 @@ import pytest
 
 from gyrobench import report
 from gyrobench.engine.session import ParameterRefusedError, Session, run
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.report.comparison_page import comparison
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError

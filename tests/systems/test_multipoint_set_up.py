@@ -13,7 +13,7 @@ from multipoint import KS, NAME, load, quiet
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.effects import PREDICTED
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 
 ARCSEC = math.pi / 648000.0

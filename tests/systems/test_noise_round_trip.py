@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from gyrobench.bench import UsageError
 from gyrobench.commands.arguments import read_settings
 from gyrobench.engine.session import Session
-from gyrobench.reduction.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.deviations import deviations
 from gyrobench.reduction.series.gyro_noise import gyro_noise, slow_density
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient
 from gyrobench.system.system import load_system
 from gyrobench.workflow.gyro_values import write_gyro_values

@@ -15,7 +15,7 @@ from pickoffs import ARCMIN, DPH, NAME, R, load, made
 
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 Command = Callable[..., tuple[int, str, str]]
 

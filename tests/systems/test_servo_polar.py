@@ -16,7 +16,7 @@ from undiagnosed import reduce_undiagnosed
 
 from gyrobench import frames
 from gyrobench.engine.session import RunError, Session, run
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.parameters import resolve
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError
@@ -406,7 +406,7 @@ def test_stopped_and_continued(tmp_path: Any) -> None:
 
 def test_noise_coefficients_of_the_residuals(day: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long test has their table, from its residuals and said so; this day is too short for it."""
-    from gyrobench.reduction import noise_coefficients_table as module
+    from gyrobench.reduction.series import noise_coefficients_table as module
 
     def tables() -> list[dict[str, Any]]:
         return [t for t in load_system(NAME).reduce(day).tables if t["title"] == "Noise coefficients"]

@@ -33,7 +33,7 @@ from undiagnosed import reduce_undiagnosed
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import RunError, Session, run
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError
 

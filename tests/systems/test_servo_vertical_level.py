@@ -13,7 +13,7 @@ from servoing import DPH, QUIET, errors, expected_rate, gyro, held, latitude
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "servo_vertical_level"

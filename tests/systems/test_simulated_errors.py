@@ -15,7 +15,7 @@ from tumbling import DPH, NAMES, SHORT
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.truth_check import check_truth, set_values
+from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 

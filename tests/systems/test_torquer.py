@@ -17,7 +17,7 @@ import pytest
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import System, load_system
 
 Command = Callable[..., tuple[int, str, str]]

@@ -14,7 +14,7 @@ from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import PREDICTED
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 from gyrobench.system.system import System, load_system
 

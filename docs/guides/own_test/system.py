@@ -4,7 +4,7 @@ import numpy as np
 
 from gyrobench import attitudes, drift, frames, units
 from gyrobench.reduction.estimation.fit_result import Effect, Group, Quantity, fit, linear_result
-from gyrobench.reduction.run_metadata import Site, number, truth_of
+from gyrobench.reduction.setup.run_metadata import Site, number, truth_of
 from gyrobench.system.families.option_groups import SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.plan import Phase, Plan

@@ -16,7 +16,7 @@ class AirBearing(Block):
         journal  mu pi D3 L w / (4 h sqrt(1 - eps2))        two thrust faces  mu pi (r2^4 - r1^4) w / h_t
         eddy     eddy w                                     unbalance  M_W = U g cos(elevation) sin(x - unbalance_angle)
 
-    Not modelled: load and stiffness (gyrobench/reduction/aerostatic.py), turbine torque of the air, heating of the gap.
+    Not modelled: load and stiffness (gyrobench/design/aerostatic.py), turbine torque of the air, heating of the gap.
     Source: Hu 1981, eq. 5-33, 5-34, 5-36, 5-37 with ET7, ET8; [BEARING-AIR].
     """
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = 10  # windows
 

@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
-from gyrobench.reduction import window_checks
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
-from gyrobench.reduction.run_metadata import Site
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup import window_checks
+from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations

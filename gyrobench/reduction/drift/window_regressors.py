@@ -18,7 +18,7 @@ from numpy.polynomial.legendre import leggauss
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.frames import G0, pole
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

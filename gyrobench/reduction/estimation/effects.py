@@ -25,7 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) = 12(2) arcsec'"
 _ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")

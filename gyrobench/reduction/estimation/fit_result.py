@@ -4,8 +4,8 @@
     effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", fitted.error(-k * current))]
     result = linear_result(fitted, system="...", title="...", ..., effects=effects, specification=limits)
 
-Two channels measured at once: one result each, then gyrobench.reduction.merge_channels.  Everything inside is SI; what
-a Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
+Two channels measured at once: one result each, then merge_channels.  Everything inside is SI; what a
+Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from gyrobench.reduction.estimation.effects import (
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
 
 __all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "observed_fits", "plus_minus"]
@@ -70,7 +70,7 @@ def linear_result(
     {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
     simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
     robust: a table with a robust fit beside this one.  errors: those of a simulated set-up by their source, SI, see
-    gyrobench.reduction.simulated_errors.
+    gyrobench.reduction.setup.simulated_errors.
     """
     by_source = [standard_changes(fit, e) for e in effects]
     rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])

@@ -20,7 +20,7 @@ from gyrobench.reduction.estimation.findings import Estimates, Findings, Group
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import RegressionError
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 IDEAL = 1e-6  # residuals over data, below which there is no noise
 

@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEVEL = 0.01  # probability that any row of a clean record is named
 MOST = 0.2  # share of the rows that may be outliers

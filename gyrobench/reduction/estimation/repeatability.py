@@ -21,7 +21,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import nuisances, uncertainty
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
 
 

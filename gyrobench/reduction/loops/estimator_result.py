@@ -20,7 +20,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, Test
 
 RANKED = "error"  # the coefficient that ranks estimators, smallest first

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Response
 
 DEG = math.pi / 180.0

@@ -24,7 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value

@@ -19,7 +19,6 @@ from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
-from gyrobench.reduction import run_metadata
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
@@ -46,6 +45,7 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
+from gyrobench.reduction.setup import run_metadata
 from gyrobench.result import Coefficient, LoopResult, Response, Specification
 from gyrobench.units import DPH
 

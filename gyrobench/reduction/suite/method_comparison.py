@@ -18,10 +18,10 @@ from gyrobench import drift
 from gyrobench.record.run_document import RunDocument, SuiteTestRun
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
-from gyrobench.reduction.window_checks import ReductionError
 from gyrobench.result import (
     Coefficient,
     DriftTestResult,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from gyrobench import units
-from gyrobench.reduction.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.result import DriftTestResult
 
 NEAR = 0.03  # relative distance

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import Noise
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise import mean_variance

@@ -20,7 +20,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import Remount
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, Result
 
 R = TypeVar("R", bound=Result)

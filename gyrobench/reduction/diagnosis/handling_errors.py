@@ -42,11 +42,11 @@ from scipy import special
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
-from gyrobench.reduction import plausibility
+from gyrobench.reduction.diagnosis import plausibility
 from gyrobench.reduction.estimation import asked, uncertainty
 from gyrobench.reduction.estimation.effects import UNSTATED
-from gyrobench.reduction.run_metadata import NO_TYPE_B, Site
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.run_metadata import NO_TYPE_B, Site
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Specification
 
 Reduce = Callable[..., DriftTestResult]

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import UsageError
-from gyrobench.campaign.design.design_text import format_suite_design
-from gyrobench.campaign.design.plan_runs import DesignedTest, DesignError
-from gyrobench.campaign.design.shortest_test import design_test
+from gyrobench.design.design_text import format_suite_design
+from gyrobench.design.plan_runs import DesignedTest, DesignError
+from gyrobench.design.shortest_test import design_test
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.suite import Suite
 

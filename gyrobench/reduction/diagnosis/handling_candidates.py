@@ -1,4 +1,4 @@
-"""Mistakes in taking or labelling a record, each undone: what gyrobench.reduction.handling_errors tries.
+"""Mistakes in taking or labelling a record, each undone: what gyrobench.reduction.diagnosis.handling_errors tries.
 
     def candidates(record):
         yield from exchanged_labels(record)
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.handling_errors import Candidate, with_options
+from gyrobench.reduction.diagnosis.handling_errors import Candidate, with_options
 
 ANGLES = ("angle_start", "angle_end")
 TIMES = ("t_start", "t_end")

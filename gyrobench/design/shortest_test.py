@@ -22,11 +22,11 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
-from gyrobench.campaign.design import plan_search
-from gyrobench.campaign.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
-from gyrobench.campaign.design.choice_search import search_choices
-from gyrobench.campaign.design.option_protocol import OptionProtocol
-from gyrobench.campaign.design.plan_runs import (
+from gyrobench.design import plan_search
+from gyrobench.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
+from gyrobench.design.choice_search import search_choices
+from gyrobench.design.option_protocol import OptionProtocol
+from gyrobench.design.plan_runs import (
     Covariances,
     DesignedTest,
     DesignError,
@@ -37,9 +37,9 @@ from gyrobench.campaign.design.plan_runs import (
     trial_of,
     wanted_sizes,
 )
-from gyrobench.campaign.design.plan_search import ExactPlan, Search, Want
-from gyrobench.campaign.design.predicted_uncertainty import effective
-from gyrobench.campaign.design.visit_protocol import Noise, VisitProtocol
+from gyrobench.design.plan_search import ExactPlan, Search, Want
+from gyrobench.design.predicted_uncertainty import effective
+from gyrobench.design.visit_protocol import Noise, VisitProtocol
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import noise as noise_model

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gyrobench.campaign.design.plan_runs import DesignedTest
-    from gyrobench.campaign.design.suite_design import DesignedSuite
+    from gyrobench.design.plan_runs import DesignedTest
+    from gyrobench.design.suite_design import DesignedSuite
 
 SHOWN = 12  # places in the table of the plan
 

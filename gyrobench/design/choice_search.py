@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gyrobench.campaign.design.option_protocol import Choice, OptionProtocol
-from gyrobench.campaign.design.plan_runs import (
+from gyrobench.design.option_protocol import Choice, OptionProtocol
+from gyrobench.design.plan_runs import (
     DesignedTest,
     DesignError,
     Trial,

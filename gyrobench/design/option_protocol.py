@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import Noise
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.design.approximate_design import ApproximateDesign, approximate_design, evaluate
-from gyrobench.campaign.design.predicted_uncertainty import effective
-from gyrobench.campaign.design.visit_protocol import Noise, VisitProtocol
+from gyrobench.design.approximate_design import ApproximateDesign, approximate_design, evaluate
+from gyrobench.design.predicted_uncertainty import effective
+from gyrobench.design.visit_protocol import Noise, VisitProtocol
 
 LONGEST = 1e7  # s, beyond which a wanted uncertainty is not reached
 EXCHANGES = 400  # plans tried of each number of visits

@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.campaign.design.predicted_uncertainty import predict
+from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
@@ -80,7 +80,7 @@ class DesignedTest:
         return {**plain(asdict(self)), "command": self.command}
 
     def __str__(self) -> str:
-        from gyrobench.campaign.design.design_text import format_design
+        from gyrobench.design.design_text import format_design
 
         return format_design(self)
 

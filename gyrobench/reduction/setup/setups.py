@@ -21,9 +21,9 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import Remount
-from gyrobench.reduction.run_metadata import Site, phases, remount_of, sizes
-from gyrobench.reduction.simulated_errors import simulated_errors
-from gyrobench.reduction.window_checks import ReductionError
+from gyrobench.reduction.setup.run_metadata import Site, phases, remount_of, sizes
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Specification
 
 
@@ -37,7 +37,7 @@ class Setup:
     truth: Mapping[str, float] | None = None
     specification: Specification | None = None
     instrument: str = ""
-    errors: Mapping[str, float] | None = None  # of a simulated set-up, see gyrobench.reduction.simulated_errors
+    errors: Mapping[str, float] | None = None  # of a simulated set-up, see gyrobench.reduction.setup.simulated_errors
     corrections: str = ""  # measured errors of the set-up, see gyrobench.reduction.estimation.effects
 
     @classmethod
