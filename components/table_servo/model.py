@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Discrete, Input, Noise, Output, Parameter, State, sampled
 from gyrobench.component.blocks.table import AxisTable, SegmentMotion
 from gyrobench.component.math import Number, clip, cos, fabs, floor, maximum, pi, sin, sqrt, tanh
+from gyrobench.component.set_up import harmonic, unbalanced
 
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
 SIXTH = 1.0 / 6.0
@@ -70,6 +71,10 @@ class TableServo(AxisTable):
     capture_slow = Parameter(3e-5, "rad/s", "fine below this rate, or this one against the drift", above=0.0)
     capture_hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
 
+    simulates = (
+        harmonic(("encoder_amplitude",), ("encoder_phase",), ("angle.once", "angle.twice")),
+        unbalanced("unbalance"),
+    )
     encoder_amplitude = Parameter([0.0, 0.0, 0.0], "rad", "encoder error of orders 1, 2 and encoder_fine")
     encoder_phase = Parameter([0.0, 0.0, 0.0], "rad", "their phases at angle 0")
     encoder_fine = Parameter(360, int, "order of the fine encoder error, cycles per turn", min=1, max=100000)

@@ -12,8 +12,6 @@ from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
-from gyrobench.reduction.loops.loop_summary import renew
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System
@@ -33,27 +31,6 @@ class RunOutcome:
     folder: Path | None = None
     paths: Mapping[str, Path] = field(default_factory=dict)
     stopped: PostRunError | None = None
-
-
-def reduce_run(
-    system: System, record: Record, limits: Specification | None, step_check: Mapping[str, Any] | None = None
-) -> Result:
-    """Return the result of the system's own reduction, with the run as provenance.
-
-    step_check: what the communication step does, to be part of u; see gyrobench.reduction.estimation.step_effect.
-    """
-    from gyrobench.reduction.estimation.step_effect import apply_step
-    from gyrobench.system.wiring import parse_wires
-
-    result = system.reduce(record, limits)
-    wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
-    result.provenance = {**record.run.as_dict(), "wires": wires, "shown": list(system.shown)}
-    if step_check and step_check.get("rows"):
-        apply_step(result, step_check)
-    renew(result)
-    result.warnings[:0] = record.run.external
-    check_truth(result, set_values(record.run))
-    return result
 
 
 def write_report(
@@ -86,7 +63,7 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
         check = (reading.json_object(reading.read_text(old, RecordError), old, RecordError).get("step_check") or {}
                  ) if old.exists() else {}  # fmt: skip
         try:
-            result = reduce_run(system, record, limits, check if "other" in check else None)
+            result = system.reduce(record, limits, check if "other" in check else None)
         except GyrobenchError:
             if record.complete:
                 raise

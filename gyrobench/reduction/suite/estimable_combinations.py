@@ -121,9 +121,9 @@ def value(label: str, quantity: Measurand, result: DriftTestResult, shared: Coll
     u_b = 0.0
     common: dict[str, Array] = {}
     for b in result.type_b:
-        change = np.array(b["changes"], dtype=float) @ c
-        if b["source"] in shared:
-            common[b["source"]] = np.append(common.get(b["source"], np.zeros(0)), change)
+        change = np.array(b.changes, dtype=float) @ c
+        if b.id in shared:
+            common[b.id] = np.append(common.get(b.id, np.zeros(0)), change)
         else:
             u_b = math.hypot(u_b, float(np.linalg.norm(change)))
     known = [coefficients[j].truth for j in used]

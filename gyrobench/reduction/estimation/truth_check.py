@@ -6,42 +6,34 @@ from collections.abc import Sequence
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import PREDICTED
-from gyrobench.result import Coefficient, Result
+from gyrobench.result import Coefficient, Reason, Result
 
 LIMIT = 5.0  # of |z|: by chance once in two million
 
 
-def check_truth(result: Result, causes: Sequence[str]) -> None:
-    """Put a warning before all others where an estimate is more than five standard uncertainties from the truth.
+def missed_truth(result: Result, causes: Sequence[str]) -> list[Reason]:
+    """Return the reason not to use a result of which an estimate is more than five u from the truth; none else.
 
     causes: what was set and may explain it, see :func:`set_values`.
     """
     deviating = [c for c in result.coefficients if c.z is not None and abs(c.z) > LIMIT]
     if not deviating:
-        return
+        return []
     deviating.sort(key=lambda c: -abs(c.z or 0.0))
     why = (
         f"Possible causes among the values set: {'; '.join(causes)}."
         if causes
         else "No value was set: the model or its u is wrong."
     )
-    shifts = _predicted(result)
+    shifts = {row[0]: row[t.columns.index("sum")] for t in result.tables if t.id == PREDICTED for row in t.rows}
     left = [abs(c.estimate - (c.truth or 0.0) - shifts.get(c.name, 0.0)) / c.u for c in deviating]
     if shifts and max(left) <= LIMIT:
-        why = f"The simulated errors of the set-up account for it, see the table '{PREDICTED}'."
-    result.warnings.insert(
-        0,
+        why = "The simulated errors of the set-up account for it, see the table of predicted shifts."
+    text = (
         f"The result misses the simulated truth by more than five standard uncertainties: {_shown(deviating)}. Chance "
-        f"does not explain this; do not use the coefficients, their u or their verdicts. {why}",
+        f"does not explain this; do not use the coefficients, their u or their verdicts. {why}"
     )
-
-
-def _predicted(result: Result) -> dict[str, float]:
-    """Return name -> shift by the simulated errors that the budget knows, in the printed unit."""
-    for table in result.tables:
-        if table["title"] == PREDICTED:
-            return {row[0]: row[table["columns"].index("sum")] for row in table["rows"]}
-    return {}
+    return [Reason("truth.missed", text, blocks=("pass", "fail"), severity="error")]
 
 
 def _shown(deviating: Sequence[Coefficient], most: int = 4) -> str:
