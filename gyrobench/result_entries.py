@@ -14,6 +14,7 @@ NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
 Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
 
+
 @dataclass(frozen=True)
 class Coefficient:
     """One estimated quantity, or one inseparable combination under the combination's name."""
@@ -71,7 +72,7 @@ class Test:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the method's own.  id: "budget.predicted"; a series of them may add what they belong to after a colon."""
+    """A table of the method's own.  id: "budget.predicted"; several alike: with what each belongs to, after a colon."""
 
     id: str
     title: str
@@ -89,7 +90,7 @@ class Table:
 class Reason:
     """What limits a result: a sentence for the reader, and the verdicts that it takes away.
 
-    blocks: of these verdicts, of the coefficients ``names`` (none named: all), ``becomes`` is made.  intervals: a verdict
+    blocks: these verdicts of the coefficients ``names`` (none named: all) become ``becomes``.  intervals: a verdict
     stands only where it holds for these too (name -> low, high, printed unit).  severity: "error" (not to be used as it
     is; said first), "doubt" (listed; said first where it takes a verdict away), "warning", "condition" (said only where
     it takes a verdict away).
@@ -158,5 +159,3 @@ class Response:
     coherence: list[float] = field(default_factory=list)
     counts: list[bool] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list)
-
-

@@ -79,12 +79,13 @@ def _again(fit: Findings, y: Array, J: Array) -> tuple[Array, Array]:
     """Return u (q,) and gain (q, n) of the values J b of the same fit of other data, as :meth:`Findings.derive` does,
     without its tests of the residuals, which would take most of the time.
     """
-    p, names = fit.X.shape[1], [x.name for x in fit.linear]
-    if fit.mode == "white":
+    p = fit.X.shape[1]
+    names = fit.est.names[:p]
+    if fit.white:
         est = noise_mixture_fit.ordinary(fit.X, y, names, fit.t_start, fit.t_end, fit.weights, math.inf)
     else:
         blocks = [c.block for c in fit.candidates]
-        readings = fit.mode == "readings"
+        readings = fit.data.noise == "readings"
         est = noise_mixture_fit.fit(fit.X, y, names, fit.t_start, fit.t_end, math.inf, readings, blocks, fit.known)
     full = np.column_stack([J, np.zeros((len(J), est.beta.size - p))])
     sd, half = est.mixture.spread(full)

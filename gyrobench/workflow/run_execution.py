@@ -13,7 +13,7 @@ from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Coefficient, Specification
+from gyrobench.result import Coefficient, Reason, Specification
 from gyrobench.system.system import System
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots

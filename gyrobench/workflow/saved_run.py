@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from gyrobench import reading
 from gyrobench.bench import Bench
@@ -13,7 +12,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Result, Specification
+from gyrobench.result import Result
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_limits
 from gyrobench.workflow.user_errors import PostRunError, record_kept

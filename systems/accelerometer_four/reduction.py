@@ -32,8 +32,9 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 
 from . import chain, geometry
 
@@ -179,12 +180,14 @@ def _effects(s: FourSetup, found: Findings, reported: Findings, alpha: Array, U:
     lines = [np.concatenate([-t * f(alpha) for t in tangent]) for f in (np.cos, np.sin)]
     power = np.tile([0.0, 1.0, 1.0, 2.0, 2.0], 4)  # of 1/gravity in the coefficients
     out = [
-        Effect("voltmeter", s.u_voltage, "1", reported.error(U.T.ravel()), "relative, of all voltages"),
-        Effect("gravity", s.u_gravity, "m/s²", None, values=-power * found.est.beta[:20] / s.gravity),
+        VOLTMETER.effect(s, reported.error(U.T.ravel()), note="relative, of all voltages"),
+        GRAVITY.effect(s, values=-power * found.est.beta[:20] / s.gravity),
     ]
     if s.D1 is not None:
         out += [
-            Effect(f"first harmonic of the head, {kind}", s.u_D1, "rad", reported.error(line), "as measured")
+            Source(f"first_harmonic_of_the_head:{kind}", f"first harmonic of the head, {kind}", "rad", "u_D1").effect(
+                s, reported.error(line), note="as measured"
+            )
             for kind, line in zip(("cosine", "sine"), lines, strict=True)
         ]
     return out
@@ -202,14 +205,16 @@ def _tables(
         for j, i in enumerate(geometry.SENSORS)
         for m, k in enumerate(geometry.TERMS)
     ]
-    compared = {
-        "title": "Joint fit, chain of the source, each sensor alone",
-        "caption": "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
+    compared = Table(
+        "joint_fit_chain_of_the",
+        "Joint fit, chain of the source, each sensor alone",
+        "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
         "Alone: five terms of each sensor, errors of the head in them. Residuals of the sensors alone: "
-        + ", ".join(f"{v:.3g}" for v in s_single) + f" V, of the joint fit {found.residual_std:.3g} V.",
-        "columns": ["coefficient", "joint", "u, type A", "chain", "alone", "unit"],
-        "rows": rows,
-    }  # fmt: skip
+        + ", ".join(f"{v:.3g}" for v in s_single)
+        + f" V, of the joint fit {found.residual_std:.3g} V.",
+        ["coefficient", "joint", "u, type A", "chain", "alone", "unit"],
+        rows,
+    )
     head = [
         [k, kind, float(beta[20 + m]) / ARCSEC, float(u[20 + m]) / ARCSEC]
         for m, (k, kind) in enumerate(geometry.orders(s.points))
@@ -217,12 +222,13 @@ def _tables(
     if s.D1 is not None:
         given = zip(("cos", "sin"), s.D1, strict=True)
         head = [[1, kind, v / ARCSEC, s.u_D1 / ARCSEC] for kind, v in given] + head
-    errors = {
-        "title": "Angle errors of the head by harmonics",
-        "caption": "Positions minus their nominal angles; the first harmonic is that of the autocollimator",
-        "columns": ["harmonic", "of", "amplitude / ″", "u / ″"],
-        "rows": head,
-    }
+    errors = Table(
+        "angle_errors_of_the_head",
+        "Angle errors of the head by harmonics",
+        "Positions minus their nominal angles; the first harmonic is that of the autocollimator",
+        ["harmonic", "of", "amplitude / ″", "u / ″"],
+        head,
+    )
     return [compared, errors]
 
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, GRAVITY, Source
 
 from . import closed
 from .geometry import specific_force
@@ -47,22 +48,30 @@ def effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float]
         return np.array([found.error(-slope * f(n * v.angle)) for f in (np.sin, np.cos)])
 
     return [
-        Effect("scale λ", s.u_scale, "1", found.error(v.y), "relative"),
-        Effect("zero of the current meter", s.u_current, "A", offset),
-        Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
-        Effect("gravity", s.u_gravity, "m/s²", found.error(dX=stretched)),
-        Effect(
-            "positions of the head", s.u_angle, "rad", alone, "independent, the same in each turn and mount",
-            tuple(f"{x:g}°" for x in stations.tolist()),
+        Source("scale", "scale λ", "1", "u_scale").effect(s, found.error(v.y), note="relative"),
+        Source("zero_of_the_current_meter", "zero of the current meter", "A", "u_current").effect(s, offset),
+        Source("resolution_of_the_current_meter", "resolution of the current meter", "A").effect(
+            s.quantum / math.sqrt(12.0), offset, note="as if never dithered"
         ),
-        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "of the readings of the head", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "of the readings of the head", SINES),
-        Effect("axis of the head above the horizon", s.u_axis, "rad", found.error(axis)),
+        GRAVITY.effect(s, found.error(dX=stretched)),
+        Source("positions_of_the_head", "positions of the head", "rad", "u_angle").effect(
+            s,
+            alone,
+            note="independent, the same in each turn and mount",
+            parts=tuple(f"{x:g}°" for x in stations.tolist()),
+        ),
+        ANGLE_ONCE.effect(s, misread(1), note="of the readings of the head"),
+        ANGLE_TWICE.effect(s, misread(2), note="of the readings of the head"),
+        Source("axis_of_the_head_above", "axis of the head above the horizon", "rad", "u_axis").effect(
+            s, found.error(axis)
+        ),
         *(
-            Effect(f"accelerometer turned about its {n} axis", s.u_mount, "rad", found.error(row))
+            Source(
+                f"accelerometer_turned_about_its_axis:{n}", f"accelerometer turned about its {n} axis", "rad", "u_mount"
+            ).effect(s, found.error(row))
             for n, row in zip(("input", "output", "pendulum"), turned, strict=True)
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _stations(angle: Array) -> Array:

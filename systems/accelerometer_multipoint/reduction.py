@@ -31,7 +31,7 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import ARCSEC
 
 from . import closed
@@ -196,14 +196,18 @@ def _f_tests(found: Findings, v: Visits) -> None:
                 later += [np.where(here, f, 0.0) for f in (np.ones_like(v.y), np.cos(v.angle), np.sin(v.angle))]
     empty = np.empty((v.y.size, 0))
     found.f_test(
-        "harmonics 4 and higher", np.column_stack(columns) if columns else empty,
+        "harmonics_4_and_higher", "harmonics 4 and higher", np.column_stack(columns) if columns else empty,
         "errors of the head's positions and terms beyond the third order",
         "something goes with the angle that the model does not hold", "no more than noise",
     )  # fmt: skip
     found.f_test(
-        "turn to turn", np.column_stack(later) if later else empty, "change of bias and scale factor between turns",
-        "the turns differ by more than the noise", "the turns agree within the noise",
-    )  # fmt: skip
+        "turn_to_turn",
+        "turn to turn",
+        np.column_stack(later) if later else empty,
+        "change of bias and scale factor between turns",
+        "the turns differ by more than the noise",
+        "the turns agree within the noise",
+    )
 
 
 def _repeatability(found: Findings, v: Visits) -> dict[str, Any]:
@@ -243,7 +247,7 @@ def _tables(fits: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
             rows.append(["k1 − 1" if offset else name, a, b, a - b, unit])
     caption = "Closed formulas of each mount alone: the difference should be scatter"
     head = ["coefficient", "mount a", "mount b", "difference", "unit"]
-    return [{"title": "The two mounts apart", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("the_two_mounts_apart", "The two mounts apart", caption, head, rows)]
 
 
 def _equation(model: Model) -> str:

@@ -17,7 +17,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import LoopResult, Response, Specification, Test
+from gyrobench.result import LoopResult, Response, Specification, Table, Test
 from gyrobench.units import DPH
 
 DEG = math.pi / 180.0
@@ -205,13 +205,14 @@ def _phases(found: LoopFindings, errors: Array, drift: Array) -> dict[str, Any]:
         nees = float(np.mean(whitened(c, np.column_stack([errors, drift]), inside) ** 2)) if stated else None
         rows.append([g.label, float(g.t[-1] - g.t[0]), float(np.sqrt(np.mean(size**2))), float(size.max()),
                      float(np.mean(g["estimator.aided"])) if "estimator.aided" in c else None, nees])  # fmt: skip
-    return {
-        "title": "Attitude error by phase",
-        "caption": "Aided: share of the phase in which the specific force was used. NEES: mean squared error over its "
+    return Table(
+        "attitude_error_by_phase",
+        "Attitude error by phase",
+        "Aided: share of the phase in which the specific force was used. NEES: mean squared error over its "
         "stated covariance, 1 where it is right; above 1 in and after an acceleration that is taken for gravity.",
-        "columns": ["phase", "length / s", "rms error / °", "largest / °", "aided", "NEES"],
-        "rows": rows,
-    }
+        ["phase", "length / s", "rms error / °", "largest / °", "aided", "NEES"],
+        rows,
+    )
 
 
 def _figures(c: Mapping[str, Array], errors: Array, drift: Array, calm: NDArray[np.int_]) -> list[Response]:

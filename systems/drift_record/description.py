@@ -19,6 +19,7 @@ from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficient
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.report.numbers import write_number, write_p
+from gyrobench.result import Table
 from gyrobench.units import ARCSEC, DPH
 
 from .preparation import Prepared
@@ -38,7 +39,7 @@ def number(x: float, u: float | None = None) -> str:
 
 
 def table(title: str, caption: str, columns: list[str], rows: list[list[Any]]) -> Json:
-    return {"title": title, "caption": caption, "columns": columns, "rows": rows}
+    return Table("title", title, caption, columns, rows)
 
 
 def acquisition(p: Prepared, run: RunDocument) -> Json:

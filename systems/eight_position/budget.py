@@ -19,6 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Windows, sources
 from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.sources import LATITUDE, Source
 
 from . import model, positions
 
@@ -70,22 +71,28 @@ def effects(
     quantum = setup.quantum.get(channel, 0.0) / math.sqrt(12.0)
     zero, resolution, nonlinearity, *_ = own_sources(channel)
     return [
-        Effect(
-            "attitude of each position", setup.u_attitude, "rad", alone,
-            "about each axis, the positions independent of one another",
-            tuple(f"position {n} about {axis}" for axis in AXES for n in np.unique(position)),
+        Source("attitude_of_each_position", "attitude of each position", "rad", "u_attitude").effect(
+            setup,
+            alone,
+            note="about each axis, the positions independent of one another",
+            parts=tuple(f"position {n} about {axis}" for axis in AXES for n in np.unique(position)),
         ),
         *(
-            Effect(f"gyro turned about its {axis} axis in the fixture", setup.u_mount, "rad", turns[axis])
+            Source(
+                f"gyro_turned_about_its_axis:{axis}",
+                f"gyro turned about its {axis} axis in the fixture",
+                "rad",
+                "u_mount",
+            ).effect(setup, turns[axis])
             for axis in AXES
         ),
-        Effect("latitude", setup.u_latitude, "rad", found.error(dw) / SMALL, STATED),
-        Effect(zero, setup.u_current, "A", offset),
-        Effect(resolution, quantum, "A", offset, "as if never dithered"),
-        Effect(
-            nonlinearity, setup.u_nonlinearity, "1",
+        LATITUDE.effect(setup, found.error(dw) / SMALL),
+        Source("?", zero, "A", "u_current").effect(setup, offset),
+        Source("?", resolution, "A").effect(quantum, offset, note="as if never dithered"),
+        Source("?", nonlinearity, "1", "u_nonlinearity").effect(
+            setup,
             found.error(-lin.k0 * current * np.abs(current) / full),
-            f"relative departure from proportionality at {full * 1e3:.3g} mA",
+            note=f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
         *(pulses.effects(found, lin.k0, readings, setup.u_pulse, setup.u_switching, channel) if pulses else ()),
-    ]  # fmt: skip
+    ]

@@ -158,7 +158,7 @@ def _channel(channel: str, data: Mapping[str, Array], setup: Setup, closed: Mapp
     )
     each = np.column_stack([(position == n).astype(float) for n in tables.left_over(channel, setup.terms)])
     found.f_test(
-        "positions", each, "differences between positions that the model does not hold",
+        "positions", "positions", each, "differences between positions that the model does not hold",
         "the positions differ by more than the model and the noise: attitude errors or terms left out",
         "the model explains all eight positions",
     )  # fmt: skip

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import repeatability as repeats
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Table
 
 from . import model, positions
 
@@ -91,12 +91,13 @@ def _positions(position: NDArray[np.int_], cycle: NDArray[np.int_], mean: Mappin
             found = repeats.statistics(each)
             row += [found.mean * 1e3, found.sigma * 1e3 if len(each) > 1 else None]
         rows.append([*row, int(np.unique(cycle[position == n]).size)])
-    return {
-        "title": "Currents by position",
-        "caption": "Mean over the cycles and standard deviation (n − 1) of the cycles' means",
-        "columns": ["position", "I_x / mA", "σ(I_x) / mA", "I_y / mA", "σ(I_y) / mA", "cycles"],
-        "rows": rows,
-    }
+    return Table(
+        "currents_by_position",
+        "Currents by position",
+        "Mean over the cycles and standard deviation (n − 1) of the cycles' means",
+        ["position", "I_x / mA", "σ(I_x) / mA", "I_y / mA", "σ(I_y) / mA", "cycles"],
+        rows,
+    )
 
 
 def _spreads(position: NDArray[np.int_], mean: Mapping[str, Array], s: model.Setup) -> Table:
@@ -107,13 +108,14 @@ def _spreads(position: NDArray[np.int_], mean: Mapping[str, Array], s: model.Set
          (max(values[n]) - min(values[n])) / DPH]
         for n in ORDER if not n.startswith("k")
     ]  # fmt: skip
-    return {
-        "title": "Spread inside each mean",
-        "caption": "The single values of eq. 3-11 in °/h; what parts them is compliance (the two values of R and u_z) "
+    return Table(
+        "spread_inside_each_mean",
+        "Spread inside each mean",
+        "The single values of eq. 3-11 in °/h; what parts them is compliance (the two values of R and u_z) "
         "and error of attitude (the four of u)",
-        "columns": ["coefficient", "first", "second", "third", "fourth", "spread"],
-        "rows": rows,
-    }
+        ["coefficient", "first", "second", "third", "fourth", "spread"],
+        rows,
+    )
 
 
 def _cycles(
@@ -128,12 +130,13 @@ def _cycles(
     rows.append(["mean", *(each[n].mean / scale(n) for n in ORDER)])
     rows.append(["σ (n − 1)", *(each[n].sigma / scale(n) for n in ORDER)])
     return [
-        {
-            "title": "Cycle by cycle",
-            "caption": "Closed formulas of each cycle; k in °/h/mA, all others in °/h",
-            "columns": ["cycle", *ORDER],
-            "rows": rows,
-        }
+        Table(
+            "cycle_by_cycle",
+            "Cycle by cycle",
+            "Closed formulas of each cycle; k in °/h/mA, all others in °/h",
+            ["cycle", *ORDER],
+            rows,
+        )
     ]
 
 
@@ -151,13 +154,14 @@ def _book_fit(position: NDArray[np.int_], mean: Mapping[str, Array], s: model.Se
         residual = float(np.sqrt(np.sum((current - A @ beta) ** 2) / 4.0)) * k / DPH
         for n, v in zip(positions.UNKNOWNS[c], (k, *(beta[1:] * k).tolist()), strict=True):
             rows.append([n, v / scale(n), closed[n] / scale(n), (v - closed[n]) / scale(n), residual])
-    return {
-        "title": "Four unknowns a channel",
-        "caption": "Least squares of the eight mean currents in (1/k, R/k, u/k); residual standard deviation in °/h. "
+    return Table(
+        "four_unknowns_a_channel",
+        "Four unknowns a channel",
+        "Least squares of the eight mean currents in (1/k, R/k, u/k); residual standard deviation in °/h. "
         "Compliance parts the two columns",
-        "columns": ["coefficient", "least squares", "closed formula", "difference", "residual / (°/h)"],
-        "rows": rows,
-    }
+        ["coefficient", "least squares", "closed formula", "difference", "residual / (°/h)"],
+        rows,
+    )
 
 
 def _coefficients(s: model.Setup, each: Mapping[str, DriftTestResult]) -> Table:
@@ -174,9 +178,10 @@ def _coefficients(s: model.Setup, each: Mapping[str, DriftTestResult]) -> Table:
     ]
     rows: list[list[Any]] = [[n, f * c[m].estimate, abs(f) * c[m].u, unit] for n, m, f, unit in rule]
     rows += [[n, c[n].estimate, c[n].u, c[n].unit] for ch in "xy" for n in model.EXTRA[ch] if n in c]
-    return {
-        "title": "As drift coefficients",
-        "caption": f"Precession sign, per multiple of g0; γ = g/g0 = {g:.6f}",
-        "columns": ["coefficient", "estimate", "u", "unit"],
-        "rows": rows,
-    }
+    return Table(
+        "as_drift_coefficients",
+        "As drift coefficients",
+        f"Precession sign, per multiple of g0; γ = g/g0 = {g:.6f}",
+        ["coefficient", "estimate", "u", "unit"],
+        rows,
+    )

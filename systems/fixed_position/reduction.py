@@ -31,8 +31,9 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, TURNED
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 
 __all__ = ["ReductionError", "Setup", "from_record", "reduce"]
 
@@ -131,7 +132,7 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
         j, hours = names.index("trend"), span / 3600.0
         return float(found.value[j]) * hours, float(found.u[j]) * hours
     tested = found.f_test(
-        "trend", ((middle - middle.mean()) / span)[:, None], "drift that changes with time",
+        "trend", "trend", ((middle - middle.mean()) / span)[:, None], "drift that changes with time",
         "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
     )  # fmt: skip
     return None if tested is None else (float(tested[0][0]), float(tested[1][0]))
@@ -147,14 +148,14 @@ def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
         text = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate), text))
+        turned.append(TURNED[name].effect(s, found.error(-rate), note=text))
     offset = found.error(-s.k)
     return [
         *turned,
-        Effect("latitude", s.u_latitude, "rad", found.error(by_latitude), STATED),
-        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current), f"relative, {STATED}"),
-        Effect("offset of the current reading", s.u_current, "A", offset),
-        Effect("resolution of the current reading", s.quantum / 12.0**0.5, "A", offset, "as if never dithered"),
+        LATITUDE.effect(s, found.error(by_latitude)),
+        TORQUER_SCALE.effect(s, found.error(-s.k * current), note=f"relative, {STATED}"),
+        CURRENT_OFFSET.effect(s, offset),
+        CURRENT_RESOLUTION.effect(s.quantum / 12.0**0.5, offset),
     ]
 
 
@@ -170,11 +171,12 @@ def _conventions(s: Setup) -> list[str]:
 
 def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, Any]:
     X, Y, Z = s.xyz.tolist()
-    return {
-        "title": "From current to drift",
-        "caption": "Means over the record",
-        "columns": ["quantity", "value", "unit"],
-        "rows": [
+    return Table(
+        "from_current_to_drift",
+        "From current to drift",
+        "Means over the record",
+        ["quantity", "value", "unit"],
+        [
             ["Earth rate along the input axis ω_IA", s.input_rate / DPH, "°/h"],
             ["mean current i", float(np.average(i, weights=t1 - t0)) * 1e3, "mA"],
             ["k i", s.k * float(np.average(i, weights=t1 - t0)) / DPH, "°/h"],
@@ -182,7 +184,7 @@ def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, A
             ["X, Y, Z = −f/g0 along I, O, S", f"{X:.6f}, {Y:.6f}, {Z:.6f}", "1"],
             ["time of the readings", float(np.sum(t1 - t0)), "s"],
         ],
-    }
+    )
 
 
 def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:

@@ -12,7 +12,7 @@ from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.result import LoopResult, Response, Specification, Table
 
 from .field import FieldError, field_at
 
@@ -136,14 +136,17 @@ def _field(found: LoopFindings) -> None:
         ["inclination, down / °", field.inclination / DEG, field.u_inclination / DEG],
         ["horizontal field / µT", field.horizontal * 1e6, field.u_horizontal * 1e6],
     ]
-    found.tables.append({
-        "title": "Magnetic field of the site",
-        "caption": f"{field.model} on {o['date']} at latitude {site[0] / DEG:.4f}°, longitude {site[1] / DEG:.4f}°, "
-        f"{site[2]:g} m. u: of the model, one sigma, without local anomalies. The sensor of the run "
-        "has the model's own field; a true heading on the site has the u of the declination beside the errors found.",
-        "columns": ["", "value", "u"],
-        "rows": rows,
-    })  # fmt: skip
+    found.tables.append(
+        Table(
+            "magnetic_field_of_the_site",
+            "Magnetic field of the site",
+            f"{field.model} on {o['date']} at latitude {site[0] / DEG:.4f}°, longitude {site[1] / DEG:.4f}°, "
+            f"{site[2]:g} m. u: of the model, one sigma, without local anomalies. The sensor of the run "
+            "has the model's own field; a true heading on the site has the u of the declination beside the errors found.",
+            ["", "value", "u"],
+            rows,
+        )
+    )
 
 
 def _drift(found: LoopFindings) -> float:

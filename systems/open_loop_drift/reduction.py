@@ -31,15 +31,16 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, TURNED, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import ARCSEC, DPH
 
 from . import refusals
@@ -231,7 +232,7 @@ def _effects(
     for axis, name in ((1, "output"), (2, "spin")):
         R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate)))
+        turned.append(TURNED[name].effect(s, found.error(-rate)))
     whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
 
     def misread(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
@@ -241,17 +242,15 @@ def _effects(
 
     return [
         *turned,
-        Effect(
-            "latitude",
-            s.u_latitude,
-            "rad",
-            found.error(float(by_latitude)),
-            "positive where the stated one is too large",
+        LATITUDE.effect(s, found.error(float(by_latitude))),
+        Source("angle_between_first_and_last", "angle between first and last reading", "rad", "u_angle").effect(
+            s, whole
         ),
-        Effect("angle between first and last reading", s.u_angle, "rad", whole),
-        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "encoder", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "encoder", SINES),
-        Effect("float gain H/C", s.u_float_gain, "1", found.error(-coupled), "Earth rate along the spin axis times b"),
+        ANGLE_ONCE.effect(s, misread(1)),
+        ANGLE_TWICE.effect(s, misread(2)),
+        Source("float_gain_h_c", "float gain H/C", "1", "u_float_gain").effect(
+            s, found.error(-coupled), note="Earth rate along the spin axis times b"
+        ),
     ]
 
 
@@ -266,7 +265,7 @@ def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: 
         ["case angle at saturation", None if s.reach is None else s.reach / ARCSEC, "″"],
     ]
     head = ["quantity", "value", "unit"]
-    return {"title": "From angle to drift", "caption": "What the drift is made of", "columns": head, "rows": rows}
+    return Table("from_angle_to_drift", "From angle to drift", "What the drift is made of", head, rows)
 
 
 def _float_gain(run: RunDocument) -> float:

@@ -18,7 +18,7 @@ from scipy import special
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.result import Coefficient, Series
+from gyrobench.result import Coefficient, Series, Table
 
 ARCMIN = units.factor("arcmin")
 
@@ -99,4 +99,4 @@ class Levels:
             for k, (a, v, d) in enumerate(zip(self.angle, self.u, self.departure, strict=True))
         ]
         head = ["reading", "angle / ′", "u / mV", "departure from the line / µV"]
-        return {"title": "Readings", "caption": "In the order taken", "columns": head, "rows": rows}
+        return Table("readings", "Readings", "In the order taken", head, rows)

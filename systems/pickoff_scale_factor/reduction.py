@@ -30,13 +30,21 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_LEVEL_POLE,
+    INPUT_TO_OUTPUT,
+    VOLTMETER,
+    Source,
+)
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Specification
 
@@ -122,7 +130,7 @@ def reduce(windows: Mapping[str, Array], setup: PickoffSetup) -> DriftTestResult
 
     found = with_set_up(linear.derive(wanted, derived), sources, s.corrections)
     found.f_test(
-        "square and cube of the angle",
+        "square_and_cube_of_the", "square and cube of the angle",
         np.column_stack([np.diff((angle / span) ** p) / dt for p in (2, 3)]),
         "curvature of the pickoff", "the pickoff is not straight", "no curvature beyond the scatter",
     )  # fmt: skip
@@ -185,17 +193,23 @@ def _effects(found: Findings, s: PickoffSetup, both: bool, angle: Array, dt: Arr
 
     earth = found.error(slope * s.earth_rate)
     effects = [
-        Effect("gain H/C", s.u_gain, "1", None, "relative", values=only),
-        Effect("angle scale of the table", s.u_angle, "1", found.error(dX=wrong), "relative"),
-        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "encoder", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "encoder", SINES),
-        Effect("voltmeter", s.u_voltage, "1", found.error(found.y), "relative"),
-        Effect("table axis towards the pole", s.u_axis, "rad", earth, EARTH_ONLY),
-        Effect("input axis towards output axis", s.u_mount, "rad", earth, EARTH_ONLY),
+        Source("gain_h_c", "gain H/C", "1", "u_gain").effect(s, note="relative", values=only),
+        Source("angle_scale_of_the_table", "angle scale of the table", "1", "u_angle").effect(
+            s, found.error(dX=wrong), note="relative"
+        ),
+        ANGLE_ONCE.effect(s, misread(1)),
+        ANGLE_TWICE.effect(s, misread(2)),
+        VOLTMETER.effect(s, found.error(found.y)),
+        AXIS_LEVEL_POLE.effect(s, earth, note=EARTH_ONLY),
+        INPUT_TO_OUTPUT.effect(s, earth, note=EARTH_ONLY),
     ]
     if not both:
         note = "not told from the slope by angles gone over once; bound taken as two standard uncertainties"
-        effects.append(Effect("drift during the test", s.drift / 2.0, "rad/s", found.error(slope), note))
+        effects.append(
+            Source("drift_during_the_test", "drift during the test", "rad/s").effect(
+                s.drift / 2.0, found.error(slope), note=note
+            )
+        )
     return effects
 
 

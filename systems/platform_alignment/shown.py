@@ -8,7 +8,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.result import BudgetLine, Response
+from gyrobench.result import BudgetLine, Response, Table
 
 from . import plans
 from .record import ARCMIN, ARCSEC, DEG, K, Run
@@ -88,13 +88,16 @@ def tables(
         expected = plans.ready_after(h, sigma, goal * ARCMIN)
         error = run.error[at] / ARCMIN if at is not None and truth else None
         rows.append([goal, float(run.t[at]) if at is not None else None, expected, error])
-    found.append({
-        "title": "Time to be ready against accuracy",
-        "caption": "From switch-on until the platform is at north and the standard deviation of its heading stays at "
-        "the one wanted, within this run; by the controller and by the error model; true error at that time",
-        "columns": ["standard deviation wanted / ′", "ready / s", "by the error model / s", "true error / ′"],
-        "rows": rows,
-    })  # fmt: skip
+    found.append(
+        Table(
+            "time_to_be_ready_against",
+            "Time to be ready against accuracy",
+            "From switch-on until the platform is at north and the standard deviation of its heading stays at "
+            "the one wanted, within this run; by the controller and by the error model; true error at that time",
+            ["standard deviation wanted / ′", "ready / s", "by the error model / s", "true error / ′"],
+            rows,
+        )
+    )
     return found
 
 
@@ -114,14 +117,14 @@ def _stages(run: Run, settings: plans.Settings) -> dict[str, Any]:
         rows.append([plans.STAGES[stage - 1], float(run.t[inside[0]]), float(run.t[last] - run.t[inside[0]]), w, poles,
                      run.sigma[last] / ARCMIN if known else None, run.error[last] / ARCMIN if known else None,
                      float(np.hypot(*run.lean[last])) / ARCSEC])  # fmt: skip
-    return {
-        "title": "Stages",
-        "caption": "Natural frequency (of the falling one: the last) and poles of the levelling or gyrocompass loop; "
+    return Table(
+        "stages",
+        "Stages",
+        "Natural frequency (of the falling one: the last) and poles of the levelling or gyrocompass loop; "
         "standard deviation and true error of the heading and true tilt at the end of each stage",
-        "columns": ["stage", "from / s", "time / s", "ω / (rad/s)", "poles / (rad/s)", "σ(ψ) / ′", "error / ′",
-                    "tilt / ″"],
-        "rows": rows,
-    }  # fmt: skip
+        ["stage", "from / s", "time / s", "ω / (rad/s)", "poles / (rad/s)", "σ(ψ) / ′", "error / ′", "tilt / ″"],
+        rows,
+    )
 
 
 def _pole(p: complex) -> str:
@@ -152,6 +155,18 @@ def budget(
     if velocity > 0.0 and rest > 0.0:
         effect, size = float(np.sqrt(rest)) / DEG, 1e3 * velocity
         note = "by the controller: its variance less that of the other sources"
-        lines.append(BudgetLine("vibration of the base", size, "mm/s", effect / size, "°/(mm/s)", effect, "°", "ψ",
-                                note=note))  # fmt: skip
+        lines.append(
+            BudgetLine(
+                "vibration_of_the_base",
+                "vibration of the base",
+                size,
+                "mm/s",
+                effect / size,
+                "°/(mm/s)",
+                effect,
+                "°",
+                "ψ",
+                note=note,
+            )
+        )
     return sorted(lines, key=lambda x: -x.contribution)

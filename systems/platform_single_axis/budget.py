@@ -24,6 +24,7 @@ from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import base_ways
+from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
 LOWEST = 0.02  # Hz, where the integral over the noise begins: the running mean takes what is slower
@@ -69,14 +70,15 @@ def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[
         size = rms * abs(complex(across[0])) / ARCSEC
         shown.append(["not in the ride: base about y, output-axis coupling", degrees, "°", size, None])
     found.tables.append(
-        {
-            "title": TITLE,
-            "caption": f"Angle of the platform computed from the linear model for the ride at {ride.f:g} Hz, and its "
+        Table(
+            "title",
+            TITLE,
+            f"Angle of the platform computed from the linear model for the ride at {ride.f:g} Hz, and its "
             "share of the variance. Size: amplitude of the base, or density of the noise (two-sided). The ways of the "
             "base add as phasors and share its variance as their sizes, noise adds by squares.",
-            "columns": ["source", "size", "unit", "angle, rms / ″", "share / %"],
-            "rows": shown,
-        }
+            ["source", "size", "unit", "angle, rms / ″", "share / %"],
+            shown,
+        )
     )
     return {row[0]: row[3] for row in rows}
 

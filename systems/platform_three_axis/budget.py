@@ -40,6 +40,7 @@ from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.rides import still
 from gyrobench.reduction.series.gyro_noise import slow_density
+from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
 Complex = NDArray[np.complex128]
@@ -274,15 +275,16 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
         rows.append([name, "measured", measured / ARCSEC, None, None])
     if rows:
         found.tables.append(
-            {
-                "title": TITLE,
-                "caption": "Angle of the inner element in each motion, root sum of squares of the three axes about "
+            Table(
+                "title",
+                TITLE,
+                "Angle of the inner element in each motion, root sum of squares of the three axes about "
                 "mean and slope (commands: the two other axes), computed from the linear model, and its share of the "
                 "variance. Ways of one motion add with their phases: a negative share cancels part of the others. "
                 "Without it: what would be left if this source were switched off.",
-                "columns": ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"],
-                "rows": rows,
-            }
+                ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"],
+                rows,
+            )
         )
     return shares
 

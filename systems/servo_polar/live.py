@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Table
 from gyrobench.system.system import OnRequest, Slot
 from gyrobench.units import DPH
 
@@ -70,19 +70,21 @@ def tables(
     asked = f"Standard deviation wanted of mean and harmonics: {', '.join(wanted) or 'none stated'} °/h."
     model = "Type A only, for the noise that the estimator is told; NIS is 1 on average where that is right."
     return [
-        {
-            "title": "Live estimate: time to the wanted uncertainty",
-            "caption": f"{asked} {model}",
-            "columns": ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"],
-            "rows": stops,
-        },
-        {
-            "title": "Live estimate: drift over the angle",
-            "caption": "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, "
+        Table(
+            "live_estimate_time_to_the",
+            "Live estimate: time to the wanted uncertainty",
+            f"{asked} {model}",
+            ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"],
+            stops,
+        ),
+        Table(
+            "live_estimate_drift_over_the",
+            "Live estimate: drift over the angle",
+            "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, "
             "and at the end (generalized least squares over all windows)",
-            "columns": ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
-            "rows": values,
-        },
+            ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
+            values,
+        ),
     ]
 
 
@@ -109,20 +111,21 @@ def had_it_stopped(
         then = {c.name: c for c in reduce(shorter).coefficients}
     except ReductionError as error:
         why = "; ".join(error.problems)
-        return [{"title": LEFT, "caption": "Not estimable from these windows", "columns": ["reason"], "rows": [[why]]}]
+        return [Table("left", LEFT, "Not estimable from these windows", ["reason"], [[why]])]
     both = [
         [c.name, c.unit, c.estimate, c.u, then[c.name].estimate, then[c.name].u]
         for c in result.coefficients
         if c.name in then
     ]
     return [
-        {
-            "title": LEFT,
-            "caption": "Reduction of this report over all windows, and over those until each mount could have been "
+        Table(
+            "left",
+            LEFT,
+            "Reduction of this report over all windows, and over those until each mount could have been "
             "left; here the noise is estimated from the windows used, there it is told",
-            "columns": ["coefficient", "unit", "whole plan", "u", "left then", "u then"],
-            "rows": both,
-        }
+            ["coefficient", "unit", "whole plan", "u", "left then", "u then"],
+            both,
+        )
     ]
 
 

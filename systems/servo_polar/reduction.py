@@ -33,7 +33,7 @@ from gyrobench.reduction.series.noise_coefficients_table import noise_coefficien
 from gyrobench.reduction.setup import run_metadata, setups
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import DPH
 
 from . import closed, live, refusals
@@ -225,7 +225,7 @@ def _turn_differences(
     if not rows:
         return []
     head = ["series", "turn", "windows", "mean difference / (°/h)", "scatter / (°/h)"]
-    return [{"title": "Turns less the first turn", "caption": "At the same table angle", "columns": head, "rows": rows}]
+    return [Table("turns_less_the_first_turn", "Turns less the first turn", "At the same table angle", head, rows)]
 
 
 def _summary(

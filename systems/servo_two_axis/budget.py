@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
+from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.sources import ANGLE_OF, INNER_SQUARE, TIME_BASE, WOBBLE_OF, Source
 
 from .windows import Track
 
@@ -41,28 +42,26 @@ def effects(
     other = _others(seen)
     each, mounts = "each mount set up by itself", tuple(f"mount {p}" for p in np.unique(phase))
     out = [
-        Effect(f"table set up, about {a}", sizes["u_axis"], "rad", one_by_one(-moved(one), phase), each, mounts)
+        Source(f"table_set_up_about:{a}", f"table set up, about {a}", "rad", "u_axis").effect(
+            sizes, one_by_one(-moved(one), phase), note=each, parts=mounts
+        )
         for a, one in zip("XYZ", other["base"], strict=True)
     ]
     out += [
-        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(one))
+        Source(f"gyro_on_the_plate_about:{a}", f"gyro on the plate, about {a}", "rad", "u_mount").effect(
+            sizes, -moved(one)
+        )
         for a, one in zip("xyz", other["body"], strict=True)
     ]
-    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(*other["square"])))
+    out.append(INNER_SQUARE.effect(sizes, -moved(*other["square"])))
     for n, often in ((1, "once"), (2, "twice")):
         for name in AXES:
             change = np.array([moved(one) for one in other[f"{name} {n}"]])
-            out.append(
-                Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", change, "encoder", SINES)
-            )
+            out.append(ANGLE_OF[often].of(axis=name).effect(sizes[f"u_angle{n}"], change))
     for name in AXES:
         change = -np.array([moved(one) for one in other[f"{name} wobble"]])
-        out.append(
-            Effect(
-                f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase", PHASES
-            )
-        )
-    return [*out, Effect("time base", sizes["u_time"], "1", moved(*other["time"]), "relative")]
+        out.append(WOBBLE_OF.of(axis=name).effect(sizes, change))
+    return [*out, TIME_BASE.effect(sizes, moved(*other["time"]))]
 
 
 @functools.lru_cache(maxsize=1)

@@ -36,7 +36,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata, setups
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import DPH
 
 from . import budget, closed, geometry, refusals
@@ -226,7 +226,7 @@ def _mount_test(found: Findings, phase: NDArray[np.int_]) -> None:
     if others.size and not any(c.scatter for c, _ in found.joined):
         columns = (phase[:, None] == others).astype(float)
         found.f_test(
-            "mount to mount", columns, "change of the constant drift between mounts",
+            "mount_to_mount", "mount to mount", columns, "change of the constant drift between mounts",
             "the constant drift is not the same in all mounts: turn-on, warm-up, or a mount that is not true",
             "constant drift alike in all mounts",
         )  # fmt: skip
@@ -247,14 +247,23 @@ def _mounts_table(
             label, p, int(k.sum()), time / 3600.0, math.degrees(float(outer[-1, -1] - outer[0, 0])),
             math.degrees(float(np.max(np.abs(seen.angle[k][..., 1])))), math.degrees(zero), *scatter,
         ])  # fmt: skip
-    return {
-        "title": "Mounts",
-        "caption": "Turn of the outer axis, largest inner angle and that of a gyro without drift; scatter of residuals",
-        "columns": [
-            "mount", "phase", "windows", "time / h", "outer / °", "inner / °", "no drift / °", "x / (°/h)", "y / (°/h)",
+    return Table(
+        "mounts",
+        "Mounts",
+        "Turn of the outer axis, largest inner angle and that of a gyro without drift; scatter of residuals",
+        [
+            "mount",
+            "phase",
+            "windows",
+            "time / h",
+            "outer / °",
+            "inner / °",
+            "no drift / °",
+            "x / (°/h)",
+            "y / (°/h)",
         ],
-        "rows": rows,
-    }  # fmt: skip
+        rows,
+    )
 
 
 def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
@@ -266,12 +275,13 @@ def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
             q, k = found[c].quantities[at[ours]], at[ours]
             value, u = float(found[c].value[k]) / q.scale, float(found[c].u[k]) / q.scale
             rows.append([f"{symbol}, {c}", sign * value, u, q.unit, ours, "+" if sign > 0 else "−"])
-    return {
-        "title": "Notation of Hu 1981",
-        "caption": "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign against this report",
-        "columns": ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
-        "rows": rows,
-    }
+    return Table(
+        "notation_of_hu_1981",
+        "Notation of Hu 1981",
+        "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign against this report",
+        ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
+        rows,
+    )
 
 
 def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
@@ -288,12 +298,13 @@ def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
         rows.append([symbol, a, b, a - b, (a - b) / both if both > 0.0 else 0.0])
     if any(f.ideal for f in found.values()):
         rows = [[*row[:4], "–"] for row in rows]
-    return {
-        "title": "Compliances seen by both channels",
-        "caption": "E_n: difference over its expanded uncertainty (type A); below 1 in size they agree",
-        "columns": ["Hu 1981", "x channel / (°/h/g²)", "y channel / (°/h/g²)", "difference", "E_n"],
-        "rows": rows,
-    }
+    return Table(
+        "compliances_seen_by_both_channels",
+        "Compliances seen by both channels",
+        "E_n: difference over its expanded uncertainty (type A); below 1 in size they agree",
+        ["Hu 1981", "x channel / (°/h/g²)", "y channel / (°/h/g²)", "difference", "E_n"],
+        rows,
+    )
 
 
 def _equation(c: str, names: tuple[str, ...]) -> str:

@@ -33,7 +33,7 @@ from gyrobench.reduction.series.noise_coefficients_table import noise_coefficien
 from gyrobench.reduction.setup import run_metadata, setups
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import DPH
 
 from . import closed, refusals
@@ -197,9 +197,10 @@ def _attitudes_table(
     for p, label in labels.items():
         mine = phase == p
         rows.append([label, p, int(mine.sum()), float(y[mine].mean()) / DPH, float(residual[mine].mean()) / DPH])
-    return {
-        "title": "Drift in each attitude",
-        "caption": "Mean of the windows of a phase; residual: less the fitted model",
-        "columns": ["attitude", "phase", "windows", "drift / (°/h)", "residual / (°/h)"],
-        "rows": rows,
-    }
+    return Table(
+        "drift_in_each_attitude",
+        "Drift in each attitude",
+        "Mean of the windows of a phase; residual: less the fitted model",
+        ["attitude", "phase", "windows", "drift / (°/h)", "residual / (°/h)"],
+        rows,
+    )

@@ -19,7 +19,7 @@ from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, told
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
-from gyrobench.result import LoopResult, Specification
+from gyrobench.result import LoopResult, Specification, Table
 from gyrobench.units import ARCSEC
 
 from .closed import Loop
@@ -191,13 +191,14 @@ def _forms(loop: Loop, values: Mapping[str, tuple[float, float]]) -> dict[str, A
     ]
     if at is not None:
         rows.append(["gain limit, share of K", at[1], values.get("lower" if at[1] < 1.0 else "upper", (None,))[0], "1"])
-    return {
-        "title": "Closed forms of the loop",
-        "caption": "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The "
+    return Table(
+        "closed_forms_of_the_loop",
+        "Closed forms of the loop",
+        "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The "
         "measured loop has them.",
-        "columns": ["of the loop", "closed form", "measured", "unit"],
-        "rows": rows,
-    }
+        ["of the loop", "closed form", "measured", "unit"],
+        rows,
+    )
 
 
 def _isolation(found: LoopFindings, points: list[Point], loop: Loop | None, p: Mapping[str, Any]) -> None:
@@ -239,12 +240,13 @@ def _blow(found: LoopFindings) -> list[str]:
         ["share of the time with the motor at its limit", 100.0 * busy, "%"],
     ]
     found.tables.append(
-        {
-            "title": "Large disturbance",
-            "caption": f"{blow.amplitude:g} N·m for {blow.row.dwell:g} s and {rest.row.dwell:g} s after it.",
-            "columns": ["of the platform", "value", "unit"],
-            "rows": rows,
-        }
+        Table(
+            "large_disturbance",
+            "Large disturbance",
+            f"{blow.amplitude:g} N·m for {blow.row.dwell:g} s and {rest.row.dwell:g} s after it.",
+            ["of the platform", "value", "unit"],
+            rows,
+        )
     )
     if lost:
         found.warnings.append("After the blow the pickoff of the gyro was beyond its range.")

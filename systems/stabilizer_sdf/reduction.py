@@ -14,7 +14,7 @@ from gyrobench.reduction.estimation.fit_result import ReductionError
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import isolation, margins, told
-from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.result import LoopResult, Response, Specification, Table
 from gyrobench.units import DPH
 
 from . import closed
@@ -133,16 +133,17 @@ def _closed_forms(found: LoopFindings, p: Axis, kind: str, form: str, gate: Gate
     {"integrating": _integrating, "rate-integrating": _rate_integrating, "rate": _rate}[kind](found, p, t, a, b, step)
     apart = float(np.abs(a - wanted_a).max()), float(np.abs(b - wanted_b).max())
     found.tables.append(
-        {
-            "title": "Co-simulation against the closed form",
-            "caption": f"Over the whole load. The exchange once a step of {step:g} s may shift platform and float by "
+        Table(
+            "co_simulation_against_the_closed",
+            "Co-simulation against the closed form",
+            f"Over the whole load. The exchange once a step of {step:g} s may shift platform and float by "
             "M h t/J0 and M h/H; both shrink with the step. The rest is cos(b) and, with form=light, that form.",
-            "columns": ["angle", "largest difference", "expected of the exchange", "largest value", "unit"],
-            "rows": [
+            ["angle", "largest difference", "expected of the exchange", "largest value", "unit"],
+            [
                 ["platform", apart[0] / ARCMIN, end / ARCMIN, float(np.abs(a).max()) / ARCMIN, "arcmin"],
                 ["float", math.degrees(apart[1]), math.degrees(p.M * step / p.H), math.degrees(np.abs(b).max()), "°"],
             ],
-        }
+        )
     )
     label = "closed form, light damping" if form == "light" else "closed form"
     _figure(found, "load", "platform angle", "arcmin", t, a / ARCMIN, wanted_a / ARCMIN, label)
@@ -276,9 +277,4 @@ def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
     else:
         rows.append(["apparent inertia J0 + H²/K", p.inertia, "kg.m2"])
     columns = ["of the closed form", "value", "unit"]
-    return {
-        "title": "Sizes of the axis",
-        "caption": "From the parameters of the run.",
-        "columns": columns,
-        "rows": rows,
-    }
+    return Table("sizes_of_the_axis", "Sizes of the axis", "From the parameters of the run.", columns, rows)

@@ -32,7 +32,7 @@ from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import LoopResult, Specification
+from gyrobench.result import LoopResult, Specification, Table
 
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
@@ -169,14 +169,15 @@ def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window
         f"N·m/√Hz, standard deviation of an angle {mechanics.angle_error * 648000.0 / math.pi:.2g}″."
     )
     columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
-    found.tables.append({"title": "Windows", "caption": caption, "columns": columns, "rows": rows})
+    found.tables.append(Table("windows", "Windows", caption, columns, rows))
     found.tables.append(
-        {
-            "title": "Torques left out",
-            "caption": "Each as if it were in the model, with the p of chance; the model has none of them.",
-            "columns": ["torque", "size", "u", "unit", "p"],
-            "rows": [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out],
-        }
+        Table(
+            "torques_left_out",
+            "Torques left out",
+            "Each as if it were in the model, with the p of chance; the model has none of them.",
+            ["torque", "size", "u", "unit", "p"],
+            [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out],
+        )
     )
 
 

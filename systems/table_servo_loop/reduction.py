@@ -15,7 +15,7 @@ from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.loop_result import NAMES, LoopFindings
 from gyrobench.reduction.loops.loop_summary import margins as margin_sentences
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.result import LoopResult, Specification
+from gyrobench.result import LoopResult, Specification, Table
 from gyrobench.units import ARCSEC
 
 from .closed import ServoLoop, loop_of, sense_torque
@@ -113,7 +113,7 @@ def _hung(
         return
     caption = "Change of the inertial table angle; u: noise of the loop and of the drift rate taken off."
     columns = ["torque / (g·cm)", "angle / ″", "u / ″", "closed form / ″"]
-    found.tables.append({"title": "Hung torques", "caption": caption, "columns": columns, "rows": rows})
+    found.tables.append(Table("hung_torques", "Hung torques", caption, columns, rows))
     if not damped:
         found.measure("K_T", "static stiffness", "N·m/rad", None,
                       no_value="an undamped gyro integrates: the static table angle is 0")  # fmt: skip
@@ -172,13 +172,14 @@ def _limits(found: LoopFindings, points: list[Point], loop: ServoLoop | None) ->
         [f, g, 20.0 * math.log10(g), "yes" if float(loop.poles(1.05 * g).real.max()) > 0.0 else "no"] for f, g in limits
     ]
     found.tables.append(
-        {
-            "title": "Gain limits of the closed form",
-            "caption": f"All phase crossovers of L (python-control); phase margin {loop.phase_margin():.3g}° at "
+        Table(
+            "gain_limits_of_the_closed",
+            "Gain limits of the closed form",
+            f"All phase crossovers of L (python-control); phase margin {loop.phase_margin():.3g}° at "
             f"{loop.w_c / (2.0 * math.pi):.4g} Hz. A loop with a factor below 1 is conditionally stable.",
-            "columns": ["phase crossover / Hz", "factor on the gain", "factor / dB", "unstable 5 % above it"],
-            "rows": rows,
-        }
+            ["phase crossover / Hz", "factor on the gain", "factor / dB", "unstable 5 % above it"],
+            rows,
+        )
     )
     if loop.network in (3, 4) and loop.w_c < 2.0 * loop.H / math.sqrt(loop.J * loop.J_g):
         found.warnings.append(

@@ -19,8 +19,17 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_LEVEL_POLE,
+    INPUT_TO_OUTPUT,
+    INPUT_TO_SPIN,
+    TIME_BASE,
+    Source,
+)
 
 AMMETER, ZERO = "ammeter", "zero of the ammeter"
 
@@ -61,12 +70,12 @@ def effects(
     K, constant = slice(0, currents), slice(currents, 2 * currents)
     along_o, along_s = mean(np.sin(end) - np.sin(start)), mean(np.cos(start) - np.cos(end))
     return [
-        Effect(AMMETER, sizes.u_current, "1", design(K, K), "relative"),
-        Effect(ZERO, sizes.u_zero, "A", design(K, constant)),
-        Effect("angle error, once a turn", sizes.u_angle1, "rad", read(1), "encoder", SINES),
-        Effect("angle error, twice a turn", sizes.u_angle2, "rad", read(2), "encoder", SINES),
-        Effect("table axis towards the pole", sizes.u_axis, "rad", found.error(-earth_rate)),
-        Effect("input axis towards output axis", sizes.u_mount, "rad", found.error(-earth_rate * along_o)),
-        Effect("input axis towards spin axis", sizes.u_mount, "rad", found.error(earth_rate * along_s)),
-        Effect("time base", sizes.u_time, "1", found.error(-found.y), "relative, seconds read too long"),
+        Source("?", AMMETER, "1", "u_current").effect(sizes, design(K, K), note="relative"),
+        Source("?", ZERO, "A", "u_zero").effect(sizes, design(K, constant)),
+        ANGLE_ONCE.effect(sizes, read(1)),
+        ANGLE_TWICE.effect(sizes, read(2)),
+        AXIS_LEVEL_POLE.effect(sizes, found.error(-earth_rate)),
+        INPUT_TO_OUTPUT.effect(sizes, found.error(-earth_rate * along_o)),
+        INPUT_TO_SPIN.effect(sizes, found.error(earth_rate * along_s)),
+        TIME_BASE.effect(sizes, found.error(-found.y), note="relative, seconds read too long"),
     ]

@@ -35,7 +35,7 @@ from gyrobench.reduction.estimation.fit_result import budget_lines, changes_by_s
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Table, Test
 
 from . import marks, row_checks
 from .budget import AMMETER, Sizes
@@ -181,7 +181,7 @@ def reduce(
         dof=float(n - 2 if found is None else found.est.mixture.dof),
         noise=_noise(e, found),
         tests=[
-            Test("cubic term", e.F, e.p, "curvature of the torquer",
+            Test("cubic_term", "cubic term", e.F, e.p, "curvature of the torquer",
                  "the scale factor depends on the current" if seen else "no curvature beyond the scatter")
         ],
         residual_std=e.scatter / KU,
@@ -236,7 +236,7 @@ def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
     ]  # fmt: skip
     head = ["current / mA", "K_n / (°/h/mA)", "u / (°/h/mA)", "drift / (°/h)", "u / (°/h)"]
     caption = "Fit to all windows together; drift: at the middle of the angles of all currents"
-    return [{"title": "Scale factors from the windows", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("scale_factors_from_the_windows", "Scale factors from the windows", caption, head, rows)]
 
 
 class _Maker:
@@ -274,12 +274,25 @@ class _Maker:
 def _budget(s: TorquerSetup, mean: float, u_mean: float) -> list[BudgetLine]:
     a, size = u_mean / KU, mean / KU
     lines = [
-        BudgetLine("scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", "type A, with the linearity error in it")
+        BudgetLine(
+            "scatter_of_the_k_n",
+            "scatter of the K_n",
+            a,
+            UNIT,
+            1.0,
+            "1",
+            a,
+            UNIT,
+            "K",
+            "type A, with the linearity error in it",
+        )
     ]
     if s.u_current > 0.0:
         lines.append(BudgetLine(AMMETER, s.u_current, "1", size, UNIT, size * s.u_current, UNIT, "K", "relative"))
     if s.u_time > 0.0:
-        lines.append(BudgetLine("time base", s.u_time, "1", size, UNIT, size * s.u_time, UNIT, "K", "relative"))
+        lines.append(
+            BudgetLine("time_base", "time base", s.u_time, "1", size, UNIT, size * s.u_time, UNIT, "K", "relative")
+        )
     return lines
 
 
@@ -290,13 +303,21 @@ def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: f
          float((K_n[k] - mean) / mean * 100.0), float((K_n[k] / KU - printed) / printed * 100.0), float(half[k] / DPH)]
         for k in range(i.size)
     ]  # fmt: skip
-    return {
-        "title": "Scale factor and linearity",
-        "caption": f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA",
-        "columns": ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
-                    "linearity, K rounded / %", "drift / (°/h)"],
-        "rows": rows,
-    }  # fmt: skip
+    return Table(
+        "scale_factor_and_linearity",
+        "Scale factor and linearity",
+        f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA",
+        [
+            "current / mA",
+            "rate + / (°/h)",
+            "rate − / (°/h)",
+            "K_n / (°/h/mA)",
+            "linearity / %",
+            "linearity, K rounded / %",
+            "drift / (°/h)",
+        ],
+        rows,
+    )
 
 
 def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float] | None:

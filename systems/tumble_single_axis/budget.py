@@ -17,8 +17,22 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift import pulses, window_regressors
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_POLE_EAST,
+    AXIS_POLE_NORMAL,
+    CURRENT_OFFSET,
+    CURRENT_RESOLUTION,
+    INPUT_TO_SPIN,
+    TORQUER_NONLINEARITY,
+    TORQUER_SCALE,
+    TURNED,
+    WOBBLE,
+    Source,
+)
 
 from .setup import TumbleSetup
 
@@ -78,28 +92,24 @@ def effects(
     p = setup.pulses
     counted = p.effects(found, setup.k, windows, setup.u_pulse, setup.u_switching) if p else []
     return [
-        Effect("table axis off the pole, about east", setup.u_axis, "rad", axis(setup.base[0])),
-        Effect("table axis off the pole, about p × east", setup.u_axis, "rad", axis(setup.base[1])),
-        Effect(TOWARDS_OUTPUT, setup.u_mount, "rad", mount(along_s)),
-        Effect("input axis towards spin axis", setup.u_mount, "rad", mount(-along_o)),
-        Effect("gyro turned about its input axis", setup.u_mount, "rad", mount(along_i)),
-        Effect(
-            "wobble of the table axis, twice a turn", setup.u_wobble, "rad", _wobble(setup, turning, found), "", PHASES
+        AXIS_POLE_EAST.effect(setup, axis(setup.base[0])),
+        AXIS_POLE_NORMAL.effect(setup, axis(setup.base[1])),
+        Source("?", TOWARDS_OUTPUT, "rad", "u_mount").effect(setup, mount(along_s)),
+        INPUT_TO_SPIN.effect(setup, mount(-along_o)),
+        TURNED["input"].effect(setup, mount(along_i)),
+        WOBBLE.effect(setup, _wobble(setup, turning, found)),
+        ANGLE_ONCE.effect(setup, angles(1)),
+        ANGLE_TWICE.effect(setup, angles(2)),
+        TORQUER_SCALE.effect(setup, read(current)),
+        TORQUER_NONLINEARITY.effect(
+            setup,
+            read(current * np.abs(current) / full),
+            note=f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect("angle error, once a turn", setup.u_angle1, "rad", angles(1), "encoder", SINES),
-        Effect("angle error, twice a turn", setup.u_angle2, "rad", angles(2), "encoder", SINES),
-        Effect(
-            "torquer scale factor", setup.u_scale_factor, "1", read(current),
-            "relative, positive where the stated one is too large",
-        ),
-        Effect(
-            "torquer nonlinearity", setup.u_nonlinearity, "1", read(current * np.abs(current) / full),
-            f"relative departure from proportionality at {full * 1e3:.3g} mA",
-        ),
-        Effect("offset of the current reading", setup.u_current, "A", read(one)),
-        Effect("resolution of the current reading", setup.quantum / 12.0**0.5, "A", read(one), "as if never dithered"),
+        CURRENT_OFFSET.effect(setup, read(one)),
+        CURRENT_RESOLUTION.effect(setup.quantum / 12.0**0.5, read(one)),
         *counted,
-    ]  # fmt: skip
+    ]
 
 
 def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findings) -> Array:

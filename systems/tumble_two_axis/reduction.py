@@ -25,7 +25,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, regression
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, with_set_up
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -33,8 +33,20 @@ from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import RebalanceSetup, scale_factor_problems
+from gyrobench.reduction.setup.sources import (
+    ANGLE_OF,
+    CURRENT_OFFSET,
+    CURRENT_RESOLUTION,
+    OUTER_POLE_EAST,
+    OUTER_POLE_NORMAL,
+    SQUARE,
+    TORQUER_NONLINEARITY,
+    TORQUER_SCALE,
+    TURNED,
+    WOBBLE_OF,
+)
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import DPH
 
 from . import closed, geometry
@@ -275,10 +287,13 @@ def _harmonic_route(
               for a, i, sign, b, j in closed.TIES]  # fmt: skip
     checks += [[f"B{j}", value["B"][j], value["B"][j]] for j in (5, 9)]
     caption = "Differences that the model makes zero; compare them with the residual scatter"
-    table = {
-        "title": "Consistency of the harmonics", "caption": caption,
-        "columns": ["check", "amplitude / (°/h)", "difference / (°/h)"], "rows": checks,
-    }  # fmt: skip
+    table = Table(
+        "consistency_of_the_harmonics",
+        "Consistency of the harmonics",
+        caption,
+        ["check", "amplitude / (°/h)", "difference / (°/h)"],
+        checks,
+    )
     return theta, closed.separate(A, B, s.latitude, s.gravity), harmonics, [table], []
 
 
@@ -289,7 +304,7 @@ def _model_test(found: Findings, theta: Array) -> None:
     top = min((places - 1) // 2, 12)
     block = np.concatenate([f(j * theta)[:, None] for j in range(1, top + 1) for f in (np.cos, np.sin)], axis=1)
     found.f_test(
-        "harmonics of the positions", block, "model errors periodic in the position",
+        "harmonics_of_the_positions", "harmonics of the positions", block, "model errors periodic in the position",
         "something goes with the positions that the model does not hold", "no more than noise",
     )  # fmt: skip
 
@@ -300,9 +315,13 @@ def _cycle_test(found: Findings, theta: Array) -> None:
     blocks = [np.where((cycle == k)[:, None], found.X, 0.0) for k in range(1, int(cycle.max()) + 1)]
     if blocks and np.linalg.matrix_rank(np.concatenate([found.X, *blocks], axis=1)) == 9 * (1 + len(blocks)):
         found.f_test(
-            "cycle to cycle", np.concatenate(blocks, axis=1), "change of the drift between successive cycles",
-            "the cycles differ by more than the noise", "the cycles agree within the noise",
-        )  # fmt: skip
+            "cycle_to_cycle",
+            "cycle to cycle",
+            np.concatenate(blocks, axis=1),
+            "change of the drift between successive cycles",
+            "the cycles differ by more than the noise",
+            "the cycles agree within the noise",
+        )
 
 
 def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Array, readings: Windows) -> list[Effect]:
@@ -334,37 +353,26 @@ def _effects(s: TwoAxisSetup, found: Findings, outer: Array, inner: Array, C: Ar
     names = ("outer", "inner")
     full, one = float(np.max(np.abs(current))) or 1.0, np.ones_like(current)
     return [
-        Effect("outer axis off the pole, about east", s.u_axis, "rad", tilted(axes[2])),
-        Effect("outer axis off the pole, about p × east", s.u_axis, "rad", tilted(-axes[1])),
-        Effect("table axes out of the right angle", s.u_square, "rad", square),
+        OUTER_POLE_EAST.effect(s, tilted(axes[2])),
+        OUTER_POLE_NORMAL.effect(s, tilted(-axes[1])),
+        SQUARE.effect(s, square),
+        *(TURNED[n].effect(s, mounted(d)) for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)),
         *(
-            Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
-            for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)
-        ),
-        *(
-            Effect(f"{name} angle error, {often} a turn", size, "rad", read(k, n), "encoder", SINES)
+            ANGLE_OF[often].of(axis=name).effect(size, read(k, n))
             for n, often, size in ((1, "once", s.u_angle1), (2, "twice", s.u_angle2))
             for k, name in enumerate(names)
         ),
-        *(
-            Effect(f"wobble of the {name} axis, twice a turn", s.u_wobble, "rad", wobbling(k), "unknown phase", PHASES)
-            for k, name in enumerate(names)
+        *(WOBBLE_OF.of(axis=name).effect(s, wobbling(k)) for k, name in enumerate(names)),
+        TORQUER_SCALE.effect(s, found.error(-s.k * current)),
+        TORQUER_NONLINEARITY.effect(
+            s,
+            found.error(-s.k * current * np.abs(current) / full),
+            note=f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect(
-            "torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current),
-            "relative, positive where the stated one is too large",
-        ),
-        Effect(
-            "torquer nonlinearity", s.u_nonlinearity, "1", found.error(-s.k * current * np.abs(current) / full),
-            f"relative departure from proportionality at {full * 1e3:.3g} mA",
-        ),
-        Effect("offset of the current reading", s.u_current, "A", found.error(-s.k * one)),
-        Effect(
-            "resolution of the current reading", s.quantum / 12.0**0.5, "A", found.error(-s.k * one),
-            "as if never dithered",
-        ),
+        CURRENT_OFFSET.effect(s, found.error(-s.k * one)),
+        CURRENT_RESOLUTION.effect(s.quantum / 12.0**0.5, found.error(-s.k * one)),
         *(s.pulses.effects(found, s.k, readings, s.u_pulse, s.u_switching) if s.pulses else ()),
-    ]  # fmt: skip
+    ]
 
 
 def _conventions(s: TwoAxisSetup) -> list[str]:

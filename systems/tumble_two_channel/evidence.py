@@ -12,8 +12,18 @@ from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift import pulses, window_regressors
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_POLE_EAST,
+    AXIS_POLE_NORMAL,
+    TURNED,
+    WOBBLE,
+    Source,
+)
+from gyrobench.result import Table
 from gyrobench.units import DPH
 
 from . import geometry
@@ -66,7 +76,7 @@ def left_out(
     shift = found.gain @ more / DPH
     rows = [[q.title, float(v), q.unit] for q, v in zip(found.quantities, shift, strict=True)]
     caption = f"Predicted shift by {', '.join(extra)}, which are simulated and outside the model; likeliest noise model"
-    table = {"title": "Terms left out", "caption": caption, "columns": ["coefficient", "shift", "unit"], "rows": rows}
+    table = Table("terms_left_out", "Terms left out", caption, ["coefficient", "shift", "unit"], rows)
     return [table], [
         f"{', '.join(extra)} is simulated but not in the {s.model} model: the others are shifted as the table says."
     ]
@@ -116,27 +126,21 @@ def effects(
     one = np.ones_like(current)
     scale_factor, nonlinearity, zero, resolution, *_ = own_sources(c)
     return [
-        Effect("table axis off the pole, about east", s.u_axis, "rad", tilted(s.base[0])),
-        Effect("table axis off the pole, about p × east", s.u_axis, "rad", tilted(s.base[1])),
-        *(
-            Effect(f"gyro turned about its {n} axis", s.u_mount, "rad", mounted(d))
-            for n, d in zip("xyz", np.eye(3), strict=True)
+        AXIS_POLE_EAST.effect(s, tilted(s.base[0])),
+        AXIS_POLE_NORMAL.effect(s, tilted(s.base[1])),
+        *(TURNED[n].effect(s, mounted(d)) for n, d in zip("xyz", np.eye(3), strict=True)),
+        WOBBLE.effect(s, wobbling()),
+        ANGLE_ONCE.effect(s, angles(1)),
+        ANGLE_TWICE.effect(s, angles(2)),
+        Source("?", scale_factor, "1", "u_scale_factor").effect(
+            s, found.error(-k * current), note="relative, positive where the stated one is too large"
         ),
-        Effect("wobble of the table axis, twice a turn", s.u_wobble, "rad", wobbling(), "", PHASES),
-        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder", SINES),
-        Effect(
-            scale_factor, s.u_scale_factor, "1", found.error(-k * current),
-            "relative, positive where the stated one is too large",
+        Source("?", nonlinearity, "1", "u_nonlinearity").effect(
+            s,
+            found.error(-k * current * np.abs(current) / full),
+            note=f"relative departure from proportionality at {full * 1e3:.3g} mA",
         ),
-        Effect(
-            nonlinearity, s.u_nonlinearity, "1", found.error(-k * current * np.abs(current) / full),
-            f"relative departure from proportionality at {full * 1e3:.3g} mA",
-        ),
-        Effect(zero, s.u_current, "A", found.error(-k * one)),
-        Effect(
-            resolution, quantum / 12.0**0.5, "A", found.error(-k * one),
-            "as if never dithered",
-        ),
+        Source("?", zero, "A", "u_current").effect(s, found.error(-k * one)),
+        Source("?", resolution, "A").effect(quantum / 12.0**0.5, found.error(-k * one), note="as if never dithered"),
         *(counted.effects(found, k, readings, s.u_pulse, s.u_switching, OTHER[c]) if counted else ()),
-    ]  # fmt: skip
+    ]

@@ -34,7 +34,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 from gyrobench.units import DPH
 
 from . import closed, evidence, geometry
@@ -229,7 +229,7 @@ def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, 
         "and u_zy without the outer gimbal"
     )
     head = ["symbol", "is", "least squares", "u", "closed formula", "unit"]
-    return [{"title": "Quantities of Hu 1981", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("quantities_of_hu_1981", "Quantities of Hu 1981", caption, head, rows)]
 
 
 def _equation(c: str, names: tuple[str, ...]) -> str:

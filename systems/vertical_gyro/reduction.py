@@ -14,7 +14,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.result import LoopResult, Response, Specification, Table
 
 ARCMIN, DEG = math.pi / 10800.0, math.pi / 180.0
 G0 = 9.80665
@@ -245,10 +245,11 @@ def _phases(found: LoopFindings, o: Mapping[str, Any]) -> dict[str, Any]:
         tilt = np.hypot(*_of(gate).T) / ARCMIN
         cut = float(np.mean(gate["erection.cut"] > 0.0)) if "erection.cut" in gate.channels else None
         rows.append([gate.label, float(gate.t[-1] - gate.t[0]), tilt[0], tilt[-1], tilt.max(), cut])
-    return {
-        "title": "Tilt by phase",
-        "caption": "Cut off: share of the phase in which a channel of the erection was open.",
-        "columns": [
+    return Table(
+        "tilt_by_phase",
+        "Tilt by phase",
+        "Cut off: share of the phase in which a channel of the erection was open.",
+        [
             "phase",
             "length / s",
             "tilt at its start / arcmin",
@@ -256,8 +257,8 @@ def _phases(found: LoopFindings, o: Mapping[str, Any]) -> dict[str, Any]:
             "largest / arcmin",
             "cut off",
         ],
-        "rows": rows,
-    }
+        rows,
+    )
 
 
 def _figure(found: LoopFindings, name: str, what: str, unit: str, t: Array, y: Array, caption: str) -> None:

@@ -27,12 +27,24 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
+from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup import window_checks
 from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    ATTITUDE_SERVO,
+    AXIS_SERVO,
+    INPUT_TO_OUTPUT,
+    INPUT_TO_SPIN,
+    TIME_BASE,
+    UNBALANCE,
+    WOBBLE,
+)
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations
@@ -205,20 +217,17 @@ def effects(
 
     each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [
-        Effect("table axis about y", sizes["u_axis"], "rad", axis(1), each, phases),
-        Effect("table axis about z", sizes["u_axis"], "rad", axis(2), each, phases),
-        Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), each, phases),
-        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble(), "", PHASES),
-        Effect("input axis towards output axis", sizes["u_mount"], "rad", mount(2)),
-        Effect("input axis towards spin axis", sizes["u_mount"], "rad", -mount(1)),
-        Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder", SINES),
-        Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder", SINES),
-        Effect(
-            "unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis",
-            ("mass along z", "mass along y"),
-        ),
-        Effect("time base", sizes["u_time"], "1", fit.error(-held.rate), "relative"),
-    ]  # fmt: skip
+        AXIS_SERVO.of(axis="y").effect(sizes, axis(1), note=each, parts=phases),
+        AXIS_SERVO.of(axis="z").effect(sizes, axis(2), note=each, parts=phases),
+        ATTITUDE_SERVO.effect(sizes, axis(0), note=each, parts=phases),
+        WOBBLE.effect(sizes, wobble()),
+        INPUT_TO_OUTPUT.effect(sizes, mount(2)),
+        INPUT_TO_SPIN.effect(sizes, -mount(1)),
+        ANGLE_ONCE.effect(sizes, order(1)),
+        ANGLE_TWICE.effect(sizes, order(2)),
+        UNBALANCE.effect(sizes, unbalance()),
+        TIME_BASE.effect(sizes, fit.error(-held.rate)),
+    ]
 
 
 def _mounted(held: Held, k: int) -> Held:
@@ -247,11 +256,11 @@ def candidates(
         Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2), PART),
         Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1), PART),
         *nuisances.common({**windows, "t_start": held.t_start, "t_end": held.t_end}),
-        nuisances.scatter("σ_mount", nuisances.MOUNTS, phase.tolist()),
+        nuisances.scatter("mount", phase.tolist()),
     ]
 
 
-def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
+def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
     """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
@@ -259,12 +268,13 @@ def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict
             symbol, sign = BOOK[q.name]
             words = (combined or {}).get(q.name, symbol)
             rows.append([words, sign * value / q.scale, u / q.scale, q.unit, q.title, "+" if sign > 0 else "−"])
-    return {
-        "title": "Notation of Hu 1981",
-        "caption": "Torque sign, ω_M = −ω_d; last column: sign against this report",
-        "columns": ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
-        "rows": rows,
-    }
+    return Table(
+        "notation_of_hu_1981",
+        "Notation of Hu 1981",
+        "Torque sign, ω_M = −ω_d; last column: sign against this report",
+        ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
+        rows,
+    )
 
 
 CONVENTIONS = (

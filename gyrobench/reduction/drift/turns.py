@@ -21,8 +21,9 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.result import Table
 
-AGREE = "turn to turn"
+AGREE, HIGH = "turns.agree", "turns.harmonics"  # ids of the tests
 
 
 @dataclass
@@ -51,7 +52,7 @@ class Turns:
         """F tests of the harmonics the model does not hold and, where a phase has several, of turn against turn."""
         self._harmonic_test()
         self.found.f_test(
-            AGREE, self._turn_columns(), "change of the drift between successive turns",
+            AGREE, "turn to turn", self._turn_columns(), "change of the drift between successive turns",
             "the turns differ by more than the noise", "the turns agree within the noise",
         )  # fmt: skip
 
@@ -68,7 +69,7 @@ class Turns:
         extra = np.concatenate(columns, axis=1) if columns else np.empty((self.turn.size, 0))
         name = f"harmonics {self.held + 1} and higher"
         size = self.found.f_test(
-            name, extra, "model errors periodic in the table angle",
+            HIGH, name, extra, "model errors periodic in the table angle",
             "something turns with the table that the model does not hold", "no more than noise",
         )  # fmt: skip
         if size is not None:
@@ -122,7 +123,7 @@ class Turns:
 
     def repeatability(self) -> dict[str, Any]:
         """F test of the turns and the scatter of their harmonics; empty where no test was made."""
-        test = next((t for t in self.found.tests if t.name == AGREE), None)
+        test = next((t for t in self.found.tests if t.id == AGREE), None)
         if test is None:
             return {}
         rows = self._rows()
@@ -137,10 +138,10 @@ class Turns:
             scatter[f"scatter of {name} / ({self.found.y_unit})"] = size
         return {"F": test.statistic, "p": test.p, "finding": test.finding, **scatter}
 
-    def table(self, over: str = "θ") -> list[dict[str, Any]]:
+    def table(self, over: str = "θ") -> list[Table]:
         """Harmonics of each turn; empty for single turns."""
         if not self.turn.any():
             return []
         caption = f"Amplitudes in {self.found.y_unit} over {over}"
         head = ["series", "turn", *self._names()]
-        return [{"title": "Harmonics of each turn", "caption": caption, "columns": head, "rows": self._rows()}]
+        return [Table("harmonics_of_each_turn", "Harmonics of each turn", caption, head, self._rows())]

@@ -102,7 +102,7 @@ class Effect:
         if self.simulated:
             return list(self.simulated)
         given = simulated.get(self.id, 0.0)
-        if np.ndim(self.error) == 1:
+        if self.error is None or self.error.ndim == 1:
             return [given if isinstance(given, float) else 0.0]
         return [given.get(p, 0.0) if isinstance(given, dict) else given for p in self.parts]
 

@@ -62,7 +62,10 @@ class Estimates:
 
 @dataclass
 class Findings:
-    """A fit and what its residuals say; made by :meth:`Regression.fit`.  Data in SI, what is shown in the unit of the data."""
+    """A fit and what its residuals say; made by :meth:`Regression.fit`.
+
+    Data in SI, what is shown in the unit of the data.
+    """
 
     data: Regression
     quantities: tuple[Quantity, ...]

@@ -1,4 +1,4 @@
-"""From a linear fit to what a test has found: estimates with their budget, tables, figures, and the reasons against them.
+"""From a linear fit to what a test has found: estimates with their budget, tables, figures, reasons against them.
 
 Everything inside is SI; what a result holds is in the printed unit of each quantity.  There is no limit and no verdict
 here (gyrobench.reduction.estimation.verdict).  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
@@ -10,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -120,7 +120,10 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
             *_slow_drift(fit, coefficients, rows),
             *outliers.warnings(fit, odd),
             *fit.warnings(),
-            *([Reason("closed_form.none", f"No closed-form estimates: {account.no_closed}.")] * bool(account.no_closed)),
+            *(
+                [Reason("closed_form.none", f"No closed-form estimates: {account.no_closed}.")]
+                * bool(account.no_closed)
+            ),
             *_ill_conditioned(fit),
             *account.reasons,
         ],
@@ -181,7 +184,7 @@ def _unstated(fit: Findings, effects: Sequence[Effect]) -> list[Reason]:
 
 
 def _slow_drift(fit: Findings, coefficients: Sequence[Coefficient], contributions: Array) -> list[Reason]:
-    """Return that the noise may be slow drift, which the record does not exclude: verdicts must hold for its intervals."""
+    """Return that the noise may be slow drift, not excluded by the record: verdicts must hold for it."""
     probability, widening = fit.if_slow()
     intervals = {}
     for j, c in enumerate(coefficients):

@@ -57,11 +57,13 @@ class Regression:
 
     def rows(self, keep: NDArray[np.bool_]) -> Regression:
         """Return the regression of some rows; it has no figures, and its condition has been looked at."""
-        times = (None if t is None else t[keep] for t in (self.t_start, self.t_end))
+        t_start, t_end = (None if t is None else t[keep] for t in (self.t_start, self.t_end))
         candidates = [replace(c, columns=np.asarray(c.columns)[keep]) for c in self.candidates]
         weights = None if self.weights is None else self.weights[keep]
-        few = replace(self, X=self.X[keep], y=self.y[keep], weights=weights, candidates=candidates)
-        return replace(few, **dict(zip(("t_start", "t_end"), times, strict=True)), groups=(), limit=math.inf)
+        return replace(
+            self, X=self.X[keep], y=self.y[keep], t_start=t_start, t_end=t_end, weights=weights,
+            candidates=candidates, groups=(), limit=math.inf,
+        )  # fmt: skip
 
     def fit(self, known: Array | None = None) -> Findings:
         """Return the fit.  known (m, n): errors of the set-up of one standard uncertainty each, independent, which are

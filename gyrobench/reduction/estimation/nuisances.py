@@ -258,7 +258,7 @@ def table(
 
 def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
     """Return what joined the model, as sentences."""
-    out = []
+    out: list[str] = []
     for c, e in zip(candidates, est.evidence, strict=True):
         if not e.joined:
             continue

@@ -63,7 +63,7 @@ def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float
 
 
 def reduce_days(record: Record, reduce: Callable[[Mapping[str, Array]], DriftTestResult]) -> DriftTestResult:
-    """Return the result of a record, day by day where its plan holds several.  Raises ReductionError, naming the day."""
+    """Return the result of a record, day by day where its plan holds several.  Raises ReductionError."""
     day = {row.phase: row.day for row in record.run.plan}
     names = np.array([day.get(int(p), "") for p in record.windows["phase"]])
     each = {}
@@ -102,7 +102,9 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
         if min(u_own) > 0.0 and stats.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
             q, p = agreement(table[:, j].tolist(), u_own)
             text = f"varies from {what} to {what} by more than its noise" if p < 0.05 else "constant within its noise"
-            tests.append(Test(f"{REPEATS}:{name}", f"{what} to {what}, {name}", q, p, f"change between the {what}s", text))
+            tests.append(
+                Test(f"{REPEATS}:{name}", f"{what} to {what}, {name}", q, p, f"change between the {what}s", text)
+            )
         x = [float(k + 1) for k in range(n)]
         y = table[:, j].tolist()
         series.append(
@@ -114,7 +116,9 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
         c = coefficients[-1]
         note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
         budget.append(
-            BudgetLine(TYPE_A, f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note)
+            BudgetLine(
+                TYPE_A, f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note
+            )
         )
         budget += [b for b in parts[0].budget if b.coefficient == name and b.id != TYPE_A]
     varying = [t.id.partition(":")[2] for t in tests if t.p is not None and t.p < 0.05]
@@ -144,8 +148,12 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
 
 def _reasons(results: Mapping[str, DriftTestResult], what: str) -> list[Reason]:
     """Return what limits the days: a warning of several once, a doubt of one with its day."""
-    found = [r if r.severity in ("error", "warning") else replace(r, text=f"{what} {day}: {r.text}", names=(), intervals={})
-             for day, result in results.items() for r in result.reasons if r.severity != "condition"]  # fmt: skip
+    found = [
+        r if r.severity in ("error", "warning") else replace(r, text=f"{what} {day}: {r.text}", names=(), intervals={})
+        for day, result in results.items()
+        for r in result.reasons
+        if r.severity != "condition"
+    ]
     return list(dict.fromkeys(found))
 
 

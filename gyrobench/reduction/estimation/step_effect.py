@@ -72,7 +72,9 @@ def with_step(result: R, check: Mapping[str, Any]) -> R:
         rows.append({**row, "u": c.u, "ratio": abs(change) / c.u if c.u > 0.0 else None})
         parts[c.name] = change / math.sqrt(3.0)
         if c.u > 0.0 and not any(b.coefficient == c.name for b in budget):
-            budget.append(BudgetLine("type_a", "noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A"))
+            budget.append(
+                BudgetLine("type_a", "noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A")
+            )
         size = (step, "s", parts[c.name] / step, f"{c.unit}/s", abs(parts[c.name]), c.unit, c.name)
         budget.append(BudgetLine(STEP, "coupling step", *size, "m(h) − m(0), rectangular"))
         widened.append(_widened(c, abs(parts[c.name])))

@@ -21,7 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, Test
+from gyrobench.result import Coefficient, Reason, Test
 
 RANKED = "error"  # the coefficient that ranks estimators, smallest first
 LOOP = 5.0  # degrees of phase that an estimator may cost in a loop
@@ -78,7 +78,7 @@ class Measures:
     coefficients: list[Coefficient] = field(default_factory=list)
     tests: list[Test] = field(default_factory=list)
     acf: dict[str, list[float]] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
+    reasons: list[Reason] = field(default_factory=list)
     error: Array = field(default_factory=lambda: np.zeros(0))
 
     def named(self, name: str) -> Coefficient:
@@ -124,10 +124,11 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     _consistency(m, s, R)
     phase = 360.0 * CROSSOVER * latency
     if phase > LOOP:
-        m.warnings.append(
+        text = (
             f"The stated delay of {latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
             f"{CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
         )
+        m.reasons.append(Reason("estimator.delay", text))
     return m
 
 
@@ -177,7 +178,9 @@ def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency:
             if worse
             else "Part of the noise reduction is attenuation of the signal"
         )
-        m.warnings.append(f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
+        m.reasons.append(
+            Reason("estimator.gain", f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
+        )
 
 
 def _consistency(m: Measures, s: Signals, R: float | None) -> None:
@@ -190,11 +193,13 @@ def _consistency(m: Measures, s: Signals, R: float | None) -> None:
         white = (
             "white: compatible with the signal model" if p >= 0.001 else "not white: the signal model does not apply"
         )
-        m.tests.append(Test("Ljung-Box, innovations", q, p, "autocorrelation, absent for the correct model", white))
+        what = "autocorrelation, absent for the correct model"
+        m.tests.append(Test("ljung_box.innovations", "Ljung-Box, innovations", q, p, what, white))
         if p < 0.001:
-            m.warnings.append(
+            text = (
                 "The innovations are not white (Ljung-Box, p < 0.001). The signal model of the filter does not apply."
             )
+            m.reasons.append(Reason("estimator.innovations", text))
     if s.R_hat is not None and R:
         m.add("R̂/R", "estimated variance of a reading divided by the true one", "1",
               estimator_metrics.variance_ratio(s.R_hat, R), truth=1.0)  # fmt: skip
@@ -209,6 +214,7 @@ def _against_chi_square(m: Measures, name: str, what: str, c: Consistency) -> No
     else:
         finding = f"inconsistent: the filter overstates its {what} variance"
     what_for = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
-    m.tests.append(Test(name, c.mean, c.p, what_for, finding))
+    m.tests.append(Test(f"chi_square:{name}", name, c.mean, c.p, what_for, finding))
     if not c.holds:
-        m.warnings.append(f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {finding}.")
+        text = f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {finding}."
+        m.reasons.append(Reason(f"estimator.consistency:{name}", text))

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Response
+from gyrobench.result import Response, Table
 
 DEG = math.pi / 180.0
 SHOWN = 700  # points of a drawn line
@@ -102,7 +101,7 @@ def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> dict[str, Any]:
+def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> Table:
     """Table with a row for each stretch of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
     rows = []
     for kind, flag in kinds.items():
@@ -110,16 +109,25 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
             numbers = [flight.t[a], flight.t[b], angle[a] / DEG, angle[b] / DEG, flight.error[a] / DEG]
             worst = float(np.max(flight.error[a : b + 1])) / DEG
             rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
-    return {
-        "title": "Gimbal lock",
-        "caption": "Intervals in which the gimbals were locked or close to lock; times are those of the record",
-        "columns": ["event", "leg", "from / s", "to / s", f"{name} at the start / °", "at the end / °",
-                    "platform error at the start / °", "largest / °"],
-        "rows": sorted(rows, key=lambda r: float(r[2])),
-    }  # fmt: skip
+    return Table(
+        "gimbal_lock",
+        "Gimbal lock",
+        "Intervals in which the gimbals were locked or close to lock; times are those of the record",
+        [
+            "event",
+            "leg",
+            "from / s",
+            "to / s",
+            f"{name} at the start / °",
+            "at the end / °",
+            "platform error at the start / °",
+            "largest / °",
+        ],
+        sorted(rows, key=lambda r: float(r[2])),
+    )
 
 
-def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> dict[str, Any]:
+def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> Table:
     """Return the table of what each leg did.  columns: name -> value in the stretch of the flight that is the leg."""
     rows = []
     for gate in flight.gates:
@@ -128,12 +136,13 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
         error = flight.error[s] / DEG
         known = [gate.label, float(gate.t[-1] - gate.t[0]), float(base.max()) / DEG]
         rows.append([*known, *(float(value(s)) for value in columns.values()), float(error.max()), float(error[-1])])
-    return {
-        "title": "Legs of the flight",
-        "caption": caption,
-        "columns": ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
-        "rows": rows,
-    }
+    return Table(
+        "legs_of_the_flight",
+        "Legs of the flight",
+        caption,
+        ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
+        rows,
+    )
 
 
 def over_time(

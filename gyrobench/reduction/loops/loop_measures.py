@@ -25,6 +25,7 @@ from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
@@ -385,7 +386,7 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
 
 
 # ------------------------------------------------------------------------------------------- axes
-def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> dict[str, Any]:
+def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> Table:
     """Return the table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
 
     points: (k, j) -> complex ratio at one frequency, numbered from 1.  axes: their names.  A missing pair stays empty.
@@ -399,4 +400,4 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
             cells.append(None if direct is None or coupled is None or not direct else 100.0 * abs(coupled / direct))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
-    return {"title": f"Cross-axis coupling, {what}", "caption": "", "columns": columns, "rows": rows}
+    return Table(f"cross_axis_coupling:{what}", f"Cross-axis coupling, {what}", "", columns, rows)

@@ -5,7 +5,7 @@ loop = builder.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # 
 builder.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
 builder.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
 builder.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
-return builder.result(title=..., method=..., sources=[...], equation=..., conventions=[...], specification=...)
+return builder.result(Account(method=..., sources=[...], equation=..., conventions=[...]), summary)
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
 from gyrobench.reduction.loops.loop_measures import (
@@ -45,10 +46,12 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.result import Coefficient, LoopResult, Response, Specification
+from gyrobench.result import NO_VERDICT, Coefficient, LoopResult, Reason, Response, Table
 from gyrobench.units import DPH
 
+EVERY = ("pass", "fail", "inconclusive", NO_VERDICT)
+AGREEMENT = "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
+AGREEMENT_COLUMNS = ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"]
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 
@@ -66,13 +69,20 @@ class LoopFindings:
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
         self.coefficients: list[Coefficient] = []
         self.responses: list[Response] = []
-        self.tables: list[dict[str, Any]] = []
-        self.warnings: list[str] = []
+        self.tables: list[Table] = []
+        self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
+        self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
+        self.reasons: list[Reason] = []
         self.allan: dict[str, Any] = {}
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
         if self.linear.missing:
-            self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
+            self.warn("linear.missing", f"No linear model for comparison: {self.linear.missing}")
+
+    def warn(self, id: str, text: str, severity: str = "warning") -> None:
+        """Add what a reader must know, once; nothing for ""."""
+        reason = Reason(id, text, severity=severity)
+        self.reasons += [reason] if text and reason not in self.reasons else []
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
         """Return the phases of a kind, in their order."""
@@ -90,7 +100,6 @@ class LoopFindings:
         *,
         closed: float | None = None,
         truth: float | None = None,
-        limits: Specification | None = None,
         no_value: str = "",
         unsettled: str = "",
     ) -> None:
@@ -106,7 +115,8 @@ class LoopFindings:
             return
         size = u if u is not None and (no_value or math.isfinite(u)) else 0.0
         half = uncertainty.NORMAL * size
-        limit = (limits or {}).get(name)
+        if unsettled:
+            self.reasons.append(Reason("unsettled", unsettled, EVERY, (name,), "void", "condition"))
         self.coefficients.append(
             Coefficient(
                 name=name,
@@ -120,20 +130,17 @@ class LoopFindings:
                 closed=closed,
                 truth=truth,
                 z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
-                limit=limit,
-                verdict="void" if unsettled else uncertainty.assess_conformity(estimate, half, limit),
                 no_value=no_value,
             )
         )
 
     def void(self, names: Sequence[str], reason: str) -> None:
         """Take the values of coefficients away: their phase was unstable or unsettled."""
+        nothing: dict[str, Any] = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
         for k, c in enumerate(self.coefficients):
             if c.name in names:
-                self.coefficients[k] = replace(
-                    c, estimate=math.nan, u=math.nan, interval=(math.nan, math.nan), u_a=None, z=None, verdict="void",
-                    no_value=reason,
-                )  # fmt: skip
+                self.coefficients[k] = replace(c, **nothing, u_a=None, z=None, no_value=reason)
+        self.reasons.append(Reason("unstable", reason, EVERY, tuple(names), "void", "condition"))
 
     @property
     def estimates(self) -> dict[str, float]:
@@ -167,34 +174,33 @@ class LoopFindings:
         )
         if not all(counts):
             caption += " Grey: too noisy to count, or of an unstable run."
-        curves, rows = [], []
+        curves = []
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
         at = [p.f for p in sure]
         shown = m.measured_margins(sure)
         computed: dict[str, m.Margins] = {}
-        rows.append(shown.row("measured"))
+        rows = {"measured": shown.row("measured")}
         for kind, label in NAMES.items():
             model = models.of(kind)
             if model is None:
                 continue
             dense = model_response(model, span)[:, 0, 0]
             limits = computed[kind] = m.margins(span, dense)
-            rows.append(limits.row(label))
+            rows[kind] = limits.row(label)
             curves.append(curve(label, span, dense))
             if limits.crossover is not None:
                 self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
             if kind == "discrete" and not self.unstable:
                 self._conditional(title, limits)
-        self.responses.append(bode(title, "loop", caption, points, curves, "gain", "1"))
-        self.responses[-1].counts = counts
-        self.tables.append(
-            {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
-             "rows": rows}
-        )  # fmt: skip
+        drawn = bode(title, "loop", caption, points, curves, "gain", "1")
+        self.responses.append(replace(drawn, counts=counts))
+        self.margins[loop] = {kind: row[1:] for kind, row in rows.items()}
+        note = _margin_note(self.record.run)
+        self.tables.append(Table(f"margins:{loop}", f"Stability margins, {title}", note, m.COLUMNS, [*rows.values()]))
         key = "" if loop == "stabilizer" else f" {loop}"
         self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
         values = m.measured_values(sure, self.excluded[loop])
-        closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
+        closest = rows.get("discrete", [None] * 3)
         twin = None
         if "phase" in values and models.discrete is not None:
             twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
@@ -208,12 +214,12 @@ class LoopFindings:
         ):
             self.measure(name, what, unit, *value, closed=closed, no_value=none)
         noisy = "" if self.unstable else excluded_words(title, points, counts)
-        self.warnings += [noisy] if noisy else []
+        self.warn("loop.noisy", noisy)
         if "phase" in values:
             self._missed(title, *values["crossover"], self.linear.wanted.get(loop) if self.linear.missing else None)
         if twin is not None and twin.contradicts(values["crossover"], values["phase"]):
             causes = self._causes(sines, noisy)
-            self.warnings.append(disagreement(title, values["crossover"], values["phase"], twin, causes))
+            self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
 
     def _causes(self, sines: Sequence[Gate], noisy: str) -> list[str]:
@@ -228,7 +234,8 @@ class LoopFindings:
     def _missed(self, title: str, crossover: float, u: float, wanted: float | None) -> None:
         """Warn of a crossover that is not the one asked for, where no linear model said so before the run."""
         if wanted is not None and abs(crossover - wanted) > TOLERANCE * wanted + uncertainty.NORMAL * u:
-            self.warnings.append(f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for.")
+            text = f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for."
+            self.warn("loop.crossover_missed", text)
 
     def _agreement(
         self, points: Sequence[Point], model: Any, limits: m.Margins, names: tuple[str, str], up_to: float
@@ -236,24 +243,14 @@ class LoopFindings:
         limit = up_to * float(limits.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
-        table = next((t for t in self.tables if t["title"] == "Linear models and measured loop"), None)
-        if table is None:
-            table = {
-                "title": "Linear models and measured loop",
-                "caption": (
-                    "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
-                ),
-                "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"],
-                "rows": [],
-            }
-            self.tables.append(table)
-        table["rows"].append([names[0], limit, count, db, degrees, names[1]])
+        self.agreement.append([names[0], limit, count, db, degrees, names[1]])
 
     def _conditional(self, title: str, limits: m.Margins) -> None:
         if limits.lower is not None:
             text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {limits.lower:.3g}"
             upper = f" or rises to {limits.upper:.3g}" if limits.upper is not None else ""
-            self.warnings.append(f"{text}{upper} times its value. Saturation of the motor reduces the gain.")
+            text = f"{text}{upper} times its value. Saturation of the motor reduces the gain."
+            self.warn("loop.conditionally_stable", text)
 
     def ratio(
         self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
@@ -321,8 +318,7 @@ class LoopFindings:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
             u = step_noise_std(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
             measures = measures if u is None else measures.with_noise(u)
-            short = short_rest(quiet, baseline.size + y.size, measures)
-            self.warnings += [short] if short and short not in self.warnings else []
+            self.warn("hold.short", short_rest(quiet, baseline.size + y.size, measures))
         model = self.linear.closed.discrete
         predicted = None if model is None else simulated(model, gate, output)
         if model is not None and predicted is not None and plus:
@@ -360,50 +356,32 @@ class LoopFindings:
             self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
         return measures
 
-    def result(
-        self,
-        *,
-        title: str,
-        method: str,
-        sources: Sequence[str],
-        equation: str,
-        conventions: Sequence[str],
-        summary: Sequence[str] = (),
-        instrument: str = "",
-        ranked_by: str = "",
-        specification: Specification | None = None,
-    ) -> LoopResult:
-        """The Result with all that was collected; limits of the specification are applied by coefficient name."""
-        for c in self.coefficients if specification else ():
-            c.limit = (specification or {}).get(c.name, c.limit)
-            if c.verdict != "void":
-                c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
+    def result(self, account: Account, summary: Sequence[str] = (), ranked_by: str = "") -> LoopResult:
+        """Return what was found, with what the test says of itself."""
+        run = self.record.run
         if self.unstable:
             self.void([c.name for c in self.coefficients], self.unstable)
-            self.warnings.insert(0, f"The run has no value: {self.unstable}. Its figures show what it did, no measure.")
+            text = f"The run has no value: {self.unstable}. Its figures show what it did, no measure."
+            self.warn("unstable", text, "error")
             summary = [f"No value: {self.unstable}."]
-        run = self.record.run
-        result = LoopResult(
-            system=run.system,
-            title=title,
-            method=method,
-            sources=list(sources),
-            equation=equation,
-            conventions=list(conventions),
+        agreement = Table(
+            "margins.agreement", "Linear models and measured loop", AGREEMENT, AGREEMENT_COLUMNS, self.agreement
+        )
+        return LoopResult(
+            method=account.method,
+            sources=list(account.sources),
+            equation=account.equation,
+            conventions=list(account.conventions),
             coefficients=self.coefficients,
             allan=self.allan,
-            tables=self.tables,
-            warnings=self.warnings,
+            tables=[*self.tables, *([agreement] if self.agreement else []), *account.tables],
+            reasons=[*self.reasons, *account.reasons, *(Reason("linear", w) for w in self.linear.warnings)],
             summary=list(summary),
-            decision_rule=uncertainty.DECISION_RULE,
-            verdict=uncertainty.worst_verdict(c.verdict for c in self.coefficients),
-            instrument=instrument or run.instrument,
+            instrument=run.instrument,
             simulated=not run.measured,
             ranked_by=ranked_by,
             responses=self.responses,
         )
-        result.warnings += self.linear.warnings
-        return run_metadata.finish(result, self.record)
 
 
 def _margin_note(run: RunDocument) -> str:

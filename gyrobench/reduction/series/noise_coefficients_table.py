@@ -13,7 +13,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.noise_coefficients import JUST, fit
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Table
 from gyrobench.units import DPH
 
 LEAST = 400  # windows of a long test
@@ -32,7 +32,7 @@ RESIDUAL = (
 )
 
 
-def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[dict[str, Any]]:
+def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[Table]:
     """Return the table, or none where a test has fewer than LEAST windows, or windows that do not stand end to end.
 
     Of the drift rate itself, or of its residuals.  Each series of the result is a stretch of its own; missing windows,
@@ -67,8 +67,7 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     title = "Noise coefficients"
-    return [{"title": title, "caption": f"{caption}. {RESIDUAL}" if residual else caption, "columns": columns,
-             "rows": rows}]  # fmt: skip
+    return [Table("noise_coefficients", title, f"{caption}. {RESIDUAL}" if residual else caption, columns, rows)]  # fmt: skip
 
 
 def on_grid(t: Array, x: Array, step: float) -> Array:

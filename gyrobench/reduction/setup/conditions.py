@@ -65,7 +65,10 @@ def reasons(record: Record) -> list[Reason]:
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
     if run.measured and not run.type_b_stated:
-        text = "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare type_b = none."
+        text = (
+            "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
+            "type_b = none."
+        )
         found.append(Reason(TYPE_B_UNSTATED, text, blocks=("pass",), severity="doubt"))
     if not run.complete:
         text = f"The run stopped at {run.stopped_at or 0.0:.6g} s, before the end of its plan."

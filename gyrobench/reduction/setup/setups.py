@@ -28,8 +28,8 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """truth: simulated values, SI (of coefficients rad/s per g0^n).  errors: of a simulated set-up, by their sources.
-    corrections: measured errors of the set-up (estimation.effects).  robust: a robust fit is shown beside the plain one.
+    """truth: simulated values, SI (of coefficients rad/s per g0^n).  errors: of a simulated set-up, by source.
+    corrections: measured errors of the set-up (estimation.effects).  robust: a robust fit is shown beside.
 
     u_* of all setups: standard uncertainties of type B, SI, the options of the same names.
     """

@@ -2,8 +2,8 @@
 
     TORQUER_SCALE.effect(setup, fit.error(-k * current))        # in a test: what an error of one unit does to its data
 
-A source has an id; a name and a unit for the reader; the sign (note) of an error of one unit; the option that states its
-standard uncertainty; and the handling errors that are its large form (gyrobench.reduction.diagnosis).  A part that
+A source has an id; a name and a unit for the reader; the sign (note) of an error of one unit; the option that states
+its standard uncertainty; and the handling errors that are its large form (gyrobench.reduction.diagnosis).  A part that
 simulates it names its id (gyrobench.component.set_up).  From these follow, for every test that names the source: the
 lines of the budget, the correction of a measured error, the weights of the fit, and the predicted shift of a simulated
 error.  docs/guides/errors_of_the_set_up.md explains them to a metrologist.
@@ -90,6 +90,7 @@ ANGLE_ONCE = Source("angle.once", "angle error, once a turn", "rad", "u_angle1",
 ANGLE_TWICE = Source("angle.twice", "angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
 ANGLE_ONCE_OF = Source("{axis}.angle.once", "{axis} angle error, once a turn", "rad", "u_angle1", "encoder", SINES)
 ANGLE_TWICE_OF = Source("{axis}.angle.twice", "{axis} angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
+ANGLE_OF = {"once": ANGLE_ONCE_OF, "twice": ANGLE_TWICE_OF}
 UNBALANCE = Source(
     "servo.unbalance", "unbalance over stiffness", "rad", "u_unbalance", "angle at 1 g across the axis",
     ("mass along z", "mass along y"),

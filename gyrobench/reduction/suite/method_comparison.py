@@ -188,17 +188,28 @@ def combine_methods(
     sites = [r.site for r in results.values()]
     comparison = SuiteComparison(
         rule=RULE,
-        shared=list(dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in common(results, shared))),
+        shared=list(
+            dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in common(results, shared))
+        ),
         members=[_member(label, m) for label, m in members.items()],
         failed=[{"label": n, "reason": why} for n, why in (failed or {}).items()],
         quantities=[_row(c) for c in compared],
         pairs=[
-            {"quantity": c.quantity.name, "unit": c.quantity.unit, "a": p.a, "b": p.b, "difference": p.difference,
-             "U": p.U, "E_n": p.E_n}
-            for c in compared if c.found is not None for p in c.found.pairs
+            {
+                "quantity": c.quantity.name,
+                "unit": c.quantity.unit,
+                "a": p.a,
+                "b": p.b,
+                "difference": p.difference,
+                "U": p.U,
+                "E_n": p.E_n,
+            }
+            for c in compared
+            if c.found is not None
+            for p in c.found.pairs
         ],
         **_consistency(compared),
-    )  # fmt: skip
+    )
     return SuiteResult(
         system=system, title=title, method=method, sources=list(sources),
         conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
@@ -305,10 +316,13 @@ def _reasons(
     said += [("suite.instruments", text) for text in differences(results)]
     sites = {label: str(r.site) for label, r in results.items()}
     if len(set(sites.values())) > 1:
-        said.append((
-            "suite.sites", "The tests were made at different site values, stated with each test. Where gravity differs, "
-            "the contribution of D_OO to the combinations differs too.",
-        ))  # fmt: skip
+        said.append(
+            (
+                "suite.sites",
+                "The tests were made at different site values, stated with each test. Where gravity differs, "
+                "the contribution of D_OO to the combinations differs too.",
+            )
+        )
     counts = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
     if counts:
         said.append(("suite.warned", f"Tests with warnings, stated with each test: {', '.join(counts)}."))
