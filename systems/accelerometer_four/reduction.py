@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -193,9 +192,7 @@ def _effects(s: FourSetup, found: Findings, reported: Findings, alpha: Array, U:
     return out
 
 
-def _tables(
-    s: FourSetup, found: Findings, alpha: Array, U: Array, single: Array, s_single: Array
-) -> list[dict[str, Any]]:
+def _tables(s: FourSetup, found: Findings, alpha: Array, U: Array, single: Array, s_single: Array) -> list[Table]:
     beta, u = found.est.beta, found.est.u
     three = chain.three_steps(alpha, U, s.gamma)
     if s.D1 is not None:

@@ -236,7 +236,7 @@ def _harmonics(v: Visits, four: bool, linear: Findings) -> list[dict[str, Any]]:
     return out
 
 
-def _tables(fits: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+def _tables(fits: Mapping[str, Mapping[str, float]]) -> list[Table]:
     if len(fits) < 2:
         return []
     rows: list[list[Any]] = []

@@ -192,7 +192,7 @@ def _groups(rows: Rows, kind: NDArray[np.str_], seen: NDArray[np.bool_]) -> list
     return groups
 
 
-def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[dict[str, Any]]:
+def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[Table]:
     """Return the table of rates by gates and by degrees, less what the errors of the scale make of them."""
     names = {q.name: j for j, q in enumerate(found.linear)}
     weights = np.ones_like(found.y) if found.weights is None else found.weights
@@ -228,7 +228,7 @@ def _conventions(a: Arrangement) -> list[str]:
     ]
 
 
-def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[dict[str, Any]]:
+def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[Table]:
     value = {q.name: float(v) for q, v in zip(found.quantities, found.value, strict=True)}
     own = [
         [k, math.hypot(value[f"cos_{k}"], value[f"sin_{k}"]) / ARCSEC,

@@ -195,7 +195,7 @@ def _against(found: LoopFindings, name: str, what: str, value: float, nu: float)
     return Test(name, value, p, f"mean 1 where the stated covariance is right; {nu:.0f} independent squares", finding)
 
 
-def _phases(found: LoopFindings, errors: Array, drift: Array) -> dict[str, Any]:
+def _phases(found: LoopFindings, errors: Array, drift: Array) -> Table:
     rows: list[list[Any]] = []
     c = found.record.channels
     stated = "estimator.covariance[1,1]" in c

@@ -244,7 +244,7 @@ def _by_heading(
     return np.concatenate([change, np.zeros(found.value.size - 2)])
 
 
-def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
+def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[Table]:
     rows: list[list[Any]] = []
     if not math.isnan(A):
         rows += [
@@ -265,7 +265,7 @@ def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
     return [integrity, *_methods(s, psi)]
 
 
-def _methods(s: Setup, psi: float) -> list[dict[str, Any]]:
+def _methods(s: Setup, psi: float) -> list[Table]:
     """What each method reaches in the same total time with the noise of this gyro."""
     if not s.density > 0.0 or not s.time > 0.0:
         return []

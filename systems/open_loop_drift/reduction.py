@@ -254,7 +254,7 @@ def _effects(
     ]
 
 
-def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: float) -> dict[str, Any]:
+def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: float) -> Table:
     rows: list[list[Any]] = [
         ["Earth rate along the input axis", s.earth() / DPH, "°/h"],
         ["angle of the null, last less first reading", float(null[-1] - null[0]) / ARCSEC, "″"],

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import special
@@ -93,7 +92,7 @@ class Levels:
             shown_fit_y=((self.zero + self.slope * seen) * 1e3).tolist(),
         )  # fmt: skip
 
-    def table(self) -> dict[str, Any]:
+    def table(self) -> Table:
         rows = [
             [k + 1, float(a / ARCMIN), float(v * 1e3), float(d * 1e6)]
             for k, (a, v, d) in enumerate(zip(self.angle, self.u, self.departure, strict=True))

@@ -77,7 +77,7 @@ def _against(run: Run, fine: int) -> Response:
 
 def tables(
     record: Record, run: Run, settings: plans.Settings, sensors: plans.Sensors, h: plans.History | None
-) -> list[dict[str, Any]]:
+) -> list[Table]:
     found = [_stages(run, settings)]
     if h is None:
         return found
@@ -101,7 +101,7 @@ def tables(
     return found
 
 
-def _stages(run: Run, settings: plans.Settings) -> dict[str, Any]:
+def _stages(run: Run, settings: plans.Settings) -> Table:
     """When each stage began, its frequency and poles, and what it left."""
     rows: list[list[Any]] = []
     for stage in range(plans.LEVEL, plans.SLOW + 1):

@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,7 +215,7 @@ def _effects(s: Setup, found: Findings, turning: window_regressors.Turning, rate
     ]
 
 
-def _levels(s: Setup, phase: Array, rate: Array, x: Array, found: Findings) -> dict[str, Any]:
+def _levels(s: Setup, phase: Array, rate: Array, x: Array, found: Findings) -> Table:
     residual = found.y - found.X @ found.est.beta[: found.X.shape[1]]
     rows = []
     for label in dict.fromkeys(s.labels.values()):

@@ -39,9 +39,7 @@ ON_REQUEST = OnRequest(
 )
 
 
-def tables(
-    windows: Mapping[str, Array], labels: Mapping[int, str], parameters: Mapping[str, Any]
-) -> list[dict[str, Any]]:
+def tables(windows: Mapping[str, Array], labels: Mapping[int, str], parameters: Mapping[str, Any]) -> list[Table]:
     """Return the tables of the live estimate; none for a record without it.
 
     windows: columns of the record.  labels: phase -> attitude.  parameters: of the run.
@@ -88,9 +86,7 @@ def tables(
     ]
 
 
-def had_it_stopped(
-    record: Record, result: DriftTestResult, reduce: Callable[[Record], DriftTestResult]
-) -> list[dict[str, Any]]:
+def had_it_stopped(record: Record, result: DriftTestResult, reduce: Callable[[Record], DriftTestResult]) -> list[Table]:
     """Return the coefficients of the test beside those of the same record with each mount left when it might have been.
 
     [] for a record without the live estimate, or where no mount could have been left.

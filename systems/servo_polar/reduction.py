@@ -202,9 +202,7 @@ def _pole(site: run_metadata.Site) -> Array:
     return np.array([0.0, math.cos(site.latitude), math.sin(site.latitude)])
 
 
-def _turn_differences(
-    found: Findings, turns: Turns, labels: Mapping[int, str], phase: NDArray[np.int_]
-) -> list[dict[str, Any]]:
+def _turn_differences(found: Findings, turns: Turns, labels: Mapping[int, str], phase: NDArray[np.int_]) -> list[Table]:
     """Later turns less the first, point by point at the same angle; the fit, common to all turns, drops out."""
     rows: list[list[Any]] = []
     middle = (turns.start + turns.end) / 2.0

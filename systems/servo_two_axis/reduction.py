@@ -235,7 +235,7 @@ def _mount_test(found: Findings, phase: NDArray[np.int_]) -> None:
 def _mounts_table(
     phase: NDArray[np.int_], labels: Mapping[int, str], seen: Track, found: Mapping[str, Findings],
     mount: NDArray[np.int_], site: run_metadata.Site,
-) -> dict[str, Any]:  # fmt: skip
+) -> Table:  # fmt: skip
     rows: list[list[Any]] = []
     for p, label in labels.items():
         k = phase == p
@@ -266,7 +266,7 @@ def _mounts_table(
     )
 
 
-def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
+def _book_table(found: Mapping[str, Findings]) -> Table:
     """The estimates in the names of Hu 1981: torque sign in the first line of 3-95, precession sign in the second."""
     rows: list[list[Any]] = []
     for c in "xy":
@@ -284,7 +284,7 @@ def _book_table(found: Mapping[str, Findings]) -> dict[str, Any]:
     )
 
 
-def _shared_table(found: Mapping[str, Findings]) -> dict[str, Any]:
+def _shared_table(found: Mapping[str, Findings]) -> Table:
     """K_zx and K_zy appear in both channels; they must agree where they have a rigid-body cause.  [STATIC-DRIFT]"""
     rows: list[list[Any]] = []
     for symbol in ("K_zx", "K_zy"):

@@ -192,7 +192,7 @@ def _groups(labels: Mapping[int, str], phase: NDArray[np.int_], held: servo_regr
 
 def _attitudes_table(
     means: Mapping[str, float], residual: Array, y: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
-) -> dict[str, Any]:
+) -> Table:
     rows: list[list[Any]] = []
     for p, label in labels.items():
         mine = phase == p

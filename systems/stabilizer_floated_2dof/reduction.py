@@ -181,7 +181,7 @@ def _secant(loop: Loop, w: float) -> float:
     return 20.0 * math.log10(ends[1] / ends[0]) / math.log10(1.25**2)
 
 
-def _forms(loop: Loop, values: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def _forms(loop: Loop, values: Mapping[str, tuple[float, float]]) -> Table:
     w, pm = loop.margin()
     at = loop.limit()
     rows: list[list[Any]] = [

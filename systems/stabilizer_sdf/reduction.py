@@ -7,14 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.fit_result import ReductionError
-from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.loops.loop_summary import isolation, margins, told
-from gyrobench.result import LoopResult, Response, Specification, Table
+from gyrobench.reduction.loops.toolkit import (
+    Account,
+    Array,
+    Gate,
+    LoopFindings,
+    LoopTest,
+    ReductionError,
+    Response,
+    RunDocument,
+    Table,
+    isolation,
+    margins,
+    told,
+)  # fmt: skip
 from gyrobench.units import DPH
 
 from . import closed
@@ -32,70 +38,77 @@ EQUATIONS = {
 }
 
 
-def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
-    """The result of a record.  Raises ReductionError where the load phase is not whole."""
-    run = record.run
-    kind = str(run.options.get("kind"))
-    if kind not in closed.FORMS:
-        raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
-    found = LoopFindings(record)
-    loads = found.of("torque", 1, "step")
-    if not loads:
-        raise ReductionError("the phase 'load' is not whole in this record: the run ended before (the float's stop?)")
-    gate = loads[0]
-    held = float(np.mean(np.cos(gate["gyro.b"])))
-    p = plant(run, held)
-    t = gate.t - gate.t[0]
-    free = not run.options.get("offload") and not run.options.get("viscous")
-    found.tables.append(_derived(p, kind, held))
-    if free:
-        _closed_forms(found, p, kind, str(run.options.get("form")), gate, t, run.step)
-    else:
-        found.step(gate, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
-        found.warnings.append("The closed forms know neither motor nor friction: the figures are of the run alone.")
-        end = coupling(p, t[-1], run.step) / 3**0.5 / ARCMIN
-        found.measure("a(T)", "platform angle at the end of the load", "arcmin",
-                      gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
-    late = math.degrees(p.M * run.step / p.H) / 3**0.5
-    found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
-    if free:  # a motor brings a slow pole in that is not in the fit beside the nutation
-        _drift(found, p, kind)
-        _command(found, p, kind)
-    for step in found.of("command", 1, "step"):
-        found.step(step, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
-    found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
-    found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
-                caption="Angle of the platform over that of the base.")  # fmt: skip
-    ends = next((c for c in found.coefficients if c.name == "a(T)"), None)
-    result = found.result(
-        title=f"Stabilizer with a gyro of one degree of freedom: {kind} gyro",
-        method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against the "
-        "closed form",
-        sources=[
-            "STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, eq. 5-27..5-43, corrected by EG9-EG13",
-        ],
-        equation=EQUATIONS[kind],
-        conventions=[
-            "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive for a "
-            "positive torque.",
-            f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for H cos(beta).",
-            "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
-        ],
-        specification=specification,
-    )
-    if ends is not None and not found.unstable:
+class Reduction(LoopTest):
+    """Load, drift, command, margins and isolation of an axis that its gyro stabilizes."""
+
+    def measure(self) -> Account:
+        run, found = self.run, self.found
+        self.kind = kind = str(run.options.get("kind"))
+        if kind not in closed.FORMS:
+            raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
+        self.load = self._load()
+        held = float(np.mean(np.cos(self.load["gyro.b"])))
+        self.plant = p = plant(run, held)
+        t = self.load.t - self.load.t[0]
+        self.free = not run.options.get("offload") and not run.options.get("viscous")
+        found.tables.append(_derived(p, kind, held))
+        if self.free:
+            _closed_forms(found, p, kind, str(run.options.get("form")), self.load, t, run.step)
+        else:
+            found.step(self.load, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
+            text = "The closed forms know neither motor nor friction: the figures are of the run alone."
+            found.warn("stabilizer_sdf.no_closed", text)
+            end = coupling(p, t[-1], run.step) / 3**0.5 / ARCMIN
+            found.measure("a(T)", "platform angle at the end of the load", "arcmin",
+                          self.load["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
+        late = math.degrees(p.M * run.step / p.H) / 3**0.5
+        largest = math.degrees(np.abs(self.load["gyro.b"]).max())
+        found.measure("b_max", "largest angle of the float", "°", largest, late)
+        if self.free:  # a motor brings a slow pole in that is not in the fit beside the nutation
+            _drift(found, p, kind)
+            _command(found, p, kind)
+        for step in found.of("command", 1, "step"):
+            found.step(step, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
+        found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
+        found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
+                    caption="Angle of the platform over that of the base.")  # fmt: skip
+        return Account(
+            method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against "
+            "the closed form",
+            sources=["STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, eq. 5-27..5-43, corrected by EG9-EG13"],
+            title=f"Stabilizer with a gyro of one degree of freedom: {kind} gyro",
+            equation=EQUATIONS[kind],
+            conventions=[
+                "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive "
+                "for a positive torque.",
+                f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for "
+                "H cos(beta).",
+                "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
+            ],
+        )
+
+    def _load(self) -> Gate:
+        loads = self.found.of("torque", 1, "step")
+        if not loads:
+            raise ReductionError("the phase 'load' is not whole in this record: the run ended before")
+        return loads[0]
+
+    def summary(self) -> list[str]:
+        ends = next((c for c in self.found.coefficients if c.name == "a(T)"), None)
+        if ends is None:
+            return []
+        gate, p = self.load, self.plant
         beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
-        result.summary = [
-            *margins(found),
-            *isolation(found, "isolation", "platform.attitude"),
+        return [
+            *margins(self.found),
+            *isolation(self.found, "isolation", "platform.attitude"),
             *told(
-                found.coefficients,
-                f"After {t[-1]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
+                self.found.coefficients,
+                f"After {gate.t[-1] - gate.t[0]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
                 f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°; it was never beyond {{b_max}}.",
-                SAID[kind](p) if free else "",
+                SAID[self.kind](p) if self.free else "",
             ),
         ]
-    return result
 
 
 SAID = {
@@ -263,7 +276,7 @@ def _command(found: LoopFindings, p: Axis, kind: str) -> None:
                       u_share, closed=wanted)  # fmt: skip
 
 
-def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
+def _derived(p: Axis, kind: str, held: float) -> Table:
     rows: list[list[Any]] = [
         ["cos(b) held by the closed forms, mean over the load", held, "1"],
         ["nutation without damping, √(H²/(J J0) + K/J)", p.n, "rad/s"],

@@ -381,7 +381,7 @@ def _level_terms(level: Fit, terms: Sequence[str], p: Mapping[str, Any], add: An
             u["plate"][j] if "plate" in terms else 0.0, dof, None if plate is None else plate[j], none)  # fmt: skip
 
 
-def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> dict[str, Any]:
+def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> Table:
     seen = np.flatnonzero(np.isfinite(errors))
     known = None if true is None else true - np.mean(true[seen])
     last = math.sqrt(float(np.sum(fit.u[first:] ** 2)) / max(seen.size - 1, 1))

@@ -257,7 +257,7 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
     )
 
 
-def _readouts(readings: list[AtRate], quantum: float, scale: Scale) -> dict[str, Any]:
+def _readouts(readings: list[AtRate], quantum: float, scale: Scale) -> Table:
     """Return the table of the rates by counts, gate and inverse rate, with the tracking and the true ripple."""
     rows: list[list[Any]] = []
     for r in readings:

@@ -225,7 +225,7 @@ def _set_up_tables(
     return [*correction_table(reported), *simulated_table(reported, sources, errors)]
 
 
-def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
+def _windows_table(i: Array, found: Precession | None) -> list[Table]:
     if found is None:
         return []
     n = i.size
@@ -296,7 +296,7 @@ def _budget(s: TorquerSetup, mean: float, u_mean: float) -> list[BudgetLine]:
     return lines
 
 
-def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: float) -> dict[str, Any]:
+def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: float) -> Table:
     printed = round(mean / KU, 3)
     rows = [
         [float(i[k] / MA), float(plus[k] / DPH), float(minus[k] / DPH), float(K_n[k] / KU),

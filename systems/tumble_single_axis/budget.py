@@ -17,6 +17,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift import pulses, window_regressors
+from gyrobench.reduction.drift.drift_terms import torquer_effects
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.sources import (
@@ -24,20 +25,16 @@ from gyrobench.reduction.setup.sources import (
     ANGLE_TWICE,
     AXIS_POLE_EAST,
     AXIS_POLE_NORMAL,
-    CURRENT_OFFSET,
-    CURRENT_RESOLUTION,
+    INPUT_TO_OUTPUT,
     INPUT_TO_SPIN,
-    TORQUER_NONLINEARITY,
-    TORQUER_SCALE,
     TURNED,
     WOBBLE,
-    Source,
 )
 
 from .setup import TumbleSetup
 
 TILT = "ε_IO"  # the tilt of the input axis towards the output axis as an unknown
-TOWARDS_OUTPUT = "input axis towards output axis"
+TOWARDS_OUTPUT = INPUT_TO_OUTPUT
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
@@ -79,36 +76,21 @@ def effects(
         tilt = frames.rotation(direction, SMALL)
         return geometry(setup.base, replace(turning, face=tilt @ turning.face))
 
-    def read(di: Array) -> Array:
-        return found.error(-setup.k * di)
-
     def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
         return np.array([geometry(setup.base, wrong) for wrong in window_regressors.misread(turning, n, SMALL)])
 
-    full = float(np.max(np.abs(current))) or 1.0
-    one = np.ones_like(current)
     along_i, along_o, along_s = np.eye(3)
     windows = pulses.Windows(current, spread, turning.t_end - turning.t_start)
-    p = setup.pulses
-    counted = p.effects(found, setup.k, windows, setup.u_pulse, setup.u_switching) if p else []
     return [
         AXIS_POLE_EAST.effect(setup, axis(setup.base[0])),
         AXIS_POLE_NORMAL.effect(setup, axis(setup.base[1])),
-        Source("?", TOWARDS_OUTPUT, "rad", "u_mount").effect(setup, mount(along_s)),
+        TOWARDS_OUTPUT.effect(setup, mount(along_s)),
         INPUT_TO_SPIN.effect(setup, mount(-along_o)),
         TURNED["input"].effect(setup, mount(along_i)),
         WOBBLE.effect(setup, _wobble(setup, turning, found)),
         ANGLE_ONCE.effect(setup, angles(1)),
         ANGLE_TWICE.effect(setup, angles(2)),
-        TORQUER_SCALE.effect(setup, read(current)),
-        TORQUER_NONLINEARITY.effect(
-            setup,
-            read(current * np.abs(current) / full),
-            note=f"relative departure from proportionality at {full * 1e3:.3g} mA",
-        ),
-        CURRENT_OFFSET.effect(setup, read(one)),
-        CURRENT_RESOLUTION.effect(setup.quantum / 12.0**0.5, read(one)),
-        *counted,
+        *torquer_effects(setup, found, setup.k, windows, setup.quantum, setup.pulses),
     ]
 
 
@@ -117,7 +99,7 @@ def _wobble(setup: TumbleSetup, turning: window_regressors.Turning, found: Findi
     names = found.est.names[: found.X.shape[1]]
     terms = tuple(n for n in names if n != TILT)
     errors = []
-    for rate, dX in window_regressors.wobbles(turning, setup.base, setup.site, terms, SMALL):
+    for rate, dX in window_regressors.wobbles(turning, setup.base, setup.place, terms, SMALL):
         believed = np.column_stack([dX, rate[:, 1]]) if TILT in names else dX
         errors.append(found.error(-rate[:, 0], believed))
     return np.array(errors)

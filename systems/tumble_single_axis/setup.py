@@ -8,7 +8,6 @@ from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.setup import run_metadata, setups
-from gyrobench.result import Specification
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +26,13 @@ class TumbleSetup(setups.TumbleSetup):
     u_switching: float = 0.0
 
 
-def setup_of(run: RunDocument, specification: Specification | None = None) -> TumbleSetup:
+def setup_of(run: RunDocument) -> TumbleSetup:
     """Return the setup a run.json describes: options, plan and the parameters of the parts (slot.name, SI).
 
     Scale factor: option ``k``, else the gyro's parameter ``k``.  Truth only where the gyro part has the coefficients.
     """
     return TumbleSetup.of_plan(
         run,
-        specification,
         frames.tumble_faces(run_metadata.Site.of(run).latitude),
         k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
         truth=run_metadata.truth_of(run, drift.NAMES),

@@ -215,7 +215,7 @@ def _closed(
     return out, fits, ""
 
 
-def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, float]) -> list[dict[str, Any]]:
+def _book_table(s: TwoChannelSetup, coefficients: list[Any], book: Mapping[str, float]) -> list[Table]:
     """The simple model in the symbols of Hu 1981."""
     if s.model != "simple":
         return []

@@ -239,7 +239,7 @@ def _roll(found: LoopFindings, gate: Gate, o: Mapping[str, Any]) -> None:
                   closed=lag)  # fmt: skip
 
 
-def _phases(found: LoopFindings, o: Mapping[str, Any]) -> dict[str, Any]:
+def _phases(found: LoopFindings, o: Mapping[str, Any]) -> Table:
     rows: list[list[Any]] = []
     for gate in found.gates:
         tilt = np.hypot(*_of(gate).T) / ARCMIN

@@ -17,7 +17,7 @@ handling errors in a measured record, and the reasons that withhold a verdict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -40,7 +40,7 @@ class DriftTest(Generic[S]):
     """One reduction of one record; see the module.  windows: columns of the record, SI."""
 
     #: record -> mistakes in taking or labelling it that make sense in this test (diagnosis.handling_candidates)
-    handling: ClassVar[Callable[[Record], Iterable[Any]] | None] = None
+    handling: ClassVar[Any] = None
 
     def __init__(self, windows: Mapping[str, Array], setup: S) -> None:
         self.windows, self.setup = windows, setup

@@ -58,6 +58,7 @@ class Account:
     harmonics: Sequence[dict[str, Any]] = ()
     repeatability: Mapping[str, Any] = field(default_factory=dict)
     reasons: Sequence[Reason] = ()
+    title: str = ""  # where it is not that of the system
     random: str = "random drift and reading noise"
 
 
@@ -84,6 +85,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
     odd = outliers.find(fit)
     robust = outliers.robust(fit) if setup.robust and asked.whole() else []
     return DriftTestResult(
+        title=account.title,
         method=account.method,
         sources=list(account.sources),
         equation=account.equation,

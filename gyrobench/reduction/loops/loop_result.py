@@ -368,6 +368,7 @@ class LoopFindings:
             "margins.agreement", "Linear models and measured loop", AGREEMENT, AGREEMENT_COLUMNS, self.agreement
         )
         return LoopResult(
+            title=account.title,
             method=account.method,
             sources=list(account.sources),
             equation=account.equation,

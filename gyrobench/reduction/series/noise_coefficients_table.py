@@ -67,7 +67,8 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     title = "Noise coefficients"
-    return [Table("noise_coefficients", title, f"{caption}. {RESIDUAL}" if residual else caption, columns, rows)]  # fmt: skip
+    caption = f"{caption}. {RESIDUAL}" if residual else caption
+    return [Table("noise_coefficients", title, caption, columns, rows)]
 
 
 def on_grid(t: Array, x: Array, step: float) -> Array:

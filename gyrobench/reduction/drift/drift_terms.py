@@ -1,0 +1,83 @@
+"""What every test of drift coefficients in torque rebalance or servo mode shares: quantities, equation, torquer.
+
+[GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gyrobench.reduction.drift.pulses import Pulses, Windows
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.setup.setups import RebalanceSetup
+from gyrobench.reduction.setup.sources import (
+    CURRENT_OFFSET,
+    CURRENT_RESOLUTION,
+    TORQUER_NONLINEARITY,
+    TORQUER_SCALE,
+)
+from gyrobench.result import Reason
+
+FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
+NO_OO = "D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."
+AXES = {"I": "X", "O": "Y", "S": "Z"}
+
+
+def quantity(s: RebalanceSetup, name: str, closed: Mapping[str, float]) -> Quantity:
+    """Return a coefficient of the model at one |g|, where D_OO cannot be told from the others: it is in their truth."""
+    truth = None
+    if s.truth is not None:
+        oo = s.truth.get("D_OO", 0.0)
+        truth = s.truth.get(name, 0.0) + {"D_F": oo * s.gamma**2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
+    q = Quantity.drift(name, truth, closed.get(name))
+    if not s.fold or name not in FOLDED:
+        return q
+    return replace(q, meaning=f"{q.meaning}, with D_OO folded in", shown=FOLDED[name])
+
+
+def folded(s: RebalanceSetup) -> list[Reason]:
+    """Return that D_OO is folded into others, where it is."""
+    text = (
+        "D_OO is folded: at constant |g| only D_F + γ² D_OO, D_II − D_OO and D_SS − D_OO can be had (γ = g/g0 = "
+        f"{s.gamma:.6f}); separating them needs |f| ≠ 1 g, a centrifuge."
+    )
+    return [Reason("drift.folded", text)] if s.fold else []
+
+
+def equation(left: str, names: Iterable[str]) -> str:
+    """Return the measurement equation in Typst math: ``left``, then the polynomial of the terms ``names``."""
+    parts = []
+    for n in names:
+        index = n[2:]
+        if n == "D_F":
+            parts.append("D_F")
+        elif len(index) == 2 and index[0] == index[1]:
+            parts.append(f'D_"{index}" {AXES[index[0]]}^2')
+        else:
+            parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(AXES[a] for a in index))
+    return left + " + ".join(parts)
+
+
+def torquer_effects(
+    s: RebalanceSetup, found: Findings, k: float, read: Windows, quantum: float, pulses: Pulses | None = None
+) -> list[Effect]:
+    """Return what errors of torquer and current reading do to drift rates omega_IA - k i.
+
+    k: rad/s/A.  read: currents with the sign of the precession convention.  quantum: resolution of the reading, A.
+    """
+    current = read.mean
+    full = float(np.max(np.abs(current))) or 1.0
+    nonlinear = TORQUER_NONLINEARITY.of(full=f"{full * 1e3:.3g} mA")
+    offset = found.error(-k * np.ones_like(current))
+    return [
+        TORQUER_SCALE.effect(s, found.error(-k * current)),
+        nonlinear.effect(s, found.error(-k * current * np.abs(current) / full)),
+        CURRENT_OFFSET.effect(s, offset),
+        CURRENT_RESOLUTION.effect(quantum / 12.0**0.5, offset),
+        *(pulses.effects(found, k, read, s) if pulses else ()),
+    ]
