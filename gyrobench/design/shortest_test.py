@@ -290,7 +290,7 @@ def _with_noise_of(protocol: VisitProtocol, folder: Path, system: System) -> Vis
         system.reduce(record)
     if any(f.ideal for f, _ in fits):
         raise UsageError(f"--noise {folder}: a run without noise; a run of the instrument, or simulated with its noise")
-    estimates = [f.est for f, _ in fits]
+    estimates = [f.est.noise for f, _ in fits]
     found = [Noise(e.density[0], e.sigma[0], max(e.tau[0], 1e-3)) for e in estimates]
     channels = [replace(c, noise=n) for c, n in zip(protocol.channels, found, strict=True)]
     slow = max(e.sigma[2] / e.density[0] * math.sqrt(WINDOW) if e.density[0] > 0.0 else 0.0 for e in estimates)

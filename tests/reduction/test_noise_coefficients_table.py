@@ -43,7 +43,7 @@ def test_residuals_and_the_rate_itself(gap: bool) -> None:
     assert RESIDUAL in left["caption"] and RESIDUAL not in whole["caption"]
     assert f"from {LEAST + 94 if gap else LEAST + 100} means of 60 s" in left["caption"]
     for table in (left, whole):
-        rows = {row[0].partition(",")[0]: row for row in table["rows"]}
+        rows = {row[0].partition(",")[0]: row for row in table.rows}
         assert list(rows) == [n for n in "NBKRQ" if n != "R" or table is whole]
         assert rows["N"][1] == pytest.approx(0.01, rel=0.1) and rows["N"][2] < 0.01 < rows["N"][3]
         for name in "BK":  # the fit may have taken some
@@ -79,8 +79,8 @@ def test_just_determined_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     just, none = Estimate(1e-7, 3e-8, 1.7e-7, True), Estimate(0.0, 0.0, 1e-7, False)
     monkeypatch.setattr(table_module, "fit", lambda *_: NoiseCoefficients(none, none, just, none, none))
     (table,) = noise_coefficients_table(*long_test())
-    assert [row[5] for row in table["rows"]] == ["not determined"] * 2 + ["just determined"] + ["not determined"] * 2
-    assert "K: just determined, below 4 u: of such" in table["caption"]
+    assert [row[5] for row in table.rows] == ["not determined"] * 2 + ["just determined"] + ["not determined"] * 2
+    assert "K: just determined, below 4 u: of such" in table.caption
 
 
 def test_a_missing_window_is_a_gap() -> None:

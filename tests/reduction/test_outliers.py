@@ -54,8 +54,8 @@ def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
     assert r.coefficients[0].estimate == pytest.approx(0.3 + 0.6 / N, abs=0.004)  # the plain fit stays
     (text,) = [w for w in r.warnings if "outside the noise" in w]
     assert text.startswith("Row 41 (+0.") and "without it" in text and "u = " in text
-    (table,) = [t for t in r.tables if t["title"] == "Estimates without outliers"]
-    assert table["rows"][0][4] < 0.2 * table["rows"][0][2]
+    (table,) = [t for t in r.tables if t.title == "Estimates without outliers"]
+    assert table.rows[0][4] < 0.2 * table.rows[0][2]
 
 
 def test_a_mount_of_outliers() -> None:
@@ -106,9 +106,9 @@ def test_robust_fit_beside_the_plain_one() -> None:
     assert light >= 2
     assert np.all(np.abs(beta - clean.value) < 0.5 * clean.u)
     assert np.sqrt(np.diag(covariance)) == pytest.approx(clean.u, rel=0.2)
-    tables = {t["title"]: t for t in result(spoilt, robust=True).tables}
+    tables = {t.title: t for t in result(spoilt, robust=True).tables}
     assert [row[0] for row in tables["Robust fit"]["rows"]] == ["a", "b"]
-    assert "Robust fit" not in {t["title"] for t in result(spoilt).tables}
+    assert "Robust fit" not in {t.title for t in result(spoilt).tables}
 
 
 def test_derived_quantities_have_both() -> None:

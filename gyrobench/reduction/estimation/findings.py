@@ -21,6 +21,7 @@ from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuis
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.mixture import equivalent_dof
+from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import p_text
@@ -49,7 +50,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What is reported, in SI, in the order of the quantities; see noise_mixture_fit.Estimate."""
+    """What is reported, in SI, in the order of the quantities; see Estimate."""
 
     value: Array
     covariance: Array
@@ -69,7 +70,7 @@ class Findings:
 
     data: Regression
     quantities: tuple[Quantity, ...]
-    est: noise_mixture_fit.Estimate  # of the linear unknowns
+    est: Estimate  # of the linear unknowns
     reported: Estimates
     candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
     hidden: Sequence[Hidden] = ()
@@ -140,7 +141,7 @@ class Findings:
         return int(self.y.size) - int(self.X.shape[1]) - flat
 
     @property
-    def joined(self) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+    def joined(self) -> list[tuple[Candidate, Evidence]]:
         """Effects of the nuisance model that are reported."""
         return nuisances.reported(self.candidates, self.est)
 
@@ -272,13 +273,13 @@ class Findings:
     # ------------------------------------------------------------------------------------------ noise
     def noise(self) -> dict[str, Any]:
         """Return the noise model of the estimation; units in the keys."""
-        e, unit, scale = self.est, self.y_unit, self.y_scale
+        e, unit, scale = self.est.noise, self.y_unit, self.y_scale
         if self.white:
             parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
             return {**parameters, f"standard deviation / ({unit})": self.residual_std}
         share = e.best[1]
         model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
-        model += " with reading errors" if e.reading > 0.0 else ""
+        model += " with reading errors" if e.best[2] > 0.0 else ""
         parameters = {
             "model": "none (ideal data)" if self.ideal else model,
             "weight of white noise alone": e.white,
@@ -290,7 +291,7 @@ class Findings:
         if e.sigma_reading[2] > 0.0:
             parameters[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
             parameters[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
-        if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
+        if e.white < 0.5 and (share > 0.0 or e.best[2] == 0.0) and not self.ideal:
             parameters["correlation time / s"] = e.tau[0]
             parameters["correlation time, 90 % range / s"] = list(e.tau[1:])
         return parameters
@@ -302,10 +303,10 @@ class Findings:
             return text + ", rounding only."
         if self.white:
             return text + ", treated as white noise."
-        if self.est.best[1] == 0.0:
-            reading_errors = " and reading errors" if self.est.reading > 0.0 else ""
+        if self.est.noise.best[1] == 0.0:
+            reading_errors = " and reading errors" if self.est.noise.best[2] > 0.0 else ""
             return text + f", compatible with white noise{reading_errors}."
-        return text + f"; correlation time about {self.est.tau[0]:.3g} s, included in the coverage intervals."
+        return text + f"; correlation time about {self.est.noise.tau[0]:.3g} s, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests
     def _residual_tests(self) -> list[Test]:
@@ -324,15 +325,15 @@ class Findings:
         )
         tests = [Test(RAW, "Ljung-Box, residuals", q, p, f"autocorrelation up to lag {lags}", text)]
         whitened = ", residuals" if self.white else ", whitened residuals"
-        null = series.fitted_noise(e.fitted)
+        null = series.fitted_noise(e.likeliest.fitted)
         if not self.white:
-            q, p = series.ljung_box_of_fit(self._parts(e.whitened), lags, null)
+            q, p = series.ljung_box_of_fit(self._parts(e.likeliest.whitened), lags, null)
             text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
             tests.append(Test(WHITENED, "Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
-        z, p = series.runs_test(e.whitened, null)
+        z, p = series.runs_test(e.likeliest.whitened, null)
         text = "neighbours have the same sign too often" if p < 0.05 else "compatible with random signs"
         tests.append(Test(RUNS, "runs" + whitened, z, p, "trends and steps", text))
-        w, p = series.normality(e.whitened)
+        w, p = series.normality(e.likeliest.whitened)
         text = (
             "the residuals are not normal; check for outliers" if p < 0.05 else "compatible with a normal distribution"
         )
@@ -350,7 +351,10 @@ class Findings:
         """Return what :meth:`broken` tests, and the fit itself, say against its u."""
         broken = [(t.id, f"{t.name}: {p_text(t.p or 0.0)}, {t.finding}. The stated u may be too small.")
                   for t in self.broken()]  # fmt: skip
-        return [*(Reason("fit.unbounded", text) for text in self.est.warnings), *(Reason(*b) for b in broken)]
+        return [
+            *([Reason("noise.unbounded", text)] if (text := self.est.noise.unbounded) else []),
+            *(Reason(*b) for b in broken),
+        ]
 
     def f_test(
         self, id: str, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
@@ -379,7 +383,7 @@ class Findings:
         inverse = np.linalg.inv(M)
         rss1 = yy - np.einsum("gp,gpq,gq->g", xy, inverse, xy)
         f = ((rss0 - rss1) / k) / (np.maximum(rss1, 1e-300) / dof)
-        probability = float(self.est.models[:, 3] @ special.fdtrc(k, dof, f))
+        probability = float(self.est.noise.models[:, 3] @ special.fdtrc(k, dof, f))
         self.tests.append(Test(id, name, float(f[0]), probability, what, bad if probability < 0.05 else good))
         back = turned[there].T / s[there] / size[:, None]
         covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
@@ -389,11 +393,11 @@ class Findings:
         """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
         if not self.white:
             e = self.est
-            tau, share, reading, weight = e.models.T
+            tau, share, reading, weight = e.noise.models.T
             grid, n = noise_model.NoiseGrid(tau, share, weight, reading), self.y.size
-            every = np.column_stack([columns[:, :-1], e.known, columns[:, -1]])
+            every = np.column_stack([columns[:, :-1], e.likeliest.known, columns[:, -1]])
             moments = noise_mixture_fit.moments(self.t_start, self.t_end, every, grid)
-            found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.variance)
+            found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.likeliest.variance)
             return found.square, found.own, found.data
         Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
         square = (Z.T @ Z)[None]

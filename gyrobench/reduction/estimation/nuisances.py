@@ -19,7 +19,8 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import noise_mixture_fit, nuisance_states
+from gyrobench.reduction.estimation import nuisance_states
+from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
 from gyrobench.reduction.estimation.nuisance_states import Block
 from gyrobench.result import Reason, Table
 from gyrobench.units import DPH
@@ -231,7 +232,7 @@ def _partners(columns: Array, model: Array, names: Sequence[str]) -> list[str]:
 
 
 def table(
-    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: noise_mixture_fit.Estimate, names: Sequence[str]
+    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: Estimate, names: Sequence[str]
 ) -> list[Table]:
     """Return the candidates with their estimates (if present), probabilities and what they change most."""
     rows: list[list[object]] = []
@@ -256,7 +257,7 @@ def table(
     return [Table(NUISANCES, "Nuisance model", caption, COLUMNS, rows)]
 
 
-def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
+def sentences(candidates: Sequence[Candidate], est: Estimate) -> list[str]:
     """Return what joined the model, as sentences."""
     out: list[str] = []
     for c, e in zip(candidates, est.evidence, strict=True):
@@ -271,7 +272,7 @@ def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) 
     return out
 
 
-def implausible(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[Reason]:
+def implausible(candidates: Sequence[Candidate], est: Estimate) -> list[Reason]:
     """Return which effects that joined are larger than an error of the set-up can be."""
     out = []
     for c, e in reported(candidates, est):
@@ -289,8 +290,6 @@ def _percent(p: float) -> str:
     return "above 99.9 %" if p > 0.999 else f"{100.0 * p:.3g} %"
 
 
-def reported(
-    candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate
-) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+def reported(candidates: Sequence[Candidate], est: Estimate) -> list[tuple[Candidate, Evidence]]:
     """Return those that joined."""
     return [(c, e) for c, e in zip(candidates, est.evidence, strict=True) if e.joined]

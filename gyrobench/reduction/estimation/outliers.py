@@ -55,7 +55,7 @@ def find(found: Findings) -> Outliers | None:
     if found.ideal or most < 1 or not asked.whole():
         return None
     limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
-    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.set_up))
+    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.likeliest.set_up))
     size = np.max([r / max(float(np.median(r)), 1e-300) for r in each], axis=0)
     rows = np.flatnonzero(size > limit)
     if not rows.size:
@@ -77,11 +77,11 @@ def find(found: Findings) -> Outliers | None:
 
 def _decorrelated(found: Findings) -> Array:
     """r (n,) of the residuals, up to a factor."""
-    v = found.est.residual - found.est.set_up
+    v = found.est.residual - found.est.likeliest.set_up
     if found.white:
         return v if found.weights is None else v * np.sqrt(found.weights)
     n = v.size
-    model = (*found.est.best, found.est.reading)
+    model = found.est.noise.best
     one = tuple(np.array([m]) for m in model)
     z = noise_model.whiten(found.t_start, found.t_end, v[:, None], *one)[0][:, 0, :]
     inverse = noise_model.whiten_transposed(found.t_start, found.t_end, z, model)[:, 0]
@@ -194,11 +194,11 @@ def robust(found: Findings) -> list[Table]:
 def bisquare(found: Findings) -> tuple[Array, Array, int]:
     """Coefficients of the whitened problem, their covariance, and the number of weights below a half."""
     X = found.est.X
-    columns = np.column_stack([X, found.y - found.est.set_up])
+    columns = np.column_stack([X, found.y - found.est.likeliest.set_up])
     if found.white:
         Z = columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
     else:
-        one = tuple(np.array([m]) for m in (*found.est.best, found.est.reading))
+        one = tuple(np.array([m]) for m in found.est.noise.best)
         Z = noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :]
     A, z = Z[:, :-1], Z[:, -1]
     n, p = A.shape
