@@ -12,6 +12,7 @@ from scipy import stats
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import estimable_combinations
 from gyrobench.reduction.suite.consistency import MethodValue, combine_values, holm, normalized_error, outlier
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
 from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
 
@@ -36,7 +37,8 @@ def result(values: dict[str, tuple[float, float]], dof: float | None = None, **m
 
 def suite(results: dict[str, DriftTestResult], **more: Any) -> SuiteResult:
     members = {n: Member(r) for n, r in results.items()}
-    return combine_methods(members, system="x", title="t", method="m", sources=(), **more)
+    limits = more.pop("limits", None)
+    return conclude(combine_methods(members, system="x", title="t", method="m", sources=(), **more), None, limits)
 
 
 # ------------------------------------------------------------------------------------------- by hand
@@ -202,7 +204,7 @@ def test_what_the_rank_does_not_give_is_not_compared() -> None:
 def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
     limits = {"D_F": (-5.0, 5.0), "D_I": (-5.0, 5.0)}
     values = {"a": 1.0, "b": 1.0, "c": 3.0}
-    r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, specification=limits)
+    r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, limits=limits)
     f, i = r.coefficients
     assert r.suite.disagreeing == ["D_F"] and r.suite.consistency == "inconsistent"
     assert "c deviates by +2 °/h; the others are consistent" in " ".join(r.summary)

@@ -19,10 +19,9 @@ from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import plus_minus
-from gyrobench.reduction.estimation.verdict import conclude
-from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Reason, Result
@@ -114,7 +113,8 @@ def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
 
 def test_merge_of_two_channels() -> None:
     x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
-    parts = {"x channel": judged(x, reasons=[Reason("same", "same")]), "y channel": judged(y, reasons=[Reason("same", "same"), Reason("other", "other")])}
+    same = Reason("same", "same")
+    parts = {"x channel": judged(x, reasons=[same]), "y channel": judged(y, reasons=[same, Reason("other", "other")])}
     r = merge(parts)
     assert [c.name for c in r.coefficients] == ["a_x", "b_x", "a_y", "b_y"]
     matrix = np.array(r.correlation)
@@ -194,7 +194,7 @@ def test_extra_columns_under_all_noise_models() -> None:
     X, extra = np.column_stack([np.ones(n), x]), np.column_stack([x**2, x**3])
     found = fit(["a", "b"], X, y, t, t + 10.0, [], "rate", "", 1.0)
     p_of, f_of = [], []
-    for tau, share, reading, _ in found.est.models:
+    for tau, share, reading, _ in found.est.noise.models:
         assert reading == 0.0
         C = noise_model.process_covariance(t, t + 10.0, tau)
         R = np.eye(n) * (1.0 - share) + share * C / C[0, 0]
@@ -206,7 +206,7 @@ def test_extra_columns_under_all_noise_models() -> None:
         p_of.append(stats.f.sf(f_of[-1], 2, n - 4))
     found.f_test("test", "square and cube", extra, "", "", "")
     test = found.tests[-1]
-    assert test.statistic == pytest.approx(f_of[0]) and test.p == pytest.approx(found.est.models[:, 3] @ p_of)
+    assert test.statistic == pytest.approx(f_of[0]) and test.p == pytest.approx(found.est.noise.models[:, 3] @ p_of)
     assert test.p is not None and test.p > 2.0 * p_of[0] and p_of[0] < 0.05
     found.f_test("test", "with a copy", np.column_stack([extra, x + 2.0, np.ones(n)]), "", "", "")
     assert found.tests[-1].statistic == pytest.approx(test.statistic)

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from tumbling import NAME, SHORT, load
 
 from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PartInfo, RunDocument, SetupError
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.result import Coefficient, LoopResult
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts

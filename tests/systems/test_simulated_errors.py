@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import servoing_two_axes
+from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from scipy.spatial.transform import Rotation
 from servoing import DAY50, QUIET, W50
 from tumbling import DPH, NAMES, SHORT
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
