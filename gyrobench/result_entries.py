@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
@@ -61,6 +61,8 @@ class Series:
 @dataclass(frozen=True)
 class Test:
     """A statistical test of the residuals or of repeatability."""
+
+    __test__: ClassVar[bool] = False  # pytest: not a class of tests
 
     id: str  # "ljung_box.raw"
     name: str
