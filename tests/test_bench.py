@@ -165,7 +165,8 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> engine ->
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
-COMMON = {"errors", "files", "result", "bench", "units", "frames", "attitudes", "drift", "notebook", "reading"}
+COMMON = {"errors", "files", "result", "bench", "units", "arrays", "frames", "attitudes", "drift"}
+COMMON |= {"notebook", "reading"}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
     "component": {"errors"},  # a Python FMU carries a copy of both
@@ -181,8 +182,15 @@ ROOMS: dict[str, set[str]] = {
 BELOW = {*ROOMS}
 #: from a request to a result, for the commands and the library
 ROOMS["workflow"] = BELOW
+ROOMS["design"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
-ROOMS["library"] = BELOW | {"workflow", "campaign"}
+ROOMS["library"] = BELOW | {"workflow", "design", "campaign"}
+#: rooms inside a room -> rooms beside them that they may import
+INNER: dict[str, set[str]] = {
+    "campaign.execution": set(),
+    "campaign.analysis": {"campaign.execution"},
+    "campaign.site": {"campaign.execution", "campaign.analysis"},
+}
 
 
 @functools.cache
@@ -219,6 +227,23 @@ def test_imports_go_one_way(file: Path) -> None:
     for module in imports(file):
         there = module.split(".")[1] if "." in module else ""
         assert there in ROOMS[room(file)] | {room(file), ""}, f"{file}: imports {module}"
+
+
+def inner_room(module: str) -> str:
+    """Room inside a room that a module is in: "campaign.site" of gyrobench.campaign.site.site_page; else ""."""
+    return next((name for name in INNER if f"{module}.".startswith(f"gyrobench.{name}.")), "")
+
+
+def test_imports_between_the_rooms_of_a_room_go_one_way() -> None:
+    for name, allowed in INNER.items():
+        files = [f for f in FILES if inner_room(module_of(f)) == name]
+        assert len(files) > 2, name
+        for file in files:
+            others = {inner_room(m) for m in imports(file)} - {"", name}
+            assert others <= allowed, f"{file}: imports {others - allowed}"
+    for name in {name.partition(".")[0] for name in INNER}:
+        loose = [f.name for f in (TOOL / name).glob("*.py")]
+        assert loose == ["__init__.py"], f"gyrobench/{name}: {loose}"
 
 
 def module_of(file: Path) -> str:

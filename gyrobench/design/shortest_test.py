@@ -25,10 +25,10 @@ from gyrobench.bench import UsageError
 from gyrobench.design import plan_search
 from gyrobench.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
 from gyrobench.design.choice_search import search_choices
+from gyrobench.design.designed_test import DesignedTest
 from gyrobench.design.option_protocol import OptionProtocol
 from gyrobench.design.plan_runs import (
     Covariances,
-    DesignedTest,
     DesignError,
     Trial,
     Workbench,

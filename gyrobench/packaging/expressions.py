@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
-from gyrobench.packaging.arrays import Place, Value, words
+from gyrobench.packaging.c_arrays import Place, Value, words
 from gyrobench.packaging.places import OPERATORS, Places
 from gyrobench.packaging.source import Code, SubsetError, gives_value, returns
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gyrobench.component import Noise, State
 from gyrobench.component.composition import TIMES
-from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells
+from gyrobench.packaging.c_arrays import Place, Range, Shape, Span, Value, cells
 from gyrobench.packaging.source import Code, SubsetError, dotted, local, member
 
 if TYPE_CHECKING:

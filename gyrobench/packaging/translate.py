@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from gyrobench.component import Discrete, Input, Output, Parameter, State
-from gyrobench.packaging.arrays import Place, Shape, Value, cells, dimensions, words
+from gyrobench.packaging.c_arrays import Place, Shape, Value, cells, dimensions, words
 from gyrobench.packaging.expressions import Expressions
 from gyrobench.packaging.source import Code, Source, SubsetError, gives_value, local, member, returns
 

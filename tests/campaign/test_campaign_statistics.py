@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from gyrobench.campaign.axis_effects import crossed_seeds, levels, main_effects, responses
-from gyrobench.campaign.intervals import clopper_pearson, normal_factor, order_trim, tolerance_interval
-from gyrobench.campaign.lot_outliers import robust_outliers
-from gyrobench.campaign.lots import analyse_lot, control_limits
-from gyrobench.campaign.measures import Measures, normalized_error
-from gyrobench.campaign.sobol_indices import factorial_indices, first_order, sobol_indices, values_as_bins
+from gyrobench.campaign.analysis.axis_effects import crossed_seeds, levels, main_effects, responses
+from gyrobench.campaign.analysis.intervals import clopper_pearson, normal_factor, order_trim, tolerance_interval
+from gyrobench.campaign.analysis.lot_outliers import robust_outliers
+from gyrobench.campaign.analysis.lots import analyse_lot, control_limits
+from gyrobench.campaign.analysis.measures import Measures, normalized_error
+from gyrobench.campaign.analysis.sobol_indices import factorial_indices, first_order, sobol_indices, values_as_bins
 
 
 # ------------------------------------------------------------------------------------------------ intervals

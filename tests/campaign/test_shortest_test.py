@@ -15,8 +15,9 @@ import gyrobench as gb
 from gyrobench.bench import UsageError
 from gyrobench.design import choice_search, plan_search, shortest_test
 from gyrobench.design.approximate_design import approximate_design, evaluate
+from gyrobench.design.designed_test import DesignedTest
 from gyrobench.design.option_protocol import OptionProtocol
-from gyrobench.design.plan_runs import DesignedTest, DesignError, Stated, Trial, Workbench, last_time
+from gyrobench.design.plan_runs import DesignError, Stated, Trial, Workbench, last_time
 from gyrobench.design.plan_search import Search, Want, finish, rounded
 from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.design.shortest_test import design_test, protocol_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.intervals import clopper_pearson, effective_runs
-from gyrobench.campaign.lot_attention import DOUBTFUL
-from gyrobench.campaign.measures import Json, Measures, error, normalized_error, numbers, shared_seeds
+from gyrobench.campaign.analysis.intervals import clopper_pearson, effective_runs
+from gyrobench.campaign.analysis.lot_attention import DOUBTFUL
+from gyrobench.campaign.analysis.measures import Json, Measures, error, normalized_error, numbers, shared_seeds
 
 NOMINAL = 0.95
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from gyrobench.campaign import site_figures
-from gyrobench.campaign.measures import Json, Measures
+from gyrobench.campaign.analysis.measures import Json, Measures
+from gyrobench.campaign.site import site_figures
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     BulletList,

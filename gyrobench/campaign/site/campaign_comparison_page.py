@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gyrobench.campaign.campaign_comparison import QUANTITIES
-from gyrobench.campaign.measures import Json
+from gyrobench.campaign.analysis.campaign_comparison import QUANTITIES
+from gyrobench.campaign.analysis.measures import Json
 from gyrobench.report.numbers import write_p
 from gyrobench.report.page_model import BulletList, Column, Page, Row, Section, Table, Text, number_cell, text_cell
 from gyrobench.report.report_files import COMPARISON_NAMES, write_files

@@ -21,10 +21,10 @@ from typing import Any
 
 from distributed import Worker, WorkerPlugin
 
-from gyrobench.campaign.bundle import Assigned, tool_digest, unpack
-from gyrobench.campaign.campaign_plan import MEASURED, PlannedRun
-from gyrobench.campaign.guard import Casualty, Guard, casualties
-from gyrobench.campaign.rows import result_columns
+from gyrobench.campaign.execution.bundle import Assigned, tool_digest, unpack
+from gyrobench.campaign.execution.campaign_plan import MEASURED, PlannedRun
+from gyrobench.campaign.execution.guard import Casualty, Guard, casualties
+from gyrobench.campaign.execution.rows import result_columns
 from gyrobench.engine import engine_library
 from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
@@ -360,7 +360,7 @@ class _Desk:
     def _place(self, error: Exception) -> str:
         """Return file and line of the innermost call in the bench, else in gyrobench."""
         frames = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
-        for root in (self.bench, Path(__file__).parents[2]):
+        for root in (self.bench, Path(__file__).parents[3]):
             inside = [f"{file.relative_to(root)}:{line}: " for file, line in frames if file.is_relative_to(root)]
             if inside:
                 return inside[-1]

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.campaign.lot_outliers import Outliers
-from gyrobench.campaign.measures import Json, Measures
+from gyrobench.campaign.analysis.lot_outliers import Outliers
+from gyrobench.campaign.analysis.measures import Json, Measures
 from gyrobench.report.numbers import write_number
 from gyrobench.result import NO_VERDICT
 

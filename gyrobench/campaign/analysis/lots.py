@@ -8,10 +8,10 @@ import numpy as np
 from scipy import special, stats
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.intervals import tolerance_interval
-from gyrobench.campaign.lot_attention import common_warnings, contradictions, instruments
-from gyrobench.campaign.lot_outliers import LEVEL, robust_outliers
-from gyrobench.campaign.measures import Json, Measures, numbers
+from gyrobench.campaign.analysis.intervals import tolerance_interval
+from gyrobench.campaign.analysis.lot_attention import common_warnings, contradictions, instruments
+from gyrobench.campaign.analysis.lot_outliers import LEVEL, robust_outliers
+from gyrobench.campaign.analysis.measures import Json, Measures, numbers
 from gyrobench.reduction.suite.ranking import LEVEL as CHANGE_LEVEL
 from gyrobench.reduction.suite.ranking import adjusted
 

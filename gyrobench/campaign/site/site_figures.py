@@ -9,8 +9,8 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.lots import all_dated, in_order
-from gyrobench.campaign.measures import Json, Measures, normalized_error, numbers
+from gyrobench.campaign.analysis.lots import all_dated, in_order
+from gyrobench.campaign.analysis.measures import Json, Measures, normalized_error, numbers
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import Picture
 from gyrobench.report.style import BLUE, GREEN, HALF, INK, MUTED, ORANGE, VERMILION, axis_label, figure, svg, zero_line

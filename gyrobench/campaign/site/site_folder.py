@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench.bench import Bench, UsageError
-from gyrobench.campaign.analysis import analyse
-from gyrobench.campaign.measures import Json, Measures, error, numbers
-from gyrobench.campaign.site_page import page
-from gyrobench.campaign.store import Campaign
+from gyrobench.campaign.analysis.campaign_analysis import analyse
+from gyrobench.campaign.analysis.measures import Json, Measures, error, numbers
+from gyrobench.campaign.execution.store import Campaign
+from gyrobench.campaign.site.site_page import page
 from gyrobench.files import write_whole
 from gyrobench.report.assets import read_content
 from gyrobench.report.render import html

@@ -1,14 +1,93 @@
-"""A designed test as text: what is reached, the plan as a command, time saved, what the plan does not determine."""
+"""A designed test or suite: options, time, predicted uncertainties, and its text.
+
+The text: what is reached, the plan as a command, time saved, what the plan does not determine.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
-if TYPE_CHECKING:
-    from gyrobench.design.plan_runs import DesignedTest
-    from gyrobench.design.suite_design import DesignedSuite
+from gyrobench.report.result_json import plain
 
 SHOWN = 12  # places in the table of the plan
+
+
+@dataclass(frozen=True)
+class DesignedValue:
+    """wanted, predicted u (as the reduction will state it), error (rms of the estimate), in ``unit``; book: u of the
+    system's own plan.  None: nothing was wanted of it.
+    """
+
+    name: str
+    unit: str
+    wanted: float | None
+    u: float
+    error: float
+    book: float
+
+
+@dataclass(frozen=True)
+class DesignedTest:
+    """options: of the system, for --set.  time, book_time: s of the plan, and of the system's own at equal uncertainty
+    (in a given time: the same time).  bound: s below which no plan reaches what is wanted; shares_efficiency: of the
+    shares of the time among the places under white noise, 1 is optimal; NaN where options and not places are chosen:
+    tried: the choices of options with their times.  counted: mean u, standard deviation of the estimates, runs.
+    """
+
+    system: str
+    given: Mapping[str, Any]
+    options: Mapping[str, Any]
+    plan: tuple[tuple[str, float], ...]
+    time: float
+    book_time: float
+    bound: float
+    shares_efficiency: float
+    timed: bool
+    criterion: str
+    values: Mapping[str, DesignedValue]
+    unseen: tuple[str, ...]
+    counted: Mapping[str, tuple[float, float, int]] = field(default_factory=dict)
+    tried: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def command(self) -> str:
+        """Return the command that runs the plan."""
+        settings = {**self.given, **self.options}
+        text = " ".join(f"--set {shlex.quote(f'{n}={v}')}" for n, v in settings.items())
+        return f"gyrobench run {self.system} {text}".rstrip()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain JSON values; infinite times and what is not known are null."""
+        return {**plain(asdict(self)), "command": self.command}
+
+    def __str__(self) -> str:
+        return format_design(self)
+
+
+@dataclass(frozen=True)
+class DesignedSuite:
+    """tests: in the order to be made.  others: designed and not needed.  left_out: test -> why it has no plan."""
+
+    suite: str
+    tests: tuple[DesignedTest, ...]
+    others: tuple[DesignedTest, ...]
+    left_out: Mapping[str, str]
+
+    @property
+    def time(self) -> float:
+        """Return the time of all tests, s; changes from one to the next are not in it."""
+        return sum(t.time for t in self.tests)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        named = {"tests": [t.as_dict() for t in self.tests], "others": [t.as_dict() for t in self.others]}
+        return {"suite": self.suite, "time": self.time, **named, "left_out": dict(self.left_out)}
+
+    def __str__(self) -> str:
+        return format_suite_design(self)
 
 
 def format_design(found: DesignedTest) -> str:

@@ -19,8 +19,8 @@ import numpy as np
 from scipy import stats
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.axis_effects import ROUNDING, Codes, crossed_seeds, levels
-from gyrobench.campaign.measures import SAMPLED_KINDS, Json, Measures, numbers, quantities
+from gyrobench.campaign.analysis.axis_effects import ROUNDING, Codes, crossed_seeds, levels
+from gyrobench.campaign.analysis.measures import SAMPLED_KINDS, Json, Measures, numbers, quantities
 
 MIN_RUNS = 64  # of a sampled design
 DRAWS = 400  # of the noise of a factorial design, for its intervals

@@ -24,8 +24,16 @@ from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
-from gyrobench.campaign.measures import SEED_KINDS, Json, Measures, error, normalized_error, numbers, shared_seeds
-from gyrobench.campaign.store import Campaign
+from gyrobench.campaign.analysis.measures import (
+    SEED_KINDS,
+    Json,
+    Measures,
+    error,
+    normalized_error,
+    numbers,
+    shared_seeds,
+)
+from gyrobench.campaign.execution.store import Campaign
 from gyrobench.reduction.suite.ranking import LEVEL, ROUNDING, adjusted
 from gyrobench.report.numbers import write_number
 from gyrobench.report.result_json import content_hash, plain

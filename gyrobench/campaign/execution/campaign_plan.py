@@ -17,9 +17,9 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.campaign.axes import QUANTITY, Axis, Distribution, Point
-from gyrobench.campaign.bundle import Assigned, Bundle, digest_of, tool_digest
-from gyrobench.campaign.definition import Definition
+from gyrobench.campaign.execution.axes import QUANTITY, Axis, Distribution, Point
+from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, tool_digest
+from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.suite import Suite, load_test

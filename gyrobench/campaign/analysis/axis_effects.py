@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.measures import Json, Measures, numbers, quantities
+from gyrobench.campaign.analysis.measures import Json, Measures, numbers, quantities
 from gyrobench.reduction.suite.ranking import LEVEL, adjusted
 
 Codes = NDArray[np.intp]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.campaign.axis_effects import main_effects, responses
-from gyrobench.campaign.coverage_counts import coverage
-from gyrobench.campaign.lots import analyse_lot
-from gyrobench.campaign.measures import Json, Measures, numbers
-from gyrobench.campaign.sobol_indices import sobol_indices
+from gyrobench.campaign.analysis.axis_effects import main_effects, responses
+from gyrobench.campaign.analysis.coverage_counts import coverage
+from gyrobench.campaign.analysis.lots import analyse_lot
+from gyrobench.campaign.analysis.measures import Json, Measures, numbers
+from gyrobench.campaign.analysis.sobol_indices import sobol_indices
 from gyrobench.report.numbers import write_number
 
 if TYPE_CHECKING:
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.execution.store import Campaign
 
 SCHEMA = "gyrobench-campaign-analysis-1"
 MOST = 4  # names in a sentence

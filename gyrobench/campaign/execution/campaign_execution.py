@@ -19,17 +19,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench
-from gyrobench.campaign.bundle import tool_digest
-from gyrobench.campaign.campaign_plan import MEASURED, Plan, PlannedRun, make_plan
-from gyrobench.campaign.clusters import connect, has_own_processes, is_local
-from gyrobench.campaign.definition import Definition
-from gyrobench.campaign.store import Campaign, CampaignError, CampaignStore
+from gyrobench.campaign.execution.bundle import tool_digest
+from gyrobench.campaign.execution.campaign_plan import MEASURED, Plan, PlannedRun, make_plan
+from gyrobench.campaign.execution.clusters import connect, has_own_processes, is_local
+from gyrobench.campaign.execution.definition import Definition
+from gyrobench.campaign.execution.store import Campaign, CampaignError, CampaignStore
 from gyrobench.notebook import MissingPackageError
 
 if TYPE_CHECKING:
     from distributed import Client
 
-    from gyrobench.campaign.worker import Chunk, Done
+    from gyrobench.campaign.execution.worker import Chunk, Done
 
 SECONDS = 1.0  # of work in a chunk
 WRITE = 2.0  # s between two writes
@@ -152,7 +152,7 @@ class _Execution:
         self, plan: Plan, store: CampaignStore, client: Client, stored: int,
         progress: Callable[[CampaignProgress], None] | None,
     ) -> None:  # fmt: skip
-        from gyrobench.campaign.worker import Order, Supply
+        from gyrobench.campaign.execution.worker import Order, Supply
 
         d = plan.definition
         self.plan, self.store, self.client, self.progress = plan, store, client, progress
@@ -230,7 +230,7 @@ class _Execution:
     # ------------------------------------------------------------------------------------------ chunks
     def _submit(self) -> None:
         """Give the workers what they can work on."""
-        from gyrobench.campaign.worker import run_chunk
+        from gyrobench.campaign.execution.worker import run_chunk
 
         # a run that may end its worker has no neighbour waiting there
         while len(self.flying) < (1 if self.alone else AHEAD) * self.workers and (self.waiting or self.alone):
@@ -243,7 +243,7 @@ class _Execution:
 
     def _chunk(self) -> Chunk:
         """Return the next runs: one that has ended a worker, else of one setup about a second of work."""
-        from gyrobench.campaign.worker import Chunk
+        from gyrobench.campaign.execution.worker import Chunk
 
         if self.alone:
             runs = [self.alone.popleft()]
@@ -264,7 +264,7 @@ class _Execution:
         """Take what has come back."""
         from distributed import KilledWorker
 
-        from gyrobench.campaign.worker import MachineError
+        from gyrobench.campaign.execution.worker import MachineError
 
         try:
             future = self.finished.get(timeout=0.2)
@@ -288,7 +288,7 @@ class _Execution:
 
     def _inquire(self) -> None:
         """Ask the workers which runs have ended a worker; what was only beside them waits again."""
-        from gyrobench.campaign.worker import find_casualties
+        from gyrobench.campaign.execution.worker import find_casualties
 
         answers = self.client.run(find_casualties, self.name, on_error="ignore") if self.own else {}
         tries_allowed = self.plan.definition.retries + 1

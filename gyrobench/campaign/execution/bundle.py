@@ -17,7 +17,7 @@ from gyrobench.bench import Bench
 from gyrobench.files import sha256, temporary_folder
 
 #: rooms of the tool whose text does not determine a result
-OTHER_ROOMS = ("campaign", "commands", "library", "workflow", "exchange", "_bench")
+OTHER_ROOMS = ("campaign", "design", "commands", "library", "workflow", "exchange", "_bench")
 SOURCES = (".py", ".toml", ".j2", ".css", ".js", ".typ", ".json")
 
 
@@ -88,6 +88,6 @@ def digest_of(files: Mapping[str, Path]) -> str:
 @functools.cache
 def tool_digest() -> str:
     """Return a hash of the part of gyrobench that determines results; it stays as it is while the process runs."""
-    tool = Path(__file__).parents[1]
+    tool = Path(__file__).parents[2]
     files = {str(f.relative_to(tool)): f for f in tool.rglob("*") if f.suffix in (".py", ".c", ".h")}
     return digest_of({n: f for n, f in files.items() if Path(n).parts[0] not in OTHER_ROOMS})

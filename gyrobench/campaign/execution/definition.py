@@ -9,7 +9,7 @@
     [set]                                   # values of all runs, as of gyrobench run --set @FILE
     latitude = "45.75deg"
 
-    [over]                                  # axes, see gyrobench.campaign.axes
+    [over]                                  # axes, see gyrobench.campaign.execution.axes
     latitude = "0deg..80deg:9"
     "gyro.D_I" = "uniform(-1, 1) deg/h/g"
 
@@ -38,7 +38,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.campaign.axes import DESIGNS, Axis, Distribution, Point, draw, parse_axis
+from gyrobench.campaign.execution.axes import DESIGNS, Axis, Distribution, Point, draw, parse_axis
 from gyrobench.system.values import parse
 
 KEEP = ("all", "failures", "extremes", "none")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from gyrobench.bench import UsageError
-from gyrobench.campaign.store import CampaignError
+from gyrobench.campaign.execution.store import CampaignError
 from gyrobench.files import cores, temporary_folder
 
 if TYPE_CHECKING:
@@ -81,7 +81,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
         settings["distributed.worker.multiprocessing-method"] = "forkserver"
     with dask.config.set(settings), _without_main():
         if sys.platform == "linux":
-            loaded = ["distributed", "gyrobench.campaign.worker", "scipy.stats", "scipy.signal"]  # in place of dask's
+            # in place of dask's
+            loaded = ["distributed", "gyrobench.campaign.execution.worker", "scipy.stats", "scipy.signal"]
             get_mp_context().set_forkserver_preload(loaded)
         with (
             LocalCluster(
