@@ -330,3 +330,14 @@ def test_what_the_benchmarks_import_exists() -> None:
             for name in re.findall(r"(\w+)(?: as \w+)?", names):
                 found = hasattr(importlib.import_module(module), name)
                 assert found or importlib.util.find_spec(f"{module}.{name}"), f"{file.name}: {module} has no {name}"
+
+
+def test_files_of_tests_are_tests() -> None:
+    """What tests share is in tests/support, on the path by pyproject.toml; each room of tests is one of the tool."""
+    tests = Path(__file__).parent
+    others = {"benchmarks", "support", "foreign", "corpus"}
+    for folder in (f for f in tests.iterdir() if f.is_dir() and f.name not in {*others, "__pycache__"}):
+        assert folder.name in {*ROOMS, "components", "systems", "spec"}, f"{folder}: which room of the tool is it of?"
+        for file in folder.glob("*.py"):
+            assert file.name == "conftest.py" or file.name.startswith("test_"), f"{file}: to tests/support"
+            assert "sys.path.insert" not in file.read_text(encoding="utf-8"), file

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "campaign"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import synthetic_campaign as synthetic
 from browser import OVERLAPS, Browser

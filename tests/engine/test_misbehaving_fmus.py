@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import foreign_fmus
 import pytest
 
 from gyrobench.engine import supervision
@@ -17,7 +18,7 @@ from gyrobench.record.record import Record
 from gyrobench.system.execution_order import AlgebraicLoopError
 from gyrobench.system.system import System
 
-Make = Callable[..., Path]
+Foreign = Callable[..., Path]
 QUIET = {"rebalance.K_p": 0.0, "rebalance.K_i": 0.0}
 SHORT = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
 SOURCE = (Path(__file__).parents[1] / "foreign" / "faulty.c").read_text(encoding="utf-8")
@@ -54,7 +55,7 @@ STEP = [
 
 @pytest.mark.parametrize(("fault", "words"), STEP)
 def test_a_fault_in_a_step(
-    small: System, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
+    small: System, foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
 ) -> None:
     # step 150 begins at t = 0.15 s: the channels every 10 ms then have rows at 0, 0.01 ... 0.15, and the rest of the
     # plan's first phase, gate from 0.1 s, has no window of 0.1 s yet
@@ -63,7 +64,7 @@ def test_a_fault_in_a_step(
     values = {"gyro.fault": FAULTS[fault], "gyro.at": 150, **QUIET}
     timeout = 0.5 if "no answer" in words else 60.0  # the others end by themselves, on a slow machine too
     with pytest.raises(RunError) as caught:
-        run(small, {"gyro": make("faulty")}, values=values, child=True, timeout=timeout, out=tmp_path / "run")
+        run(small, {"gyro": foreign("faulty")}, values=values, child=True, timeout=timeout, out=tmp_path / "run")
     text = str(caught.value)
     assert f"gyro: doStep failed at t = 0.15 s: {words}" in text or (fault == "MEMORY" and words in text)
     assert str(tmp_path / "run") in text and caught.value.exit_code == 3
@@ -84,12 +85,12 @@ def test_a_fault_in_a_step(
     ],
 )
 def test_a_fault_before_the_first_step(
-    small: System, make: Make, tmp_path: Path, fault: str, flags: tuple[str, ...], words: str
+    small: System, foreign: Foreign, tmp_path: Path, fault: str, flags: tuple[str, ...], words: str
 ) -> None:
     with pytest.raises(RunError) as caught:
         run(
             small,
-            {"gyro": make("faulty", *flags)},
+            {"gyro": foreign("faulty", *flags)},
             values={"gyro.fault": FAULTS[fault]},
             child=True,
             timeout=0.5 if "no answer" in words else 60.0,
@@ -100,17 +101,11 @@ def test_a_fault_before_the_first_step(
     assert not record.complete and words in record.run.problem and record.run.steps == 0
 
 
-def test_a_library_outside_of_the_archive(small: System, make: Make, tmp_path: Path) -> None:
+def test_a_library_outside_of_the_archive(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """The identifier leads to a library that would end the process: it is not loaded."""
-    outside = make("faulty", "-DON_LOADING").with_suffix("")
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location("m", Path(__file__).parents[1] / "foreign" / "make.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    outside = foreign("faulty", "-DON_LOADING").with_suffix("")
     for way in (f"../../../../../../../../../..{outside}", str(outside), "..\\faulty"):
-        fmu = module.make("faulty", tmp_path, identifier=way)
+        fmu = foreign_fmus.make("faulty", tmp_path, identifier=way)
         with pytest.raises(RunError, match=r"gyro: loading failed: modelIdentifier '.*' is not the name of a file"):
             run(small, {"gyro": fmu}, child=True, out=tmp_path / "run")
         assert not Record.load(tmp_path / "run").complete
@@ -128,13 +123,13 @@ def test_a_library_outside_of_the_archive(small: System, make: Make, tmp_path: P
     ],
 )
 def test_what_does_not_touch_the_run(
-    small: System, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
+    small: System, foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     values = {"gyro.at": 150, **QUIET, **SHORT}
-    good = run(small, {"gyro": make("faulty")}, values=values)
+    good = run(small, {"gyro": foreign("faulty")}, values=values)
     found = run(
-        small, {"gyro": make("faulty")}, values={**values, "gyro.fault": FAULTS[fault]}, child=True,
+        small, {"gyro": foreign("faulty")}, values={**values, "gyro.fault": FAULTS[fault]}, child=True,
         timeout=0.5 if "no answer" in words else 60.0, out=Path("run"),
     )  # fmt: skip
     assert found.complete and found.same_data(good) and Record.load(tmp_path / "run").same_data(good)
@@ -142,11 +137,11 @@ def test_what_does_not_touch_the_run(
     assert Path.cwd() == tmp_path
 
 
-def test_nothing_is_left_of_a_process_that_an_fmu_started(small: System, make: Make) -> None:
+def test_nothing_is_left_of_a_process_that_an_fmu_started(small: System, foreign: Foreign) -> None:
     """A process that the FMU has forked ends with the run, although it waits for a signal for ever."""
     before = set(os.listdir("/proc"))
     with pytest.raises(RunError):
-        run(small, {"gyro": make("faulty")}, values={"gyro.fault": FAULTS["LEAVE_A_PROCESS"], **QUIET}, child=True)
+        run(small, {"gyro": foreign("faulty")}, values={"gyro.fault": FAULTS["LEAVE_A_PROCESS"], **QUIET}, child=True)
 
     def ours() -> list[str]:
         found = []
@@ -180,15 +175,15 @@ def test_the_record_of_a_child_is_bit_equal(
     assert seen[-1].windows == len(outside.windows["mean"])
 
 
-def test_a_crash_without_fork_is_told_too(small: System, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crash_without_fork_is_told_too(small: System, foreign: Foreign, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervision, "can_fork", lambda: False)
     values = {"gyro.fault": FAULTS["CRASH"], "gyro.at": 150, **QUIET}
     with pytest.raises(RunError, match=r"gyro: doStep failed at t = 0.15 s: its process crashed \(SIGSEGV\)") as caught:
-        run(small, {"gyro": make("faulty")}, values=values, child=True)
+        run(small, {"gyro": foreign("faulty")}, values=values, child=True)
     assert caught.value.record is not None and len(caught.value.record.channels["time"]) == 16
 
 
-def test_rows_of_many_blocks_survive_a_crash(small: System, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_of_many_blocks_survive_a_crash(small: System, foreign: Foreign, monkeypatch: pytest.MonkeyPatch) -> None:
     """The blocks are emptied some twenty times before the crash: each row is there once."""
     from gyrobench.engine import native_engine, run_board
 
@@ -197,15 +192,15 @@ def test_rows_of_many_blocks_survive_a_crash(small: System, make: Make, monkeypa
         monkeypatch.setattr(module, "BLOCK", 7)
     values = {"gyro.fault": FAULTS["CRASH"], "gyro.at": 1500, **QUIET}
     with pytest.raises(RunError, match=r"at t = 1.5 s: its process crashed") as caught:
-        run(small, {"gyro": make("faulty")}, values=values, child=True)
+        run(small, {"gyro": foreign("faulty")}, values=values, child=True)
     assert caught.value.record is not None
     assert caught.value.record.channels["time"].tolist() == [k * 10 * 1e-3 for k in range(151)]
 
 
-def test_a_foreign_fmu_is_named_with_its_digest_before_it_runs(small: System, make: Make) -> None:
+def test_a_foreign_fmu_is_named_with_its_digest_before_it_runs(small: System, foreign: Foreign) -> None:
     import hashlib
 
-    fmu = make("faulty", "-DON_LOADING")
+    fmu = foreign("faulty", "-DON_LOADING")
     digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
     with Session(small, {"gyro": fmu}, child=True) as session:
         assert f"gyro: faulty.fmu is not of this bench: SHA-256 {digest}" in session.notes
@@ -214,18 +209,18 @@ def test_a_foreign_fmu_is_named_with_its_digest_before_it_runs(small: System, ma
 
 
 @pytest.mark.parametrize("engine", ["native", "reference"])
-def test_error_with_message_in_process(small: System, make: Make, engine: str) -> None:
+def test_error_with_message_in_process(small: System, foreign: Foreign, engine: str) -> None:
     with pytest.raises(
         RunError, match=r"gyro: doStep failed at t = 0.15 s: status 3 \(Error\)\n.*the wheel has stopped"
     ):
         run(
             small,
-            parts={"gyro": make("faulty")},
+            parts={"gyro": foreign("faulty")},
             values={"gyro.fault": 3, "gyro.at": 150, "rebalance.K_p": 0.0},
             engine=engine,
         )
 
 
-def test_undeclared_dependencies_make_an_algebraic_loop(small: System, make: Make) -> None:
+def test_undeclared_dependencies_make_an_algebraic_loop(small: System, foreign: Foreign) -> None:
     with pytest.raises(AlgebraicLoopError, match=r"gyro\.u -> rebalance\.u -> rebalance\.i -> gyro\.i -> gyro\.u"):
-        run(small, parts={"gyro": make("loose")})
+        run(small, parts={"gyro": foreign("loose")})

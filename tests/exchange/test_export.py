@@ -20,7 +20,7 @@ from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.record.record import Record
 from gyrobench.system.system import InvalidConfigurationError, System
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 QUICK = {
     "dwell": 0.2,
@@ -84,7 +84,7 @@ def test_ssp_is_valid_and_reproducible(small: System, archive: Path, tmp_path: P
     assert float(fmu.defaultExperiment.stepSize) == 1e-3
 
 
-def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path) -> None:
+def test_ssp_reads_back(small: System, archive: Path, foreign: Foreign, tmp_path: Path) -> None:
     # the archive names no windows and no done output, so it runs to its stop time; the channels are comparable
     system = read_ssp(archive, step=1e-3)
     ours, theirs = run(small, values=QUICK), run(system)
@@ -95,7 +95,7 @@ def test_ssp_reads_back(small: System, archive: Path, make: Make, tmp_path: Path
     inside = common < len(ours.channels["time"])
     np.testing.assert_array_equal(theirs.channels["gyro.u"][inside], ours.channels["gyro.u"][common[inside]])
     # factors survive the way out and back
-    parts = {"gyro": make("vendor_gyro")}
+    parts = {"gyro": foreign("vendor_gyro")}
     export_ssp(small, tmp_path / "v.ssp", parts=parts, maps=MAPPED, values={"dwell": 0.2})
     with Session(small, parts, MAPPED) as a, Session(read_ssp(tmp_path / "v.ssp", 1e-3)) as b:
         gains = [{(c.source, c.output.variable, c.target, c.input.variable): c.gain for c in s.assembly.connections}

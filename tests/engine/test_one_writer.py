@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from gyrobench.commands import cli
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE
 from gyrobench.engine.run_driver import Interrupts
@@ -22,14 +21,11 @@ from gyrobench.files import LOCK, FolderInUseError, FolderLock, sweep
 from gyrobench.record.record import Record
 
 Command = Callable[..., tuple[int, str, str]]
-ROOT = str(Path(cli.__file__).parents[2])
 SHORT = ("fixed_position", "--set", "dwell=16s", "--set", "readings=8", "--set", "settle=1s", "--set", "attitude=E U")
 
 
 STEPPING = "stepping"  # file that a command leaves once its run is past its initialization
 CODE = f"""
-import sys
-sys.path.insert(0, {ROOT!r})
 from pathlib import Path
 from gyrobench.commands import cli, progress_display
 progress_display.ProgressDisplay.__call__ = lambda self, status: Path({STEPPING!r}).touch()
@@ -55,9 +51,7 @@ def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> N
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     """The lock ends with the process that has it, killed or not; its file may stay."""
     held = FolderLock(tmp_path / "r")
-    code = (
-        f"import sys; sys.path.insert(0, {ROOT!r})\nfrom pathlib import Path\nfrom gyrobench.files import FolderLock\n"
-    )
+    code = "from pathlib import Path\nfrom gyrobench.files import FolderLock\n"
     other = subprocess.run(
         [sys.executable, "-c", f"{code}FolderLock(Path({str(tmp_path / 'r')!r}))"], capture_output=True, text=True
     )
@@ -73,10 +67,9 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 MAKING = """
 import os, signal, sys, time
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
 from gyrobench import files
 
-folder = Path(sys.argv[2])
+folder = Path(sys.argv[1])
 
 def note(name):
     with (folder / name).open("a") as file:
@@ -104,7 +97,7 @@ def test_a_file_of_the_cache_is_made_once(tmp_path: Path) -> None:
 
     A process that was killed in its turn has left it to them.
     """
-    words = [sys.executable, "-c", MAKING, ROOT, str(tmp_path)]
+    words = [sys.executable, "-c", MAKING, str(tmp_path)]
     assert subprocess.run([*words, "killed"]).returncode == -signal.SIGKILL
     made, asked = tmp_path / "made", tmp_path / "asked"
     assert len(made.read_text().split()) == 1 and not (tmp_path / "cache" / "library.so").exists()
@@ -167,7 +160,7 @@ def test_the_first_checkpoint_comes_after_seconds() -> None:
 def test_files_of_killed_processes_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that ends removes its own; what a killed one left goes, what a living one has and a user's run stay."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    code = f"import sys; sys.path.insert(0, {ROOT!r})\nimport os, signal, tempfile\n"
+    code = "import os, signal, tempfile\n"
     code += f"tempfile.tempdir = {str(tmp_path)!r}\nfrom gyrobench.files import temporary_folder\n"
     code += "print(temporary_folder(), flush=True)\n"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

@@ -7,7 +7,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "foreign"
 
 
 def make(name: str, folder: Path, *flags: str, identifier: str | None = None) -> Path:

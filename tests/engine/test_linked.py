@@ -192,10 +192,10 @@ def test_without_a_compiler_a_long_run_is_not_linked(
         run(small, values=QUICK, engine="linked")
 
 
-def test_foreign_and_python_parts_are_not_linked(small: System, make: Callable[[str], Path]) -> None:
+def test_foreign_and_python_parts_are_not_linked(small: System, foreign: Callable[[str], Path]) -> None:
     with Session(small, target="python") as session:
         assert not session.linkable
-    setup = {"parts": {"gyro": make("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
+    setup = {"parts": {"gyro": foreign("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
     with Session(small, **setup) as session:  # type: ignore[arg-type]
         assert not session.linkable
     with pytest.raises(InvalidValueError, match="engine 'linked': gyro: not a native part of this bench"):

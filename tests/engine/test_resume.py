@@ -25,7 +25,7 @@ from gyrobench.record.record import Record
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0, "gyro.white": 1e-7, "gyro.markov": 1e-7}
 FOREIGN = Path(__file__).parents[1] / "foreign"
 
@@ -146,8 +146,8 @@ def test_nothing_or_a_damaged_file_is_refused(small: System, tmp_path: Path) -> 
             run(small, **again)
 
 
-def test_a_part_that_cannot_save_its_state(small: System, make: Make, tmp_path: Path) -> None:
-    setup: dict[str, Any] = {"parts": {"gyro": make("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
+def test_a_part_that_cannot_save_its_state(small: System, foreign: Foreign, tmp_path: Path) -> None:
+    setup: dict[str, Any] = {"parts": {"gyro": foreign("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
     setup["values"] = {n: v for n, v in QUICK.items() if not n.startswith("gyro")}
     why = r"gyro: the FMU cannot save its state \(canSerializeFMUstate is not true"
     assert f"it cannot be resumed: {why[:30]}" in str(stop(small, tmp_path, 0.1, **setup))
@@ -273,10 +273,7 @@ def test_a_killed_process_is_resumed(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = [*WORDS, "--engine", "reference", "--out", "k"]
-    root = str(Path(cli.__file__).parents[2])
-    process = subprocess.Popen(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {root!r})\n{CODE}", *words], cwd=tmp_path
-    )
+    process = subprocess.Popen([sys.executable, "-c", CODE, *words], cwd=tmp_path)
     file = tmp_path / "k" / FILE
     deadline = time.monotonic() + 300.0
     while not (tmp_path / "four").is_file() and process.poll() is None and time.monotonic() < deadline:

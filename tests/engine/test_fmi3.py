@@ -19,7 +19,7 @@ from gyrobench.system import sockets
 from gyrobench.system.system import Slot, System, load_system
 from gyrobench.system.values import InvalidValueError
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
 TYPES = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
@@ -49,19 +49,19 @@ def any_socket(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sockets.SOCKETS, "Any", sockets.Socket("Any", "any FMU", ()))
 
 
-def pair(make: Make, system: type[System] = Pair, engine: str = "native", **more: Any) -> Any:
-    return run(system(), parts={n: make("types3") for n in "ab"}, engine=engine, **more)
+def pair(foreign: Foreign, system: type[System] = Pair, engine: str = "native", **more: Any) -> Any:
+    return run(system(), parts={n: foreign("types3") for n in "ab"}, engine=engine, **more)
 
 
-def test_foreign_fmus_are_valid(make: Make) -> None:
-    assert validate_fmu(str(make("types3"))) == []
-    assert validate_fmu(str(make("vendor_gyro3"))) == []
+def test_foreign_fmus_are_valid(foreign: Foreign) -> None:
+    assert validate_fmu(str(foreign("types3"))) == []
+    assert validate_fmu(str(foreign("vendor_gyro3"))) == []
 
 
-def test_every_type_and_arrays_that_are_wired_in_part(make: Make) -> None:
-    found = pair(make, child=True)
-    assert pair(make).same_data(found)
-    assert pair(make, engine="reference").same_data(found)
+def test_every_type_and_arrays_that_are_wired_in_part(foreign: Foreign) -> None:
+    found = pair(foreign, child=True)
+    assert pair(foreign).same_data(found)
+    assert pair(foreign, engine="reference").same_data(found)
     k = np.arange(51.0)
     single = (0.1 * k).astype(np.float32).astype(float)  # what a float holds of k/10
     expected = (
@@ -75,17 +75,17 @@ def test_every_type_and_arrays_that_are_wired_in_part(make: Make) -> None:
     np.testing.assert_array_equal(found.channels["b.sum"], 1.0 + 10.0 * single + 300.0)
 
 
-def test_elements_of_arrays_are_set_one_by_one(make: Make) -> None:
-    both = [pair(make, engine=e, values={"b.vector[3]": 5.0}) for e in ("native", "reference")]
+def test_elements_of_arrays_are_set_one_by_one(foreign: Foreign) -> None:
+    both = [pair(foreign, engine=e, values={"b.vector[3]": 5.0}) for e in ("native", "reference")]
     assert both[0].same_data(both[1])
     assert both[0].channels["b.sum"][0] == 501.0  # 1 + 10 * 0 + 100 * 5
     with pytest.raises(InvalidValueError, match=r"a has no parameter 'vektor\[3\]'"):
-        pair(make, values={"a.vektor[3]": 5.0})
+        pair(foreign, values={"a.vektor[3]": 5.0})
 
 
-def test_early_return_goes_on_with_the_rest_of_the_step(make: Make) -> None:
+def test_early_return_goes_on_with_the_rest_of_the_step(foreign: Foreign) -> None:
     for engine in ("native", "reference"):
-        found = pair(make, engine=engine, values={"a.pieces": 3})
+        found = pair(foreign, engine=engine, values={"a.pieces": 3})
         assert found.channels["a.calls"].tolist() == [3 * k for k in range(51)]
         assert found.channels["a.o_Int8"].tolist() == [-k for k in range(51)]
 
@@ -100,9 +100,11 @@ def test_early_return_goes_on_with_the_rest_of_the_step(make: Make) -> None:
         (Pair, {"b.end_at": 0.1}, "b: doStep failed at t = 0.1 s: the FMU asks for the end of the simulation"),
     ],
 )
-def test_what_ends_a_run(make: Make, engine: str, system: type[System], values: dict[str, Any], words: str) -> None:
+def test_what_ends_a_run(
+    foreign: Foreign, engine: str, system: type[System], values: dict[str, Any], words: str
+) -> None:
     with pytest.raises(RunError) as caught:
-        pair(make, system, engine, values=values)
+        pair(foreign, system, engine, values=values)
     assert words in str(caught.value)
 
 
@@ -129,24 +131,24 @@ def test_arrays_of_own_builds_that_are_wired_and_set_in_part(tmp_path: Path) -> 
         assert run(system, values=values, seed=5, parts=every, engine=engine).same_data(two)
 
 
-def test_a_vendors_gyro_with_arrays(small: System, make: Make) -> None:
+def test_a_vendors_gyro_with_arrays(small: System, foreign: Foreign) -> None:
     """The FMI 3.0 gyro is the FMI 2.0 one but for its floats, which hold 24 bits of the load and the current."""
     maps = {"gyro": FOREIGN / "vendor_gyro3.toml"}
     values = {**QUICK, "gyro.D_I": "0.9deg/h", "gyro.D_S": "0.4deg/h", "rebalance.meter": 0.0}
-    new = run(small, {"gyro": make("vendor_gyro3")}, maps, values, seed=5)
-    assert new.same_data(run(small, {"gyro": make("vendor_gyro3")}, maps, values, seed=5, engine="reference"))
-    old = run(small, {"gyro": make("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}, values, seed=5)
+    new = run(small, {"gyro": foreign("vendor_gyro3")}, maps, values, seed=5)
+    assert new.same_data(run(small, {"gyro": foreign("vendor_gyro3")}, maps, values, seed=5, engine="reference"))
+    old = run(small, {"gyro": foreign("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}, values, seed=5)
     np.testing.assert_allclose(new.windows["mean"], old.windows["mean"], rtol=1e-6, atol=1e-9)
     assert not new.same_data(old)  # a float is not a double
     # events every 0.7 ms cut the steps of 1 ms: the exact solution with held inputs is the same, up to the cross term
-    early = run(small, {"gyro": make("vendor_gyro3")}, maps, {**values, "gyro.T_EVENT": "0.7ms"}, seed=5)
+    early = run(small, {"gyro": foreign("vendor_gyro3")}, maps, {**values, "gyro.T_EVENT": "0.7ms"}, seed=5)
     np.testing.assert_allclose(early.windows["mean"], new.windows["mean"], rtol=1e-6, atol=1e-9)
     assert not early.same_data(new)
 
 
-def test_arrays_in_an_archive(small: System, make: Make, tmp_path: Path) -> None:
+def test_arrays_in_an_archive(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """Elements of arrays are connectors of their names; the archive reads back with the same connections."""
-    parts, maps = {"gyro": make("vendor_gyro3")}, {"gyro": FOREIGN / "vendor_gyro3.toml"}
+    parts, maps = {"gyro": foreign("vendor_gyro3")}, {"gyro": FOREIGN / "vendor_gyro3.toml"}
     notes = export_ssp(small, tmp_path / "v.ssp", parts, maps, {"gyro.D_S": "0.4deg/h"})
     assert "gyro: elements of arrays (FMI 3.0) are connectors, which few importers take" in notes
     archive = read_ssp(tmp_path / "v.ssp", 1e-3)

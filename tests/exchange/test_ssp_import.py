@@ -14,7 +14,7 @@ from gyrobench.engine.session import run
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.system.system import InvalidConfigurationError
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 NAMES = " ".join(
     f'xmlns:{n}="http://ssp-standard.org/SSP1/SystemStructure{what}"'
     for n, what in {
@@ -63,7 +63,7 @@ def real(name: str, value: float, unit: str = "") -> str:
 
 
 @pytest.fixture
-def archive(make: Make, tmp_path: Path) -> Callable[..., Path]:
+def archive(foreign: Foreign, tmp_path: Path) -> Callable[..., Path]:
     """Write an archive: elements, connections, what is bound to the system, units, end of the system."""
 
     def write(elements: str, connections: str = "", values: str = "", units: str = "", end: str = "") -> Path:
@@ -76,7 +76,7 @@ def archive(make: Make, tmp_path: Path) -> Callable[..., Path]:
         path = tmp_path / "x.ssp"
         with zipfile.ZipFile(path, "w") as z:
             z.writestr("SystemStructure.ssd", text)
-            z.write(make("lag"), "resources/lag.fmu")
+            z.write(foreign("lag"), "resources/lag.fmu")
         return path
 
     return write

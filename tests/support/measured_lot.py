@@ -1,6 +1,6 @@
 """Measured files of a lot of floated gyros, as a laboratory writes them, a few with the mistakes laboratories make.
 
-    python tests/campaign/measured_lot.py FOLDER [--count 100] [--seed 1]
+    python tests/support/measured_lot.py FOLDER [--count 100] [--seed 1]
 
 Each file is a co-simulated tumble of one gyro of the lot (short turns at 0.02 rad/s), written in units of a laboratory.
 Five are wrong, spread over the lot: the current in microampere under the head mA; the two mounts exchanged; the angle

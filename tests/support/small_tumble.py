@@ -1,14 +1,9 @@
-"""A small system for the tests (the standard parts on a short plan) and the foreign FMUs."""
+"""A small system for the tests: the standard parts on a short plan."""
 
 from __future__ import annotations
 
-import importlib.util
 import math
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any, ClassVar
-
-import pytest
 
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -76,27 +71,3 @@ class SmallTumble(System):
 
     def check(self) -> list[str]:
         return ["latitude 0: nothing to see"] if self["latitude"] == 0.0 else []
-
-
-@pytest.fixture
-def small() -> SmallTumble:
-    return SmallTumble()
-
-
-@pytest.fixture(scope="session")
-def make(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Builds a foreign FMU of tests/foreign once, with each set of the compiler's flags."""
-    file = Path(__file__).parents[1] / "foreign" / "make.py"
-    spec = importlib.util.spec_from_file_location("foreign_make", file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    done: dict[tuple[str, ...], Path] = {}
-
-    def make_once(name: str, *flags: str) -> Path:
-        key = (name, *flags)
-        if key not in done:
-            done[key] = module.make(name, tmp_path_factory.mktemp("foreign"), *flags)
-        return done[key]
-
-    return make_once

@@ -1,6 +1,6 @@
 """Monte Carlo of the tumble's intervals: do 95 % intervals cover, the noise model being estimated from the same data?
 
-python tests/reduction/coverage.py [runs]      prints coverage per coefficient and u against scatter
+python tests/support/estimation_coverage.py [runs]      prints coverage per coefficient and u against scatter
 """
 
 from __future__ import annotations

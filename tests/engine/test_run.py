@@ -20,7 +20,7 @@ from gyrobench.system.system_description import describe
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import WiringError
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
 FOREIGN = Path(__file__).parents[1] / "foreign"
 
@@ -51,8 +51,8 @@ def lag_socket(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sockets.SOCKETS, "Lag", sockets.Socket("Lag", "a lag", ()))
 
 
-def ring(make: Make) -> dict[str, Any]:
-    return {"parts": {n: make("lag") for n in "abcd"}, "values": {"a.y0": 1.0, "b.T": 0.05, "a.T": "200ms"}}
+def ring(foreign: Foreign) -> dict[str, Any]:
+    return {"parts": {n: foreign("lag") for n in "abcd"}, "values": {"a.y0": 1.0, "b.T": 0.05, "a.T": "200ms"}}
 
 
 def test_engines_are_bit_equal(small: System) -> None:
@@ -64,8 +64,8 @@ def test_engines_are_bit_equal(small: System) -> None:
     assert one.run.order == two.run.order
 
 
-def test_engines_are_bit_equal_with_a_mapped_fmu(small: System, make: Make) -> None:
-    setup = {"parts": {"gyro": make("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
+def test_engines_are_bit_equal_with_a_mapped_fmu(small: System, foreign: Foreign) -> None:
+    setup = {"parts": {"gyro": foreign("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
     one = run(small, values=QUICK, engine="native", **setup)
     two = run(small, values=QUICK, engine="reference", **setup)
     assert one.same_data(two)
@@ -73,10 +73,10 @@ def test_engines_are_bit_equal_with_a_mapped_fmu(small: System, make: Make) -> N
     assert one.run.parts["gyro"].target == "foreign"
 
 
-def test_integer_and_boolean_connections_against_a_loop_by_hand(make: Make) -> None:
+def test_integer_and_boolean_connections_against_a_loop_by_hand(foreign: Foreign) -> None:
     # order a b c d, d -> a is cut.  y' = (u - y)/T held over h: y += (u - y) (1 - exp(-h/T))
-    found = run(Ring(), **ring(make), engine="native")
-    assert found.same_data(run(Ring(), **ring(make), engine="reference"))
+    found = run(Ring(), **ring(foreign), engine="native")
+    assert found.same_data(run(Ring(), **ring(foreign), engine="reference"))
     assert found.run.cuts == ["d.y -> a.u: one step delay (no output of a depends on it at once)"]
     y = {"a": 1.0, "b": 0.0, "c": 0.0, "d": 0.0}
     e = {n: -math.expm1(-0.01 / t) for n, t in {"a": 0.2, "b": 0.05, "c": 0.1, "d": 0.1}.items()}
@@ -94,9 +94,9 @@ def test_integer_and_boolean_connections_against_a_loop_by_hand(make: Make) -> N
     assert found.channels["time"][-1] == 1.0
 
 
-def test_initial_outputs_are_propagated(make: Make) -> None:
+def test_initial_outputs_are_propagated(foreign: Foreign) -> None:
     # the first step of b sees a.y after a's first step; a itself sees d's initial output y0 = 3, not 0
-    found = run(Ring(), parts=ring(make)["parts"], values={"d.y0": 3.0})
+    found = run(Ring(), parts=ring(foreign)["parts"], values={"d.y0": 3.0})
     assert found.channels["a.y"][0] == 0.0
     assert found.channels["a.y"][1] == pytest.approx(3.0 * -math.expm1(-0.1), rel=1e-14)
 
@@ -177,7 +177,7 @@ def test_part_refuses_its_parameter(small: System) -> None:
         run(small, values={"gyro.H": -1.0})
 
 
-def test_wiring_errors(small: System, make: Make) -> None:
+def test_wiring_errors(small: System, foreign: Foreign) -> None:
     class Bad(type(small)):  # type: ignore[misc]
         wires = """
             site.f -> gyro.u
@@ -196,7 +196,7 @@ def test_wiring_errors(small: System, make: Make) -> None:
     ]  # fmt: skip
 
 
-def test_interrupt_keeps_the_record(make: Make, tmp_path: Path) -> None:
+def test_interrupt_keeps_the_record(foreign: Foreign, tmp_path: Path) -> None:
     class Long(Ring):
         stop = 1e6
         channel_period = 100.0
@@ -209,7 +209,7 @@ def test_interrupt_keeps_the_record(make: Make, tmp_path: Path) -> None:
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(RunInterrupted) as caught:
-        run(Long(), **ring(make), out=tmp_path, progress=interrupt)
+        run(Long(), **ring(foreign), out=tmp_path, progress=interrupt)
     record = Record.load(tmp_path)
     assert not record.complete
     assert 1000.0 < record.run.stopped_at == seen[-1].time < 1e6
@@ -228,11 +228,11 @@ def test_description_is_what_runs(small: System) -> None:
     assert [w["wire"] for w in shown["wires"] if w["cut"]] == list(shown["delays"])
 
 
-def test_many_rows_do_not_overflow_the_blocks(make: Make) -> None:
+def test_many_rows_do_not_overflow_the_blocks(foreign: Foreign) -> None:
     class Dense(Ring):
         stop = 500.0  # 50,000 rows
 
-    found = run(Dense(), **ring(make))
+    found = run(Dense(), **ring(foreign))
     np.testing.assert_array_equal(found.channels["time"], np.arange(50001) * 0.01)
 
 
@@ -243,9 +243,9 @@ def test_python_and_native_parts_give_the_same_record(small: System) -> None:
     assert python.run.parts["gyro"].target == "python"
 
 
-def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, make: Make) -> None:
+def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, foreign: Foreign) -> None:
     with pytest.raises(RunError, match=r"rebalance: doStep failed at t = 0.15\d* s.*\n.*FMU log: .*u") as caught:
-        run(small, parts={"gyro": make("faulty")}, values={"gyro.fault": 4, "gyro.at": 150, "rebalance.K_p": 0.0})
+        run(small, parts={"gyro": foreign("faulty")}, values={"gyro.fault": 4, "gyro.at": 150, "rebalance.K_p": 0.0})
     assert caught.value.record is not None
     assert not caught.value.record.complete
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 CORPUS = {f.stem: f.read_bytes() for f in sorted((HERE / "corpus").glob("*.csv"))}
 QUICK = ("fixed_position", "open_loop_drift", "pickoff_scale_factor", "tumble_single_axis")  # reduced in 0.1 to 0.3 s
 REDUCED = 0.03  # of the files that can be read

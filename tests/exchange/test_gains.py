@@ -23,7 +23,7 @@ from gyrobench.system.binding import Bound
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.system import Slot, System, load_system
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 VENDOR = {"gyro": FOREIGN / "vendor_gyro.toml"}
 LAG = Socket("Lag", "a lag", (inp("u", "1", "in", whole=False), out("y", "1", "out")))
@@ -46,8 +46,8 @@ class Pair(System):
 
 
 @pytest.fixture
-def parts(make: Make) -> dict[str, Path]:
-    return {n: make("lag") for n in "ab"}
+def parts(foreign: Foreign) -> dict[str, Path]:
+    return {n: foreign("lag") for n in "ab"}
 
 
 @pytest.fixture
@@ -137,10 +137,10 @@ def test_the_gain_is_an_fmu_as_all(archive: Path, tmp_path: Path) -> None:
     assert (description.defaultExperiment.stepSize, description.defaultExperiment.stopTime) == ("0.02", "1.0")
 
 
-def test_a_mapped_gyro_in_other_tools(small: System, make: Make, tmp_path: Path) -> None:
+def test_a_mapped_gyro_in_other_tools(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """Units and signs of a mapping file: the container's windows are those of the bench bit for bit, outputs in SI."""
     pytest.importorskip("fmu_manipulation_toolbox")
-    parts, values = {"gyro": make("vendor_gyro")}, {"dwell": 0.2, "turns": 0.01, "table.index_rate": 2.0}
+    parts, values = {"gyro": foreign("vendor_gyro")}, {"dwell": 0.2, "turns": 0.01, "table.index_rate": 2.0}
     notes = export_ssp(small, tmp_path / "v.ssp", parts, VENDOR, values)
     assert notes == ["table.alpha -> gyro.alpha: gyro has no 'alpha' (optional); not connected"]
     with zipfile.ZipFile(tmp_path / "v.ssp") as z:

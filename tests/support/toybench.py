@@ -9,7 +9,7 @@ from gyrobench.bench import Bench, standard_folder
 PARTS = sorted(Bench(standard_folder()).parts())
 TARGETS = ("native", "python")
 FORMS = ("native", "python", "native-fmi3")
-TOYS = Path(__file__).parent / "toys"
+TOYS = Path(__file__).parents[1] / "packaging" / "toys"
 
 HEAD = """\
 from __future__ import annotations

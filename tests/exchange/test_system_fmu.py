@@ -172,7 +172,7 @@ def test_what_is_wrong_is_refused(small: System, write: Write, capfd: pytest.Cap
         assert f"one: a step from t = {when:g} s, but the last one ended at 0.001 s" in capfd.readouterr().out
 
 
-def test_what_cannot_be_exposed(small: System, tmp_path: Path, make: Callable[[str], Path]) -> None:
+def test_what_cannot_be_exposed(small: System, tmp_path: Path, foreign: Callable[[str], Path]) -> None:
     for name, why in {
         "gyro.omega": r"--expose gyro.omega\[1\]: this input is wired: table.omega -> gyro.omega",
         "gyro.float_angle": "it is internal; parameters, inputs and outputs can be exposed",
@@ -184,7 +184,7 @@ def test_what_cannot_be_exposed(small: System, tmp_path: Path, make: Callable[[s
             export_fmu(small, tmp_path / "x.fmu", expose=[name])
     with pytest.raises(ExportError, match="latitude: the option does more than set values of parts, so it is built in"):
         export_fmu(load_system("tumble_single_axis"), tmp_path / "x.fmu", expose=["latitude"])
-    setup: dict[str, Any] = {"parts": {"gyro": make("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
+    setup: dict[str, Any] = {"parts": {"gyro": foreign("vendor_gyro")}, "maps": {"gyro": FOREIGN / "vendor_gyro.toml"}}
     with pytest.raises(ExportError, match="gyro: not a native part of this bench; one library"):
         export_fmu(small, tmp_path / "x.fmu", **setup)
     assert not list(tmp_path.glob("*.fmu"))
