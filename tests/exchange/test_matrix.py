@@ -44,7 +44,7 @@ def own(system: System) -> dict[str, Any]:
 
 
 def test_a_container_gives_the_record_bit_for_bit(system: System, own: dict[str, Any], tmp_path: Path) -> None:
-    """So does the one FMU: tests/system/test_system_fmu.py."""
+    """So does the one FMU: tests/exchange/test_system_fmu.py."""
     needs("fmu_manipulation_toolbox")
     export_container(system, tmp_path / "one.fmu")
     record, _ = record_in("FMU in FMPy", tmp_path / "one.fmu", system, own["record"])

@@ -29,7 +29,7 @@ from gyrobench.notebook import MissingPackageError
 if TYPE_CHECKING:
     from distributed import Client
 
-    from gyrobench.campaign.execution.worker import Chunk, Done
+    from gyrobench.campaign.execution.worker import Chunk, ChunkResult
 
 SECONDS = 1.0  # of work in a chunk
 WRITE = 2.0  # s between two writes
@@ -152,19 +152,19 @@ class _Execution:
         self, plan: Plan, store: CampaignStore, client: Client, stored: int,
         progress: Callable[[CampaignProgress], None] | None,
     ) -> None:  # fmt: skip
-        from gyrobench.campaign.execution.worker import Order, Supply
+        from gyrobench.campaign.execution.worker import BundlePlugin, ExecutionSettings
 
         d = plan.definition
         self.plan, self.store, self.client, self.progress = plan, store, client, progress
         self.stored, self.start, self.looked, self.written = stored, time.monotonic(), 0.0, time.monotonic()
         self.name = uuid.uuid4().hex[:12]
         self.own = has_own_processes(client)
-        order = Order(
+        settings = ExecutionSettings(
             self.name, tool_digest(), d.system, tuple(plan.setups), plan.spec, d.step, d.check_step, d.keep,
             d.time_limit, d.memory_limit, self.own,
         )  # fmt: skip
         _add_engine(plan)
-        self.supply = Supply(order, plan.bundle.packed())
+        self.plugin = BundlePlugin(settings, plan.bundle.packed())
         self.waiting: deque[PlannedRun] = deque()
         self.alone: deque[PlannedRun] = deque()  # that have ended a worker
         self.lost: list[tuple[Chunk, str, float]] = []  # whose worker vanished: its machine, when
@@ -185,7 +185,7 @@ class _Execution:
 
     def run(self, runs: Iterable[PlannedRun]) -> None:
         """Execute runs and store their rows."""
-        self.client.register_plugin(self.supply)
+        self.client.register_plugin(self.plugin)
         self.waiting.extend(sorted(runs, key=lambda r: (r.setup, r.index)))
         try:
             self._look()
@@ -206,7 +206,7 @@ class _Execution:
                     future.release()
                 self.flying.clear()
                 with contextlib.suppress(Exception):  # the scheduler may be gone
-                    self.client.unregister_worker_plugin(self.supply.name)
+                    self.client.unregister_worker_plugin(self.plugin.name)
 
     def keep_extremes(self) -> list[str]:
         """Run again, with record and report, the runs with the smallest and largest estimate of each coefficient."""
@@ -288,15 +288,15 @@ class _Execution:
 
     def _inquire(self) -> None:
         """Ask the workers which runs have ended a worker; what was only beside them waits again."""
-        from gyrobench.campaign.execution.worker import find_casualties
+        from gyrobench.campaign.execution.worker import find_lost_runs
 
-        answers = self.client.run(find_casualties, self.name, on_error="ignore") if self.own else {}
+        answers = self.client.run(find_lost_runs, self.name, on_error="ignore") if self.own else {}
         tries_allowed = self.plan.definition.retries + 1
-        for casualty in [c for found in answers.values() for c in found or ()]:
-            tries = self.tries.setdefault(casualty.run, [])
-            tries.append(f"{casualty.reason} {casualty.detail}".strip())
+        for lost in [c for found in answers.values() for c in found or ()]:
+            tries = self.tries.setdefault(lost.run, [])
+            tries.append(f"{lost.reason} {lost.detail}".strip())
             if len(tries) >= tries_allowed:
-                self.spent[casualty.run] = casualty.state, f"{casualty.reason}{_times(tries_allowed)}"
+                self.spent[lost.run] = lost.state, f"{lost.reason}{_times(tries_allowed)}"
         machines = {_machine(address) for address in answers}
         late = time.monotonic() - PATIENCE
         for entry in [e for e in self.lost if e[1] in machines or e[2] < late]:
@@ -311,7 +311,7 @@ class _Execution:
                 elif run.run not in self.final:
                     (self.alone if run.run in self.tries else self.waiting).appendleft(run)
 
-    def _take(self, chunk: Chunk, done: Done) -> None:
+    def _take(self, chunk: Chunk, done: ChunkResult) -> None:
         """Take rows."""
         for kept, files in done.kept.items():
             self.store.keep(kept, files)

@@ -28,7 +28,7 @@ CALLS = 8  # shown of where a signal came
 
 
 @dataclass(frozen=True)
-class Casualty:
+class LostRun:
     """A run whose process ended: state crashed, hung or memory, the same reason each time, and what is known more."""
 
     run: str
@@ -113,7 +113,7 @@ def _born(process: Any) -> str:
     return str(round(100.0 * process.create_time()))
 
 
-def casualties(folder: Path) -> list[Casualty]:
+def lost_runs(folder: Path) -> list[LostRun]:
     """Return what ended processes of this machine that are gone, each once."""
     import psutil
 
@@ -134,16 +134,16 @@ def casualties(folder: Path) -> list[Casualty]:
         with contextlib.suppress(ValueError, OSError):
             content = json.loads(text) if text else {}
             if content.get("run"):
-                found.append(_casualty(content, trace.read_text(errors="replace") if trace.exists() else ""))
+                found.append(_lost_run(content, trace.read_text(errors="replace") if trace.exists() else ""))
         for old in (taken, trace):
             old.unlink(missing_ok=True)
     return found
 
 
-def _casualty(content: dict[str, str], trace: str) -> Casualty:
+def _lost_run(content: dict[str, str], trace: str) -> LostRun:
     if "state" in content:
-        return Casualty(content["run"], content["state"], content["reason"], content.get("detail", ""))
+        return LostRun(content["run"], content["state"], content["reason"], content.get("detail", ""))
     fault = trace.partition("\n")[0].removeprefix("Fatal Python error: ").strip()
     cause = f": {fault}" if fault else ", without a signal from inside"
     calls = trace.partition("Current thread")[2].partition("\n\n")[0].splitlines()[1 : 1 + CALLS]
-    return Casualty(content["run"], "crashed", f"ended its worker process{cause}", "\n".join(calls))
+    return LostRun(content["run"], "crashed", f"ended its worker process{cause}", "\n".join(calls))

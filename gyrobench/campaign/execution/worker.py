@@ -23,7 +23,7 @@ from distributed import Worker, WorkerPlugin
 
 from gyrobench.campaign.execution.bundle import Assigned, tool_digest, unpack
 from gyrobench.campaign.execution.campaign_plan import MEASURED, PlannedRun
-from gyrobench.campaign.execution.guard import Casualty, Guard, casualties
+from gyrobench.campaign.execution.guard import Guard, LostRun, lost_runs
 from gyrobench.campaign.execution.rows import result_columns
 from gyrobench.engine import engine_library
 from gyrobench.engine.session import RunError, Session
@@ -57,7 +57,7 @@ class PartialSuiteError(RunError):
 
 
 @dataclass(frozen=True)
-class Order:
+class ExecutionSettings:
     """All that the runs of a campaign have in common.
 
     campaign: name of this execution.  setups: as in the plan.  marks: a worker is a process that may be ended.
@@ -82,11 +82,11 @@ class Chunk:
 
     runs: list[PlannedRun]
     content: Mapping[str, bytes] = field(default_factory=dict)
-    keep: str | None = None  # instead of the order's
+    keep: str | None = None  # instead of that of the settings
 
 
 @dataclass
-class Done:
+class ChunkResult:
     """What a chunk gives: rows, units of columns, log and kept files."""
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -96,40 +96,40 @@ class Done:
 
 
 _busy = threading.Lock()
-_desks: dict[str, _Desk] = {}  # by campaign; one at a time
+_states: dict[str, _WorkerState] = {}  # by campaign; one at a time
 
 
-class Supply(WorkerPlugin):
+class BundlePlugin(WorkerPlugin):
     """Brings the bundle to every worker, those that join or restart later too."""
 
-    def __init__(self, order: Order, bundle: bytes) -> None:
-        self.name = f"gyrobench-{order.campaign}"
-        self.order, self.bundle = order, bundle
+    def __init__(self, settings: ExecutionSettings, bundle: bytes) -> None:
+        self.name = f"gyrobench-{settings.campaign}"
+        self.settings, self.bundle = settings, bundle
 
     def setup(self, worker: Worker) -> None:
         """Keep the bundle for the chunks of this campaign."""
         limit = getattr(worker.memory_manager, "memory_limit", None)
-        folder = marks_folder(self.order.campaign, worker)
-        if self.order.campaign not in _desks:
-            _desks[self.order.campaign] = _Desk(self.order, self.bundle, folder, worker.address, limit)
+        folder = marks_folder(self.settings.campaign, worker)
+        if self.settings.campaign not in _states:
+            _states[self.settings.campaign] = _WorkerState(self.settings, self.bundle, folder, worker.address, limit)
 
     def teardown(self, worker: Worker) -> None:
         """Free what this campaign has loaded."""
-        desk = _desks.pop(self.order.campaign, None)
-        if desk is not None:
+        state = _states.pop(self.settings.campaign, None)
+        if state is not None:
             with _busy:
-                desk.close()
+                state.close()
 
 
-def run_chunk(campaign: str, chunk: Chunk) -> Done:
+def run_chunk(campaign: str, chunk: Chunk) -> ChunkResult:
     """Run a chunk in this process."""
     with _busy:
-        return _desks[campaign].run(chunk)
+        return _states[campaign].run(chunk)
 
 
-def find_casualties(campaign: str, dask_worker: Worker) -> list[Casualty]:
+def find_lost_runs(campaign: str, dask_worker: Worker) -> list[LostRun]:
     """Return which runs have ended processes on the machine of a worker; called beside what it works on."""
-    return casualties(marks_folder(campaign, dask_worker))
+    return lost_runs(marks_folder(campaign, dask_worker))
 
 
 def marks_folder(campaign: str, worker: Worker) -> Path:
@@ -137,11 +137,11 @@ def marks_folder(campaign: str, worker: Worker) -> Path:
     return Path(worker.local_directory).parent / f"gyrobench-{campaign}"
 
 
-class _Desk:
+class _WorkerState:
     """Where a process works for a campaign: the unpacked bundle, loaded sessions, the guard."""
 
-    def __init__(self, order: Order, bundle: bytes, folder: Path, name: str, memory: int | None) -> None:
-        self.order, self.bundle, self.folder, self.name, self.memory = order, bundle, folder, name, memory
+    def __init__(self, settings: ExecutionSettings, bundle: bytes, folder: Path, name: str, memory: int | None) -> None:
+        self.settings, self.bundle, self.folder, self.name, self.memory = settings, bundle, folder, name, memory
         self.sessions: OrderedDict[tuple[int, str], Session] = OrderedDict()
         self.opened = False
         self.guard: Guard | None = None
@@ -150,7 +150,7 @@ class _Desk:
         """Prepare this process, at the first chunk."""
         if self.opened:
             return
-        if self.order.tool != tool_digest():
+        if self.settings.tool != tool_digest():
             raise MachineError(
                 f"worker {self.name}: its gyrobench differs from the one that sent the run; install the same everywhere"
             )
@@ -158,13 +158,13 @@ class _Desk:
         if (self.root / "engine").is_dir() and compiler.command(compiler.this_platform()) is None:
             engine_library.provide(next((self.root / "engine").iterdir()))
         self.bench = self.root / "bench"
-        self.test: System | Suite = load_test(self.order.system, self.bench)
-        self.limits = load_limits(self.root / self.order.spec) if self.order.spec else None
-        if self.order.ends:
+        self.test: System | Suite = load_test(self.settings.system, self.bench)
+        self.limits = load_limits(self.root / self.settings.spec) if self.settings.spec else None
+        if self.settings.ends:
             logging.getLogger("gyrobench").setLevel(logging.ERROR)  # warnings are in the rows
-            given = self.order.memory_limit
+            given = self.settings.memory_limit
             limit = given or (int(0.9 * self.memory) if self.memory else None)
-            self.guard = Guard(self.folder, self.order.time_limit, limit, bool(given))
+            self.guard = Guard(self.folder, self.settings.time_limit, limit, bool(given))
         self.opened = True
 
     def close(self) -> None:
@@ -175,22 +175,22 @@ class _Desk:
         if self.guard:
             self.guard.close()
 
-    def run(self, chunk: Chunk) -> Done:
+    def run(self, chunk: Chunk) -> ChunkResult:
         """Return the rows of a chunk."""
         try:
             self._open()
         except OSError as error:
             raise MachineError(f"worker {self.name}: {error.strerror or error}") from None
-        done = Done()
+        done = ChunkResult()
         for run in chunk.runs:
             with self.guard.watching(run.run) if self.guard else contextlib.nullcontext():
                 self._row(run, chunk, done)
         return done
 
     # ------------------------------------------------------------------------------------------ one run
-    def _row(self, run: PlannedRun, chunk: Chunk, done: Done) -> None:
+    def _row(self, run: PlannedRun, chunk: Chunk, done: ChunkResult) -> None:
         start = time.perf_counter()
-        row: dict[str, Any] = run.columns(self.order.system)
+        row: dict[str, Any] = run.columns(self.settings.system)
         record: Record | None = None
         result: Result | None = None
         tests: Mapping[str, Result] = {}
@@ -214,7 +214,7 @@ class _Desk:
             done.units |= units
         if record is not None and record.run.measured:
             row |= {"instrument": record.run.instrument or None, "date": record.run.date or None}
-        if self._keeps(row, chunk.keep or self.order.keep):
+        if self._keeps(row, chunk.keep or self.settings.keep):
             try:
                 done.kept[run.run] = self._files(record, result)
             except Exception as error:
@@ -237,9 +237,9 @@ class _Desk:
         if run.setup == MEASURED:
             return *self._reduce(run, chunk), {}
         assert run.seed is not None
-        spec = self.root / self.order.spec if self.order.spec else None
+        spec = self.root / self.settings.spec if self.settings.spec else None
         request = RunRequest(
-            seed=run.seed, step=self.order.step, spec=spec, check_step=self.order.check_step, in_memory=True
+            seed=run.seed, step=self.settings.step, spec=spec, check_step=self.settings.check_step, in_memory=True
         )
         if isinstance(self.test, Suite):
             return None, *self._suite(run, request)
@@ -255,7 +255,7 @@ class _Desk:
         key = (setup, member)
         if key not in self.sessions:
             system.refuse()
-            assigned = self.order.setups[setup][member]
+            assigned = self.settings.setups[setup][member]
             root = self.root
             parts = {s: str(root / p) if p.endswith(".fmu") else p for s, p in assigned.parts.items()}
             self.sessions[key] = Session(
@@ -280,7 +280,7 @@ class _Desk:
     def _reduce(self, run: PlannedRun, chunk: Chunk) -> tuple[Record, Result | None]:
         assert isinstance(self.test, System) and run.data is not None
         values = {name: str(value) for name, value in run.values.items()}
-        spec = self.root / self.order.spec if self.order.spec else None
+        spec = self.root / self.settings.spec if self.settings.spec else None
         file = Path(run.data)
         sent = run.data in chunk.content
         if sent:
@@ -323,7 +323,7 @@ class _Desk:
             problem = "; ".join(f"{n}: {reason}" for n, reason in failed.items())
             if not document.tests:
                 raise RunError(problem)
-            spec = self.root / self.order.spec if self.order.spec else None
+            spec = self.root / self.settings.spec if self.settings.spec else None
             said = write_suite_report(suite, folder, document, spec, ("json",)).result
             if failed:
                 raise PartialSuiteError(problem, said, results)
