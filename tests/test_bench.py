@@ -307,6 +307,33 @@ def test_no_two_modules_of_one_name() -> None:
     assert len(set(names)) == len(names), sorted({n for n in names if names.count(n) > 1})
 
 
+#: public classes of gyrobench/reduction and systems whose name another class has; one that is renamed leaves the list
+NAMED_TWICE = set(
+    """
+    Axis Block Candidate Choice Estimate Estimates Expected Fit GaussMarkov Line Linear LinearModel Loop Model
+    NorthFinder Piece Place Plan PlatformFourGimbal PlatformThreeAxis Quantization Response Run Setup Site State
+    TumbleSetup Windows
+    """.split()
+)
+
+
+def test_no_two_public_classes_of_one_name() -> None:
+    places: dict[str, list[str]] = {}
+    bench = standard_folder()
+    for top in (TOOL, bench / "components", bench / "systems"):
+        for file in sorted(f for f in top.rglob("*.py") if "_bench" not in f.parts):
+            for node in tree(file).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    places.setdefault(node.name, []).append(f"{top.name}/{file.relative_to(top)}")
+    assert len(places) > 500, "the classes are read"
+    twice = {name: files for name, files in places.items() if len(files) > 1}
+    new = {name: files for name, files in twice.items() if name not in NAMED_TWICE}
+    assert not new, f"two classes of one name: {new}"
+    assert NAMED_TWICE == set(twice), f"no longer named twice: {NAMED_TWICE - set(twice)}"
+    for name, files in twice.items():
+        assert any(f.startswith(("gyrobench/reduction/", "systems/")) for f in files), f"{name}: {files}"
+
+
 def test_the_tool_names_no_content() -> None:
     """gyrobench works on any bench: no part, system or specification is named in its code."""
     bench = Bench(standard_folder())

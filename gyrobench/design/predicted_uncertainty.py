@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import DataNoise
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise import mean_variance
@@ -91,6 +91,6 @@ def _again(fit: Findings, y: Array, J: Array) -> tuple[Array, Array]:
     return np.minimum(sd, half / NORMAL), full @ est.gain
 
 
-def effective(noise: Noise, window: float) -> float:
+def effective(noise: DataNoise, window: float) -> float:
     """Return the density that white noise would have with the variance of this noise over a window (s)."""
     return math.sqrt(noise.white**2 + window * noise.markov**2 * float(mean_variance(np.array(window / noise.tau))))

@@ -122,7 +122,7 @@ def _here() -> str:
 
 
 def _settle(files: RunFiles, parent: int) -> None:
-    """Become a process that shares nothing with the parent but the board and the files of the run, and that ends with it."""
+    """Become a process that shares with the parent only the board and the files of the run, and ends with it."""
     gc.freeze()  # nothing of the parent's is finalized here
     if faulthandler.is_enabled():
         faulthandler.disable()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from gyrobench.campaign.execution.campaign_execution import CampaignProgress
     from gyrobench.campaign.execution.definition import Definition
-    from gyrobench.campaign.site.site_folder import Site
+    from gyrobench.campaign.site.site_folder import CampaignSite
 
 
 def campaign(
@@ -68,7 +68,7 @@ def sweep(
     return _executed(asked, out, client, scheduler, workers, False, progress)
 
 
-def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> Site:
+def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> CampaignSite:
     """Write the site of a stored campaign; ``.index`` is its page, ``.answer`` the sentences with which it opens.
 
     campaign: folder or URL, the ``out`` of :func:`campaign` or :func:`sweep`.  out: folder of the site, default

@@ -12,7 +12,7 @@ Span = tuple[int, int]  # a slice: first element, number of elements
 
 
 @dataclass(frozen=True)
-class Value:
+class CExpression:
     """An expression: its shape and the C text of each of its elements.
 
     plain: reading an element again computes nothing.  aligned: element [i] is made of elements [i] of what it reads.
@@ -32,7 +32,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Place:
+class CVariable:
     """A variable, or a piece of one: its C text without the owner, what it is, and how far it is indexed."""
 
     base: str
@@ -59,14 +59,14 @@ class Place:
             text += f"[{t}]" if isinstance(t, str) else f"[{_shifted(next(remaining), t[0])}]"
         return text + "".join(f"[{i}]" for i in remaining)
 
-    def indexed(self, index: str | Span) -> Place:
+    def indexed(self, index: str | Span) -> CVariable:
         """Return the piece at an index, or a slice, of the first dimension that is left."""
         taken: list[str | Span] = list(self.taken)
         for k, t in enumerate(taken):
             if not isinstance(t, str):
                 taken[k] = _shifted(index, t[0]) if isinstance(index, str) else (t[0] + index[0], index[1])
-                return Place(self.base, self.kind, self.name, self.dims, tuple(taken))
-        return Place(self.base, self.kind, self.name, self.dims, (*self.taken, index))
+                return CVariable(self.base, self.kind, self.name, self.dims, tuple(taken))
+        return CVariable(self.base, self.kind, self.name, self.dims, (*self.taken, index))
 
 
 def _shifted(index: str, by: int) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from gyrobench.bench import UsageError
 from gyrobench.campaign.execution.axes import Axis, Distribution, draw, parse_axis
-from gyrobench.campaign.execution.campaign_plan import Plan, make_plan
+from gyrobench.campaign.execution.campaign_plan import CampaignPlan, make_plan
 from gyrobench.campaign.execution.definition import from_mapping, read_definition
 
 BENCH = Path(__file__).with_name("bench")
@@ -22,7 +22,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(BENCH)
 
 
-def plan(**asked: Any) -> Plan:
+def plan(**asked: Any) -> CampaignPlan:
     return make_plan(from_mapping({"system": "weighing", **asked}))
 
 

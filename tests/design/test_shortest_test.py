@@ -22,7 +22,7 @@ from gyrobench.design.plan_search import Search, Want, finish, rounded
 from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.design.shortest_test import design_test, protocol_of
 from gyrobench.design.suite_design import cheapest_cover, design_suite
-from gyrobench.design.visit_protocol import Channel, Noise, VisitProtocol
+from gyrobench.design.visit_protocol import Channel, DataNoise, VisitProtocol
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.suite import Suite, load_test
@@ -149,7 +149,7 @@ def test_the_prediction_is_what_drawn_data_give() -> None:
 
     t0 = np.arange(30) * 100.0
     X = np.column_stack([np.ones(30), np.cos(t0 / 500.0)])
-    noise = Noise(3.0, 0.4, 150.0)
+    noise = DataNoise(3.0, 0.4, 150.0)
     L = np.linalg.cholesky(noise.covariance(t0, t0 + 60.0))
     rng = np.random.default_rng(3)
 
@@ -167,7 +167,7 @@ def test_the_prediction_is_what_drawn_data_give() -> None:
     assert p.least == pytest.approx(np.sqrt(np.diag(np.linalg.inv(X.T @ np.linalg.inv(V) @ X))), rel=1e-9)
 
 
-def protocol(noise: Noise, settle: float) -> VisitProtocol:
+def protocol(noise: DataNoise, settle: float) -> VisitProtocol:
     """A bias and a scale factor, read at -1 and at 1."""
     X = np.array([[1.0, -1.0], [1.0, 1.0]])
     channel = Channel(("b", "k"), X, np.eye(2), noise)
@@ -176,11 +176,11 @@ def protocol(noise: Noise, settle: float) -> VisitProtocol:
 
 def test_time_to_a_wanted_uncertainty_by_hand() -> None:
     """Variance of k from two visits of T: N^2/(2 T): u = 0.1 of N = 1 takes T = 50 s twice, and the settling."""
-    search = Search(protocol(Noise(1.0), 3.0), (Want(0, 1, 0.1),), ((Noise(1.0),),))
+    search = Search(protocol(DataNoise(1.0), 3.0), (Want(0, 1, 0.1),), ((DataNoise(1.0),),))
     plan = finish(search, [0, 1], np.ones(2), None)
     assert plan.dwell == pytest.approx(50.0, rel=1e-3)
     assert plan.duration == pytest.approx(106.0, abs=0.2)
-    assert plan_search.shortest_time(search, (Noise(1.0),))[0] == pytest.approx(103.0, rel=1e-3)
+    assert plan_search.shortest_time(search, (DataNoise(1.0),))[0] == pytest.approx(103.0, rel=1e-3)
 
 
 def test_the_dwell_is_that_of_the_run_where_u_falls_faster_than_the_noise() -> None:
@@ -196,8 +196,8 @@ def test_the_dwell_is_that_of_the_run_where_u_falls_faster_than_the_noise() -> N
             u = least * (200.0 / values["dwell"]) ** 1.2
             return Trial({"k": Stated(u, least, least, 0.0, "1", 1.0)}, 2.0 * values["dwell"], ())
 
-    one = replace(protocol(Noise(1.0), 3.0), options=lambda visits: {"dwell": visits[0][1]})
-    search = Search(one, (Want(0, 1, 0.1),), ((Noise(1.0),),))
+    one = replace(protocol(DataNoise(1.0), 3.0), options=lambda visits: {"dwell": visits[0][1]})
+    search = Search(one, (Want(0, 1, 0.1),), ((DataNoise(1.0),),))
     start = finish(search, [0, 1], np.ones(2), None)
     cost, plan, trial, _ = shortest_test._settled(Bench(), search, {"k": Want(0, 1, 0.1)}, start, None, 1)  # type: ignore[arg-type]
     assert plan.dwell == pytest.approx((200.0**1.2 / (0.1 * 2.0**0.5)) ** (1 / 1.7), rel=0.01)
@@ -209,7 +209,7 @@ def test_slow_drift_is_beaten_by_more_visits_and_not_by_longer_ones() -> None:
     """Two visits of T: variance about sigma^2 tau/T = 0.04 at T = 2500 s.  Twenty short ones, 31 s apart: differences
     of neighbours have 1 - exp(-0.31) of the variance, a tenth of half of which is 0.013.
     """
-    search = Search(protocol(noise := Noise(0.1, 1.0, 100.0), 30.0), (Want(0, 1, 0.2),), ((noise,),))
+    search = Search(protocol(noise := DataNoise(0.1, 1.0, 100.0), 30.0), (Want(0, 1, 0.2),), ((noise,),))
     two, many = (finish(search, [0, 1] * n, np.ones(2 * n), None) for n in (1, 10))
     assert two.duration == pytest.approx(5000.0, rel=0.1) and many.duration < 650.0
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.analysis.measures import Json, Measures, numbers, quantities
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, numbers, quantities
 from gyrobench.reduction.suite.ranking import LEVEL, adjusted
 
 Codes = NDArray[np.intp]
@@ -58,7 +58,7 @@ def response(y: Array, codes: Codes, count: int, own: tuple[Array, Array] | None
     return out
 
 
-def responses(measures: Measures) -> list[Json]:
+def responses(measures: CampaignMeasures) -> list[Json]:
     """Return the response of every quantity of every measure to every axis.
 
     Means are adjusted for the main effects of the other axes (additive model, least squares), so that neither they nor
@@ -122,7 +122,7 @@ def crossed_seeds(rows: Any, columns: list[str]) -> Codes | None:
     return codes
 
 
-def main_effects(measures: Measures) -> list[Json]:
+def main_effects(measures: CampaignMeasures) -> list[Json]:
     """Return for each quantity and axis the span of the adjusted means, the share of the variance, and p of no effect.
 
     Additive model of all axes by least squares; the partial F test of an axis compares it with the model without it,

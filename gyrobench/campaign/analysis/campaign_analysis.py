@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench.campaign.analysis.axis_effects import main_effects, responses
 from gyrobench.campaign.analysis.coverage_counts import coverage
 from gyrobench.campaign.analysis.lots import analyse_lot
-from gyrobench.campaign.analysis.measures import Json, Measures, numbers
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, numbers
 from gyrobench.campaign.analysis.sobol_indices import sobol_indices
 from gyrobench.report.numbers import write_number
 
@@ -27,7 +27,7 @@ PERCENTILES = {"min": 0.0, "q025": 2.5, "median": 50.0, "q975": 97.5, "max": 100
 def analyse(campaign: Campaign) -> Json:
     """Return the analysis of a stored campaign: states, distributions, coverage, responses, indices, lot, failures."""
     rows = campaign.table()
-    measures = Measures.of(rows, campaign.units, campaign.axes)
+    measures = CampaignMeasures.of(rows, campaign.units, campaign.axes)
     definition = campaign.definition
     doc: Json = {
         "schema": SCHEMA,
@@ -64,7 +64,7 @@ def _axis(axis: Mapping[str, Any], rows: Any) -> Json:
     return {"name": axis["name"], "kind": axis["kind"], "unit": axis.get("unit") or "", "values": varied}
 
 
-def _distribution(measures: Measures, name: str) -> Json:
+def _distribution(measures: CampaignMeasures, name: str) -> Json:
     x = numbers(measures.done, f"{name}.estimate")
     u = numbers(measures.done, f"{name}.u")
     x, u = x[np.isfinite(x)], u[np.isfinite(u)]

@@ -26,8 +26,8 @@ from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
 from gyrobench.campaign.analysis.measures import (
     SEED_KINDS,
+    CampaignMeasures,
     Json,
-    Measures,
     error,
     normalized_error,
     numbers,
@@ -44,7 +44,7 @@ MOST = 4  # names in a sentence
 
 
 @dataclass(frozen=True)
-class Test:
+class DifferenceTest:
     """a, b: values of the two campaigns.  change: b - a, or b / a of u, with its 95 % interval (None: not known)."""
 
     a: float
@@ -57,7 +57,7 @@ class Test:
 
 def compare_campaigns(a: Campaign, b: Campaign) -> Json:
     """Return the comparison of two campaigns, the first the baseline.  Raises UsageError where no measure is common."""
-    both = [Measures.of(c.table(), c.units, c.axes) for c in (a, b)]
+    both = [CampaignMeasures.of(c.table(), c.units, c.axes) for c in (a, b)]
     common = [n for n in both[0].names if n in both[1].names and both[0].unit(n) == both[1].unit(n)]
     if not common:
         raise UsageError(f"{a.url} and {b.url} have no measure of one name and unit in common: nothing to compare")
@@ -90,7 +90,7 @@ def compare_campaigns(a: Campaign, b: Campaign) -> Json:
 Pairs = tuple[Sequence[int], Sequence[int]] | None
 
 
-def _pairs(a: Measures, b: Measures) -> Pairs:
+def _pairs(a: CampaignMeasures, b: CampaignMeasures) -> Pairs:
     """Return the places of the runs that belong together, None where a setting does not name one run in each."""
     axes = [n for n in (x["name"] for x in a.axes if x["kind"] not in (*SEED_KINDS, "data"))]
     columns = [f"in.{n}" for n in axes if f"in.{n}" in a.rows and f"in.{n}" in b.rows]
@@ -105,7 +105,7 @@ def _pairs(a: Measures, b: Measures) -> Pairs:
     return ([keys[0][k] for k in shared], [keys[1][k] for k in shared]) if len(shared) >= MIN_RUNS else None
 
 
-def _identical(names: Sequence[str], both: Sequence[Measures], pairs: Pairs) -> int:
+def _identical(names: Sequence[str], both: Sequence[CampaignMeasures], pairs: Pairs) -> int:
     """Return how many pairs have the same numbers, to the last bit, and the same state."""
     if not pairs:
         return 0
@@ -140,7 +140,7 @@ class Sides:
     clusters: tuple[Any, Any]
 
     @classmethod
-    def of(cls, both: Sequence[Measures], pairs: Pairs) -> Sides:
+    def of(cls, both: Sequence[CampaignMeasures], pairs: Pairs) -> Sides:
         rows = [m.rows.iloc[list(at)] for m, at in zip(both, pairs, strict=True)] if pairs else [m.rows for m in both]
         return cls(pairs, (shared_seeds(rows[0]), shared_seeds(rows[1])))
 
@@ -162,11 +162,11 @@ def _means_of(values: Array, clusters: Any) -> Array:
     return np.asarray((np.bincount(clusters, values) / np.maximum(size, 1))[size > 0])
 
 
-def _of_measure(name: str, both: Sequence[Measures], sides: Sides) -> list[Json]:
+def _of_measure(name: str, both: Sequence[CampaignMeasures], sides: Sides) -> list[Json]:
     rows = [m.rows for m in both]
     known = all(np.isfinite(error(r, name)).any() for r in rows)
     values = [error(r, name) if known else numbers(r, f"{name}.estimate") for r in rows]
-    found: dict[str, Test | None] = {
+    found: dict[str, DifferenceTest | None] = {
         "error" if known else "estimate": _means(values, sides),
         "spread": _spreads(values, sides),
         "u": _ratios([numbers(r, f"{name}.u") for r in rows], sides),
@@ -183,7 +183,7 @@ def _of_measure(name: str, both: Sequence[Measures], sides: Sides) -> list[Json]
     ]
 
 
-def _of_runs(both: Sequence[Measures], sides: Sides) -> list[Json]:
+def _of_runs(both: Sequence[CampaignMeasures], sides: Sides) -> list[Json]:
     """Return the tests of what runs have as a whole: a result, the verdict pass."""
     rows = [m.rows for m in both]
     verdicts = [np.where(r["verdict"].notna(), r["verdict"] == "pass", np.nan).astype(float) for r in rows]
@@ -212,24 +212,24 @@ def _difference(x: Array, y: Array, paired: bool) -> tuple[float, float | None, 
     return change, change - half, change + half, 2.0 * float(stats.t.sf(abs(change) / u, freedom))
 
 
-def _means(values: Sequence[Array], sides: Sides) -> Test | None:
+def _means(values: Sequence[Array], sides: Sides) -> DifferenceTest | None:
     chosen = sides.choose(values)
     if chosen is None:
         return None
     x, y = chosen
-    return Test(float(x.mean()), float(y.mean()), *_difference(x, y, sides.at is not None))
+    return DifferenceTest(float(x.mean()), float(y.mean()), *_difference(x, y, sides.at is not None))
 
 
-def _spreads(values: Sequence[Array], sides: Sides) -> Test | None:
+def _spreads(values: Sequence[Array], sides: Sides) -> DifferenceTest | None:
     chosen = sides.choose([np.abs(v - np.nanmedian(v)) for v in values])
     if chosen is None:
         return None
     a, b = (float(np.nanstd(v, ddof=1)) for v in values)
     *_, p = _difference(*chosen, sides.at is not None)
-    return Test(a, b, b - a, None, None, p)
+    return DifferenceTest(a, b, b - a, None, None, p)
 
 
-def _ratios(values: Sequence[Array], sides: Sides) -> Test | None:
+def _ratios(values: Sequence[Array], sides: Sides) -> DifferenceTest | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         chosen = sides.choose([np.where(v > 0.0, np.log(v), np.nan) for v in values])
     if chosen is None:
@@ -237,10 +237,10 @@ def _ratios(values: Sequence[Array], sides: Sides) -> Test | None:
     x, y = chosen
     change, low, high, p = _difference(x, y, sides.at is not None)
     ends = [None if v is None else float(np.exp(v)) for v in (low, high)]
-    return Test(float(np.exp(x.mean())), float(np.exp(y.mean())), float(np.exp(change)), ends[0], ends[1], p)
+    return DifferenceTest(float(np.exp(x.mean())), float(np.exp(y.mean())), float(np.exp(change)), ends[0], ends[1], p)
 
 
-def _shares(values: Sequence[Array], sides: Sides) -> Test | None:
+def _shares(values: Sequence[Array], sides: Sides) -> DifferenceTest | None:
     """values: 1 hit, 0 miss, NaN not judged."""
     chosen = sides.choose(values)
     if chosen is None:
@@ -248,14 +248,14 @@ def _shares(values: Sequence[Array], sides: Sides) -> Test | None:
     x, y = chosen
     a, b = float(x.mean()), float(y.mean())
     if any(c is not None for c in sides.clusters):
-        return Test(a, b, *_difference(x, y, sides.at is not None))
+        return DifferenceTest(a, b, *_difference(x, y, sides.at is not None))
     if sides.at:
         gained, lost = int((y > x).sum()), int((x > y).sum())
         p = float(stats.binomtest(gained, gained + lost).pvalue) if gained + lost else 1.0
     else:
         counts = [[int(v.sum()), int((1.0 - v).sum())] for v in (x, y)]
         p = float(stats.fisher_exact(counts).pvalue)
-    return Test(a, b, b - a, None, None, p)
+    return DifferenceTest(a, b, b - a, None, None, p)
 
 
 # ------------------------------------------------------------------------------------------------- sentences

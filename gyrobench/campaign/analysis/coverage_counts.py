@@ -9,12 +9,12 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.campaign.analysis.intervals import clopper_pearson, effective_runs
 from gyrobench.campaign.analysis.lot_attention import DOUBTFUL
-from gyrobench.campaign.analysis.measures import Json, Measures, error, normalized_error, numbers, shared_seeds
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, normalized_error, numbers, shared_seeds
 
 NOMINAL = 0.95
 
 
-def coverage(measures: Measures) -> list[Json]:
+def coverage(measures: CampaignMeasures) -> list[Json]:
     """Return for each measure with truth how many of its 95 % intervals hold it, with Clopper-Pearson bounds.
 
     z_mean, z_rms: of (estimate - truth) / u.  ``consistent``: the bounds, at a level shared by all measures

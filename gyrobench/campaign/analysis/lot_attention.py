@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.campaign.analysis.lot_outliers import Outliers
-from gyrobench.campaign.analysis.measures import Json, Measures
+from gyrobench.campaign.analysis.lot_outliers import LotOutliers
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json
 from gyrobench.report.numbers import write_number
 from gyrobench.result import NO_VERDICT
 
@@ -61,7 +61,7 @@ def contradictions(rows: Any) -> list[list[str]]:
     return found
 
 
-def instruments(lot: Measures, against: list[list[str]], outliers: Outliers | None) -> list[Json]:
+def instruments(lot: CampaignMeasures, against: list[list[str]], outliers: LotOutliers | None) -> list[Json]:
     """Return every row of a lot: instrument, file, date, verdict, distance, and why it needs attention (or [])."""
     listed = []
     for k, (name, (_, row)) in enumerate(zip(lot.instrument(), lot.rows.iterrows(), strict=True)):
@@ -76,7 +76,7 @@ def instruments(lot: Measures, against: list[list[str]], outliers: Outliers | No
     return listed
 
 
-def _unlike(lot: Measures, score: Any) -> str:
+def _unlike(lot: CampaignMeasures, score: Any) -> str:
     """Return in which coefficient an outlier differs most."""
     worst = int(np.nanargmax(np.abs(score)))
     side = "above" if score[worst] > 0.0 else "below"

@@ -33,7 +33,7 @@ WEIGHTED = 0.975  # quantile of chi-square up to which the first distances accep
 
 
 @dataclass(frozen=True)
-class Outliers:
+class LotOutliers:
     """Robust distances of n instruments in q coefficients.
 
     joint: one distance in all used coefficients; else the largest of the coefficients one by one, for a small lot.
@@ -52,7 +52,7 @@ class Outliers:
     limit: float
 
 
-def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> Outliers | None:
+def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> LotOutliers | None:
     """Return the robust distances of the rows of ``values`` (n, q); None for fewer than eight complete rows.
 
     Coefficients that half of the rows lack are left out; rows that lack another are not judged.
@@ -82,7 +82,7 @@ def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> Outli
         limit = max(limit, float(np.sqrt(limit2)))
         kept = scaled[accepted]
         score[:, group] = (scaled - kept.mean(axis=0)) / kept.std(axis=0, ddof=1)
-    return Outliers(
+    return LotOutliers(
         joint,
         _spread(distance, complete),
         _spread(np.minimum(1.0, count * chance), complete),

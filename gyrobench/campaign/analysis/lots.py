@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.campaign.analysis.intervals import tolerance_interval
 from gyrobench.campaign.analysis.lot_attention import common_warnings, contradictions, instruments
 from gyrobench.campaign.analysis.lot_outliers import LEVEL, robust_outliers
-from gyrobench.campaign.analysis.measures import Json, Measures, numbers
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, numbers
 from gyrobench.reduction.suite.ranking import LEVEL as CHANGE_LEVEL
 from gyrobench.reduction.suite.ranking import adjusted
 
@@ -58,13 +58,13 @@ def all_dated(rows: Any) -> bool:
     return bool(done.any() and np.isfinite(seconds(rows)[done]).all())
 
 
-def analyse_lot(measures: Measures) -> Json:
+def analyse_lot(measures: CampaignMeasures) -> Json:
     """Return the analysis of a lot.
 
     Tolerance intervals are those of the accepted rows: with a result that its record does not contradict, and not named
     as outliers.
     """
-    lot = Measures.of(in_order(measures.rows), measures.units, measures.axes)
+    lot = CampaignMeasures.of(in_order(measures.rows), measures.units, measures.axes)
     rows = lot.rows
     against = contradictions(rows)
     done = (rows["state"] == "done").to_numpy(bool)
@@ -90,7 +90,7 @@ def analyse_lot(measures: Measures) -> Json:
     }
 
 
-def _tolerance(lot: Measures, name: str, values: Array, accepted: np.ndarray) -> Json:
+def _tolerance(lot: CampaignMeasures, name: str, values: Array, accepted: np.ndarray) -> Json:
     inside = values[accepted]
     found = tolerance_interval(inside)
     limits = control_limits(values)
@@ -115,7 +115,7 @@ def _tolerance(lot: Measures, name: str, values: Array, accepted: np.ndarray) ->
 
 
 # ------------------------------------------------------------------------------------------- changes between dates
-def changes_between_dates(lot: Measures, usable: np.ndarray) -> Json:
+def changes_between_dates(lot: CampaignMeasures, usable: np.ndarray) -> Json:
     """Return what changed between the dates of instruments that were measured on two dates or more.
 
     For each coefficient ``ratio`` is the standard deviation between dates of one instrument over what u explains,

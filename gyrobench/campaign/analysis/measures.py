@@ -18,7 +18,7 @@ SAMPLED_KINDS = ("lhs", "sobol", "random")
 
 
 @dataclass(frozen=True)
-class Measures:
+class CampaignMeasures:
     """Rows of a campaign (a pandas.DataFrame of the stored columns) with the names of its measures and axes.
 
     done: the rows of the runs that ended with a result.
@@ -30,7 +30,7 @@ class Measures:
     names: list[str]
 
     @classmethod
-    def of(cls, rows: Any, units: Mapping[str, str], axes: list[Json]) -> Measures:
+    def of(cls, rows: Any, units: Mapping[str, str], axes: list[Json]) -> CampaignMeasures:
         names = [c.removesuffix(".estimate") for c in rows.columns if c.endswith(".estimate")]
         return cls(rows, units, axes, [n for n in names if np.isfinite(numbers(rows, f"{n}.estimate")).any()])
 

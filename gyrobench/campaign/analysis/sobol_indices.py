@@ -20,7 +20,7 @@ from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.campaign.analysis.axis_effects import ROUNDING, Codes, crossed_seeds, levels
-from gyrobench.campaign.analysis.measures import SAMPLED_KINDS, Json, Measures, numbers, quantities
+from gyrobench.campaign.analysis.measures import SAMPLED_KINDS, CampaignMeasures, Json, numbers, quantities
 
 MIN_RUNS = 64  # of a sampled design
 DRAWS = 400  # of the noise of a factorial design, for its intervals
@@ -28,7 +28,7 @@ UNRESOLVED = 0.05  # p of no variance beyond noise
 NORMAL = 1.959963984540054
 
 
-def sobol_indices(measures: Measures) -> Json:
+def sobol_indices(measures: CampaignMeasures) -> Json:
     """Return ``word`` (how, or why not) and ``rows``: axis, name, quantity, first, total, each with lo and hi.
 
     A total is None where the design does not give it, an interval where nothing is known of the noise.
@@ -57,7 +57,7 @@ def sobol_indices(measures: Measures) -> Json:
 
 
 # ------------------------------------------------------------------------------------------------ sampled designs
-def _given_data(measures: Measures, columns: list[str]) -> Json:
+def _given_data(measures: CampaignMeasures, columns: list[str]) -> Json:
     rows = measures.done
     points = rows.groupby(columns, dropna=False, sort=False).ngroup().to_numpy()
     repeated = points.max() + 1 < len(points)
@@ -114,7 +114,7 @@ def first_order(y: Array, bins: Codes, even: bool = False) -> tuple[float, float
 
 
 # ----------------------------------------------------------------------------------------------- factorial designs
-def _factorial(measures: Measures, codes: list[Codes]) -> Json:
+def _factorial(measures: CampaignMeasures, codes: list[Codes]) -> Json:
     rows = measures.done
     shape = tuple(int(c.max()) + 1 for c in codes)
     cells = np.ravel_multi_index(tuple(codes), shape)

@@ -29,7 +29,7 @@ _CALL = re.compile(r"([a-z]+)\s*\((.*)\)\s*(.*)", re.S)
 
 
 @dataclass(frozen=True)
-class Point:
+class AxisValue:
     """A value of an axis: in the axis' unit (or a text), and as it is given to the test."""
 
     shown: float | str
@@ -43,7 +43,7 @@ class Axis:
     name: str
     kind: str  # list, grid, part, data, seed, table
     unit: str  # "" of texts and of numbers in SI
-    points: tuple[Point, ...]
+    points: tuple[AxisValue, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of campaign.json."""
@@ -76,9 +76,9 @@ class Distribution:
                 return np.asarray(stats.triang.ppf(p, (b - a) / (c[0] - a), a, c[0] - a))
 
 
-def point(value: float, unit: str) -> Point:
+def point(value: float, unit: str) -> AxisValue:
     """Return a number in a unit; without one as a text, so that its size is questioned as that of --set."""
-    return Point(value, f"{value!r} {unit}" if unit else repr(value))
+    return AxisValue(value, f"{value!r} {unit}" if unit else repr(value))
 
 
 def parse_axis(name: str, given: Any) -> Axis | Distribution:
@@ -166,17 +166,17 @@ def _list(name: str, items: Sequence[Any]) -> Axis:
     for item in items:
         match = QUANTITY.fullmatch(item.strip()) if isinstance(item, str) else None
         if isinstance(item, bool | list | tuple | dict) or (isinstance(item, str) and match is None):
-            return Axis(name, "list", "", tuple(Point(_text(v), v) for v in items))
+            return Axis(name, "list", "", tuple(AxisValue(_text(v), v) for v in items))
         numbers.append((float(match[1]), match[2].strip()) if match else (float(item), ""))
     tail = numbers[-1][1]
     try:
         values, unit = _one_unit(name, numbers, tail)
     except units.UnitError:
         if all(isinstance(v, str) for v in items) and not _is_unit(tail):  # "5 10 20": a text that begins with a digit
-            return Axis(name, "list", "", tuple(Point(v, v) for v in items))
+            return Axis(name, "list", "", tuple(AxisValue(v, v) for v in items))
         raise
     given = [
-        Point(v, number) if isinstance(number, float | int) else point(v, unit)
+        AxisValue(v, number) if isinstance(number, float | int) else point(v, unit)
         for v, number in zip(values, items, strict=True)
     ]
     return Axis(name, "list", unit, tuple(given))
@@ -194,7 +194,9 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def draw(axes: Sequence[Distribution], runs: int, design: str = "random", seed: int = 1) -> list[Mapping[str, Point]]:
+def draw(
+    axes: Sequence[Distribution], runs: int, design: str = "random", seed: int = 1
+) -> list[Mapping[str, AxisValue]]:
     """Return points of several distributions: independent (random), or spread out evenly over the space of all of them.
 
     design: "random", "lhs" (Latin hypercube) or "sobol" (scrambled Sobol' sequence, of a power of two of points).

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import Bench
 from gyrobench.campaign.execution.bundle import tool_digest
-from gyrobench.campaign.execution.campaign_plan import MEASURED, Plan, PlannedRun, make_plan
+from gyrobench.campaign.execution.campaign_plan import MEASURED, CampaignPlan, PlannedRun, make_plan
 from gyrobench.campaign.execution.clusters import connect, has_own_processes, is_local
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.campaign.execution.store import Campaign, CampaignError, CampaignStore
@@ -140,7 +140,7 @@ def execute_campaign(
     return outcome
 
 
-def _goes_on(store: CampaignStore, plan: Plan, why: str) -> str:
+def _goes_on(store: CampaignStore, plan: CampaignPlan, why: str) -> str:
     done = store.arrow().num_rows
     return f"{why}; {done:,} of {len(plan.runs):,} runs are stored in {store.url}: the same command runs the others"
 
@@ -149,7 +149,7 @@ class _Execution:
     """The state of an execution: which runs wait, which are on their way, how often each was tried."""
 
     def __init__(
-        self, plan: Plan, store: CampaignStore, client: Client, stored: int,
+        self, plan: CampaignPlan, store: CampaignStore, client: Client, stored: int,
         progress: Callable[[CampaignProgress], None] | None,
     ) -> None:  # fmt: skip
         from gyrobench.campaign.execution.worker import BundlePlugin, ExecutionSettings
@@ -381,7 +381,7 @@ def _equal(row: Mapping[str, Any], stored: Mapping[str, Any]) -> bool:
     return bool(found) and all(stored.get(k) == v for k, v in found.items())
 
 
-def _add_engine(plan: Plan) -> None:
+def _add_engine(plan: CampaignPlan) -> None:
     """Put the native engine into the bundle, where there is one."""
     from gyrobench.engine.engine_library import engine_library
     from gyrobench.packaging import CompilerError

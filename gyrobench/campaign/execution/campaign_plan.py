@@ -17,7 +17,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.campaign.execution.axes import QUANTITY, Axis, Distribution, Point
+from gyrobench.campaign.execution.axes import QUANTITY, Axis, AxisValue, Distribution
 from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, tool_digest
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
@@ -50,7 +50,7 @@ class PlannedRun:
 
 
 @dataclass
-class Plan:
+class CampaignPlan:
     """All runs; setups: member of a suite ("" of a system) -> its parts, for each number of a run's setup."""
 
     definition: Definition
@@ -95,7 +95,7 @@ class Plan:
         return any(name for setup in self.setups for name in setup)
 
 
-def make_plan(definition: Definition, bench: Bench | None = None) -> Plan:
+def make_plan(definition: Definition, bench: Bench | None = None) -> CampaignPlan:
     """Return the plan; FMUs are built.  Raises UsageError and what the system raises for what no run can have."""
     return _Planner(definition, bench or Bench.find()).plan()
 
@@ -113,7 +113,7 @@ class _Planner:
         self.hashes: dict[tuple[str, ...], str] = {}
         self.names: list[str] = []
 
-    def plan(self) -> Plan:
+    def plan(self) -> CampaignPlan:
         d = self.definition
         slots = self._slots()
         axes, distributions = d.axes(list(slots))
@@ -150,12 +150,12 @@ class _Planner:
         elif len(seeds) > 1:
             described.append({"name": "seed", "kind": "seed", "unit": "", "values": seeds})
         repeated = len(points) - len(runs)
-        return Plan(d, described, list(runs.values()), setups, self.bundle, in_bundle, repeated, self.notes)
+        return CampaignPlan(d, described, list(runs.values()), setups, self.bundle, in_bundle, repeated, self.notes)
 
     # ------------------------------------------------------------------------------------------ points
     def _points(
         self, axes: list[Axis], distributions: list[Distribution], columns: list[Axis],
-        rows: list[tuple[Mapping[str, Point], int | None]], files: list[Path],
+        rows: list[tuple[Mapping[str, AxisValue], int | None]], files: list[Path],
     ) -> Iterator[tuple[dict[str, float | str], dict[str, Any], dict[str, str], Path | None, int | None]]:  # fmt: skip
         """Yield what is shown, values, parts, measured file and seed of each run."""
         d = self.definition

@@ -38,7 +38,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.campaign.execution.axes import DESIGNS, Axis, Distribution, Point, draw, parse_axis
+from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
 from gyrobench.system.values import parse
 
 KEEP = ("all", "failures", "extremes", "none")
@@ -109,7 +109,7 @@ class Definition:
         swapped = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
         lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in swapped.items()}
         parts = [
-            Axis(slot, "part", "", tuple(Point(p.strip(), p.strip()) for p in names))
+            Axis(slot, "part", "", tuple(AxisValue(p.strip(), p.strip()) for p in names))
             for slot, names in lists.items()
             if len(names) > 1
         ]
@@ -124,7 +124,7 @@ class Definition:
         lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in given.items()}
         return {slot: names[0].strip() for slot, names in lists.items() if len(names) == 1}
 
-    def drawn(self, axes: Sequence[Distribution]) -> list[Mapping[str, Point]]:
+    def drawn(self, axes: Sequence[Distribution]) -> list[Mapping[str, AxisValue]]:
         """Return the points of all distributions; one without values where there is none."""
         if not axes:
             if self.runs:
@@ -157,7 +157,7 @@ class Definition:
             found += [Path(n) for n in names]
         return list(dict.fromkeys(found))
 
-    def rows(self) -> tuple[list[Axis], list[tuple[Mapping[str, Point], int | None]]]:
+    def rows(self) -> tuple[list[Axis], list[tuple[Mapping[str, AxisValue], int | None]]]:
         """Return the columns of the table as axes without points, and its rows with their seeds."""
         if self.table is None:
             return [], [({}, None)]
@@ -176,7 +176,7 @@ class Definition:
             axis = parse_axis(name, [row[name] for row in content if row.get(name) is not None])
             assert isinstance(axis, Axis)
             axes[name] = iter(axis.points), Axis(name, "table", axis.unit, ())
-        rows: list[tuple[Mapping[str, Point], int | None]] = [
+        rows: list[tuple[Mapping[str, AxisValue], int | None]] = [
             ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, None if s is None else int(s))
             for row, s in zip(content, seeds, strict=True)
         ]

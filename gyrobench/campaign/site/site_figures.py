@@ -10,7 +10,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.campaign.analysis.lots import all_dated, in_order
-from gyrobench.campaign.analysis.measures import Json, Measures, normalized_error, numbers
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, normalized_error, numbers
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import Picture
 from gyrobench.report.style import BLUE, GREEN, HALF, INK, MUTED, ORANGE, VERMILION, axis_label, figure, svg, zero_line
@@ -21,7 +21,7 @@ MAX_LEVELS_DRAWN = 24  # texts beside an axis
 MAX_RESPONSES = 24  # pictures of responses
 
 
-def distributions(measures: Measures) -> list[Picture]:
+def distributions(measures: CampaignMeasures) -> list[Picture]:
     """Return a histogram of the estimates of each measure."""
     pictures = []
     for i, name in enumerate(measures.names):
@@ -53,7 +53,7 @@ def _histogram(ax: Any, x: Array) -> int:
     return len(x) - len(drawn)
 
 
-def normalized_errors(measures: Measures, covered: Sequence[Json]) -> list[Picture]:
+def normalized_errors(measures: CampaignMeasures, covered: Sequence[Json]) -> list[Picture]:
     """Return a histogram of error over half-width for each measure, with the normal curve that 95 % intervals imply."""
     pictures = []
     for i, entry in enumerate(covered):
@@ -193,7 +193,7 @@ def indices(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
     return pictures
 
 
-def control_charts(measures: Measures, lot: Json) -> list[Picture]:
+def control_charts(measures: CampaignMeasures, lot: Json) -> list[Picture]:
     """Return a chart of single values for each coefficient, with control limits and those named as outliers."""
     rows = in_order(measures.rows)
     done = (rows["state"] == "done").to_numpy(bool)

@@ -22,7 +22,7 @@ import numpy as np
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
-from gyrobench.campaign.analysis.measures import Json, Measures, error, numbers
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, numbers
 from gyrobench.campaign.execution.store import Campaign
 from gyrobench.campaign.site.site_page import page
 from gyrobench.files import write_whole
@@ -35,14 +35,14 @@ DIGITS = 7  # significant digits of the numbers in the table of the page
 
 
 @dataclass(frozen=True)
-class Site:
+class CampaignSite:
     """A written site: its page, and the sentences with which it opens."""
 
     index: Path
     answer: list[str]
 
 
-def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None = None) -> Site:
+def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None = None) -> CampaignSite:
     """Write the site of a campaign.
 
     out: folder of the site, default ``site`` in the campaign; reports are linked where they are.  publish: a folder
@@ -60,7 +60,7 @@ def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None
     if publish:
         _publish_reports(campaign, folder, kept)
     link = _links(campaign, folder, published=publish is not None)
-    measures = Measures.of(rows, campaign.units, campaign.axes)
+    measures = CampaignMeasures.of(rows, campaign.units, campaign.axes)
     doc = plain(analyse(campaign))
     bench = Bench.find().folder
     files = {
@@ -73,7 +73,7 @@ def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None
     }
     for name, text in files.items():
         write_whole(folder / name, text.encode())
-    return Site(folder / "index.html", doc["answer"])
+    return CampaignSite(folder / "index.html", doc["answer"])
 
 
 def _require_own(folder: Path) -> None:
@@ -125,7 +125,7 @@ def _script(value: Json) -> str:
 
 
 # -------------------------------------------------------------------------------------------------- table of runs
-def run_table(measures: Measures, link: Callable[[str], str]) -> Json:
+def run_table(measures: CampaignMeasures, link: Callable[[str], str]) -> Json:
     """Return the columns of the table of runs: key, head, unit, kind, measure it belongs to, values.
 
     kind: "text", "count", "number", or "value" and "u" for a measure's numbers, which are rounded to its u.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from gyrobench.campaign.analysis.measures import Json, Measures
+from gyrobench.campaign.analysis.measures import CampaignMeasures, Json
 from gyrobench.campaign.site import site_figures
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
@@ -55,7 +55,7 @@ A heading sorts.</p>
 <script defer src="site.js"></script>"""
 
 
-def page(doc: Json, measures: Measures, reports: Callable[[str], str]) -> Page:
+def page(doc: Json, measures: CampaignMeasures, reports: Callable[[str], str]) -> Page:
     """Return the page.  reports: path of a report in the campaign -> its link from the site."""
     with styled():
         sections = [
@@ -157,7 +157,7 @@ def _last(path: Any) -> str:
     return str(path).replace("\\", "/").rsplit("/", 1)[-1] if isinstance(path, str) else "–"
 
 
-def _control(doc: Json, measures: Measures) -> list[Any]:
+def _control(doc: Json, measures: CampaignMeasures) -> list[Any]:
     lot = doc["lot"]
     if not lot or not lot["tolerance"]:
         return []
@@ -243,7 +243,7 @@ def _changes(doc: Json) -> list[Any]:
 
 
 # ------------------------------------------------------------------------------------------------ simulations
-def _coverage(doc: Json, measures: Measures) -> list[Any]:
+def _coverage(doc: Json, measures: CampaignMeasures) -> list[Any]:
     covered = doc["coverage"]
     if not covered:
         return []
@@ -348,7 +348,7 @@ def _sobol(doc: Json) -> list[Any]:
     return [*blocks, *figures, CollapsedBlocks(f"Table of {len(rows)} indices", [table])]
 
 
-def _distributions(doc: Json, measures: Measures) -> list[Any]:
+def _distributions(doc: Json, measures: CampaignMeasures) -> list[Any]:
     if not doc["distributions"]:
         return []
     keys = ("mean", "sd", "min", "q025", "median", "q975", "max")
