@@ -1,4 +1,4 @@
-"""What a test offers whose plan is a choice of options: methods, rates, numbers of positions, each with one length."""
+"""Protocol of a test whose plan is a choice of options: methods, rates, numbers of positions, each with one length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a reduction will state for a plan, predicted from the fit that the same reduction made of one run of it.
+"""Uncertainty that a reduction will state for a plan, predicted from its fit of one run of that plan.
 
 The design matrix, the windows, the set-up effects that are weighed and the functions of the unknowns are those of that
 fit; its data are replaced by the fitted model plus noise drawn from the true noise model, and it is made again, a few
@@ -32,7 +32,7 @@ EASY, FEWEST = 300.0, 12
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of one fit: names and printed units of its values, u, error and least (q,) in these units, and u of type B."""
+    """Prediction for a fit: names and printed units of its values; u, error, least (q,) in these units, u of type B."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Which tests of a suite, and which plan of each, reach wanted uncertainties soonest.
+"""Tests of a suite, and a plan of each, that reach wanted uncertainties soonest.
 
 Each test that offers plans is designed for all that is wanted of it; of the sets of tests in which every wanted value
 is reached by one test, the set that takes least time is chosen, the shortest test first.  Not used: that two tests that

@@ -1,4 +1,4 @@
-"""What a test tells the search for its shortest plan: candidates, rows of its regression, noise, moves, options.
+"""Protocol of a test for the search for its shortest plan: candidates, rows of its regression, noise, moves, options.
 
 A system names in ``protocol`` a module beside system.py with
 

@@ -1,4 +1,4 @@
-"""What a system that is one FMU offers to set and to read: variables of its parts, and options that stand for them."""
+"""Variables that a system that is one FMU exposes: those of its parts, and options that stand for them."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ TURN = 0.1  # of a window by angle: the angle is a reading
 
 @dataclass(frozen=True)
 class RecordedOutput:
-    """Where a recorded output is in a file: its name, None for a constant; how it becomes SI; whether it is held."""
+    """Recorded output in a file: its name there, None for a constant; how it becomes SI; whether it is held."""
 
     name: str | None
     bound: Bound

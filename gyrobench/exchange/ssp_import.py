@@ -42,7 +42,7 @@ Node = tuple[Place, str]  # connector of a component or of a system
 
 @dataclass(frozen=True)
 class _Feed:
-    """What a connector gets: value = factor * (value of ``source``) + offset; unit: of the result."""
+    """Source of a connector's value: value = factor * (value of ``source``) + offset; unit: of the result."""
 
     source: Node
     factor: float

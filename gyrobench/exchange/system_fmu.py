@@ -121,7 +121,7 @@ def _text(source: SystemSource) -> str:
 
 
 class _Face:
-    """What the writers of descriptions take for a part."""
+    """System in the form of a part, for the writers of descriptions."""
 
     states = ()
 

@@ -48,7 +48,7 @@ class CVariable:
 
     @property
     def whole(self) -> bool:
-        """Whether the elements are contiguous from the first on: no slice."""
+        """Return True if the elements are contiguous from the first on: no slice."""
         return all(isinstance(t, str) for t in self.taken)
 
     def at(self, *indices: str) -> str:

@@ -105,7 +105,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Head:
-    """What stands above the rows of a CSV file, and how they are written."""
+    """Head of a CSV file: the lines above its rows, and how the rows are written."""
 
     names: list[str]  # of the columns, with units
     comments: dict[str, str]

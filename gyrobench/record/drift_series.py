@@ -65,7 +65,7 @@ Observer = Callable[[str, int, Array], None]
 
 @dataclass
 class Acquisition:
-    """What the file says of its acquisition; times in s."""
+    """Acquisition as the file states it; times in s."""
 
     step: float = 0.0
     samples: int = 0

@@ -1,4 +1,4 @@
-"""What a campaign shows, as one document: every number of its site is read from here."""
+"""Analysis of a campaign as one document: every number of its site is read from here."""
 
 from __future__ import annotations
 

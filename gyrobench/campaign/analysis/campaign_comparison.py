@@ -1,4 +1,4 @@
-"""What two campaigns differ in beyond chance: two benches, two versions, two methods.
+"""Differences of two campaigns beyond chance: two benches, two versions, two methods.
 
 Runs that share the values of all common axes and the seed (of measured data the file) are compared in pairs, so that
 noise common to both cancels; without such pairs the campaigns count as independent.  Runs that share a seed at several

@@ -1,4 +1,4 @@
-"""Which measurements of a lot need attention, and why: no result, a record that contradicts its test, an outlier.
+"""Measurements of a lot that need attention, and why: no result, a record that contradicts its test, an outlier.
 
 A whole lot may be inconclusive for one cause, such as a statement of type B that all files lack.  What more than half
 of the results warn of is therefore said once, of the lot, and singles out nobody.

@@ -54,7 +54,7 @@ class CampaignMeasures:
 
     @property
     def is_lot(self) -> bool:
-        """Whether the rows are measured files, each of an instrument."""
+        """Return True if the rows are measured files, each of an instrument."""
         return "data" in self.rows and bool(self.rows["data"].notna().any())
 
     def instrument(self) -> list[str]:

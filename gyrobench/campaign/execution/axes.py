@@ -53,7 +53,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Distribution:
-    """What a quantity is drawn from; numbers in ``unit``."""
+    """Distribution that a quantity is drawn from; numbers in ``unit``."""
 
     name: str
     family: str

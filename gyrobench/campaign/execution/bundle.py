@@ -1,4 +1,4 @@
-"""What workers need, by content: the systems and parts of the bench as source, the built FMUs, the native engine.
+"""Bundle of what workers need, by content: sources of the bench's systems and parts, built FMUs, the native engine.
 
 A worker that has it needs no bench, no compiler and no common file system; only gyrobench itself, of the same source.
 """

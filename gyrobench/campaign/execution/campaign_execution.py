@@ -47,7 +47,7 @@ class CampaignStopped(CampaignError):
 
 @dataclass
 class CampaignProgress:
-    """How far a campaign is.  total, stored: runs.  states: of those that were run now."""
+    """Progress of a campaign.  total, stored: runs.  states: of those that were run now."""
 
     total: int
     stored: int

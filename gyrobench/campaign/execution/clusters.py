@@ -1,4 +1,4 @@
-"""Where a campaign runs: a given dask client, the scheduler at an address, or local processes."""
+"""Clusters that a campaign runs on: a given dask client, the scheduler at an address, or local processes."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class Campaign:
 
     @property
     def axes(self) -> list[dict[str, Any]]:
-        """What is varied: name, kind, unit, values."""
+        """Return the axes that are varied: name, kind, unit, values."""
         return list(self.definition.get("axes", []))
 
     def table(self) -> pandas.DataFrame:

@@ -1,4 +1,4 @@
-"""What a worker does: a chunk of runs, each of which becomes a row whatever happens to it.
+"""Work of a worker: a chunk of runs, each of which becomes a row whatever happens to it.
 
 A worker keeps what it has loaded (a session for each setup, the last few) from chunk to chunk.  Runs of one process are
 made one after the other.  A failure that is not the run's (full disk, another gyrobench) is raised, and ends the
@@ -87,7 +87,7 @@ class Chunk:
 
 @dataclass
 class ChunkResult:
-    """What a chunk gives: rows, units of columns, log and kept files."""
+    """Result of a chunk: rows, units of columns, log and kept files."""
 
     rows: list[dict[str, Any]] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
@@ -138,7 +138,7 @@ def marks_folder(campaign: str, worker: Worker) -> Path:
 
 
 class _WorkerState:
-    """Where a process works for a campaign: the unpacked bundle, loaded sessions, the guard."""
+    """State of a process that works for a campaign: the unpacked bundle, loaded sessions, the guard."""
 
     def __init__(self, settings: ExecutionSettings, bundle: bytes, folder: Path, name: str, memory: int | None) -> None:
         self.settings, self.bundle, self.folder, self.name, self.memory = settings, bundle, folder, name, memory
