@@ -164,7 +164,7 @@ def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -
 def test_many_runs(command: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pandas
 
-    from gyrobench.campaign import clusters
+    from gyrobench.campaign.execution import clusters
 
     monkeypatch.setattr(clusters, "cores", lambda: 1)  # the tests share the cores
     names, _ = follow(GUIDES / "campaigns.md", command)

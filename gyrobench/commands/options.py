@@ -95,7 +95,7 @@ class Target(StrEnum):
     python = "python"
 
 
-class Table(StrEnum):
+class TableFormat(StrEnum):
     csv = "csv"
 
 

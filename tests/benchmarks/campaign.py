@@ -86,7 +86,7 @@ class Memory:
 def campaign(runs: int, workers: int) -> tuple[float, float]:
     """Seconds of the whole, runs a second from the first row to the last."""
     import gyrobench as gb
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.execution.store import Campaign
 
     rows = [{**VALUES, "latitude": 0.5 + 1e-4 * k, "seed": k} for k in range(runs)]
     asked = {"system": SYSTEM, "table": rows, "check_step": False, "keep": "none"}

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import estimable_combinations
 from gyrobench.reduction.suite.consistency import MethodValue, combine_values, holm, normalized_error, outlier
-from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
 from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
 
