@@ -24,10 +24,11 @@ NOTEBOOK = Path("docs/guides/first_runs.ipynb")
 #: caption of the sidebar -> pages in their order, by pattern
 CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
-    "Tests and loops": ["docs/gallery", "docs/tests", "systems/*/README"],
+    "Tests and loops": ["docs/gallery", "docs/tests_and_loops", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/errata", "docs/references"],
-    "Reference": ["docs/systems", "docs/public_interface", "api/gyrobench", "reports/README", "fmus/README"],
+    "Reference": ["docs/systems", "docs/public_interface", "reports/README", "fmus/README"],
+    "Python API": ["api/gyrobench", "api/*"],
     "Figures": ["docs/speed", "tests/benchmarks/README", "tests/spec/README"],
     "Project": ["CONTRIBUTING", "docs/architecture", "CHANGELOG", "docs/licences", "docs/README"],
 }

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import re
 import sys
+from html import escape
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx import addnodes
 
 sys.path.insert(0, str(Path(__file__).parent))
 from docstrings import restructured
@@ -40,6 +44,7 @@ html_show_copyright = False
 html_show_sphinx = False
 html_copy_source = False
 html_math_renderer = "mathml"
+highlight_language = "text"  # indented blocks are equations
 pygments_style = "default"
 pygments_dark_style = "monokai"
 
@@ -49,15 +54,58 @@ def mathml(self: Any, node: Any) -> None:
     block = node.tagname == "math_block"
     text = tex2mathml(node.astext(), as_block=block)
     self.body.append(f'<div class="math">{text}</div>' if block else text)
-    from docutils.nodes import SkipNode
-
-    raise SkipNode
+    raise nodes.SkipNode
 
 
 def docstring(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     lines[:] = restructured(lines)
 
 
+EQUATIONS = re.compile(r'(<div class="highlight-text notranslate">.*?</div>)', re.S)
+COMMAND = re.compile(r"\b(?:gyrobench|python|dask|fmpy) |://")
+SUBSCRIPT = re.compile(r"(?<![\w.])([A-Za-z\u0370-\u03ff]['\u0300-\u036f]*)_([A-Za-z0-9]{1,3})(?!\w)")
+
+
+def subscripts(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Set D_IO in the plain text of equations with a subscript that takes the columns of "_IO"."""
+
+    def put(match: re.Match[str]) -> str:
+        under = f'<span class="line">_</span><sub>{match[2]}</sub>'
+        return f'{match[1]}<span class="sub" style="width:{1 + len(match[2])}ch">{under}</span>'
+
+    def block(match: re.Match[str]) -> str:
+        return match[0] if COMMAND.search(match[0]) else SUBSCRIPT.sub(put, match[0])
+
+    if "body" in context:
+        context["body"] = EQUATIONS.sub(block, context["body"])
+
+
+def sidebar(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Put a short tree into the sidebar: the chapters, and the pages of the one that is open.
+
+    Sphinx's own tree has every heading of every page, copied for every page: most of the time of a build.
+    """
+    env = app.env
+    chapters = [(n["caption"], [ref for _, ref in n["entries"]]) for n in env.tocs[root_doc].findall(addnodes.toctree)]
+
+    def entry(level: int, name: str, text: str, current: bool, inside: str = "") -> str:
+        kind = f"toctree-l{level}" + (" current" if current else "")
+        link = "#" if name == page else context["pathto"](name)
+        return f'<li class="{kind}"><a class="reference internal" href="{link}">{escape(text)}</a>{inside}</li>'
+
+    def tree(**options: Any) -> str:
+        items = []
+        for caption, names in chapters:
+            here = page in names
+            inside = "".join(entry(2, n, env.titles[n].astext(), n == page) for n in names) if here else ""
+            items.append(entry(1, names[0], caption, here, f"<ul>{inside}</ul>" if here else ""))
+        return f"<ul>{''.join(items)}</ul>"
+
+    context["toctree"] = tree
+
+
 def setup(app: Any) -> None:
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     app.connect("autodoc-process-docstring", docstring)
+    app.connect("html-page-context", subscripts)
+    app.connect("html-page-context", sidebar, priority=400)  # before the theme, which calls it
