@@ -58,13 +58,18 @@ def keys(page: str) -> list[str]:
 
 
 def put(page: str, figures: dict[str, Entry]) -> str:
-    """Return a page with the figures of the file in their places.  Raises KeyError: no such figure."""
+    """Return a page with the figures of the file in their places.  Raises KeyError: no such figure in the file."""
+
+    def value(key: str) -> Any:
+        if key not in figures:
+            raise KeyError(f"{key}: no such figure in docs/figures.toml")
+        return figures[key]["value"]
 
     def inline(match: re.Match[str]) -> str:
-        return f"<!--fig {match[1]}-->{figures[match[1]]['value']}<!--/-->"
+        return f"<!--fig {match[1]}-->{value(match[1])}<!--/-->"
 
     def row(match: re.Match[str]) -> str:
-        values = figures[match[1]]["value"]
+        values = value(match[1])
         table = page[: match.start()].rsplit("\n\n", 1)[-1]
         names = [cell.strip() for cell in table.splitlines()[0].strip("|").split("|")]
         cells = match[0].strip("|").split("|")

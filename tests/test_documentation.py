@@ -1,4 +1,4 @@
-"""The pages: links lead somewhere, figures are those of docs/figures.toml, picture and changelog are of this version."""
+"""The pages: no dead link, figures as in docs/figures.toml, picture and changelog of this version."""
 
 from __future__ import annotations
 

@@ -50,6 +50,6 @@ def root(
       gyrobench COMMAND --help
 
     Exit codes: 0 done, 1 a validation fails or, with --strict, a verdict is fail, inconclusive
-    or void (there is no value to judge), 2 invalid request, configuration or data, 3 a run, its reduction or its report failed,
-    130 interrupted.
+    or void (there is no value to judge), 2 invalid request, configuration or data, 3 a run, its
+    reduction or its report failed, 130 interrupted.
     """
