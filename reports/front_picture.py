@@ -17,7 +17,7 @@ from PIL import Image, PngImagePlugin
 
 FILE = Path(__file__).with_name("tumble_single_axis.png")
 COMMAND = ("run", "tumble_single_axis", "--set", "latitude=45.75deg", "--seed", "7")
-WIDTH, HEIGHT = 1240, 1860  # pixels
+WIDTH, HEIGHT = 1240, 1990  # pixels
 
 
 def written_by() -> dict[str, str]:

@@ -24,7 +24,7 @@ NOTEBOOK = Path("docs/guides/first_runs.ipynb")
 #: caption of the sidebar -> pages in their order, by pattern
 CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
-    "Tests and loops": ["docs/gallery", "docs/tests_and_loops", "systems/*/README"],
+    "Tests and loops": ["docs/tests_and_loops", "docs/gallery", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "reports/README", "fmus/README"],

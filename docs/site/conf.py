@@ -46,7 +46,7 @@ html_copy_source = False
 html_math_renderer = "mathml"
 highlight_language = "text"  # indented blocks are equations
 pygments_style = "default"
-pygments_dark_style = "monokai"
+pygments_dark_style = "github-dark"
 
 
 def mathml(self: Any, node: Any) -> None:
@@ -61,20 +61,31 @@ def docstring(app: Any, what: str, name: str, obj: Any, options: Any, lines: lis
     lines[:] = restructured(lines)
 
 
-EQUATIONS = re.compile(r'(<div class="highlight-text notranslate">.*?</div>)', re.S)
+EQUATIONS = re.compile(r'(<div class="highlight-(?:none|text) notranslate">.*?</div>)', re.S)
 COMMAND = re.compile(r"\b(?:gyrobench|python|dask|fmpy) |://")
-SUBSCRIPT = re.compile(r"(?<![\w.])([A-Za-z\u0370-\u03ff]['\u0300-\u036f]*)_([A-Za-z0-9]{1,3})(?!\w)")
+SUBSCRIPT = re.compile(r"(?<![\w.])([A-Za-z\u0370-\u03ff]['\u0300-\u036f]*)_([A-Za-z0-9]{1,3})(?!\w)|  +")
+
+
+def equation(line: str) -> str:
+    """Return a line of an equation in plain text with its subscripts set, the columns after wide gaps in their places."""
+    saved = 0.0  # columns that subscripts have saved since the last gap, ch
+
+    def put(match: re.Match[str]) -> str:
+        nonlocal saved
+        if match[1] is None:
+            gap, saved = saved, 0.0
+            return f'{match[0]}<span class="gap" style="width:{gap:.2f}ch"></span>' if gap else match[0]
+        saved += 1.0 + 0.28 * len(match[2])  # the line is not shown, sub has 0.72 of the size
+        return f'{match[1]}<span class="line">_</span><sub>{match[2]}</sub>'
+
+    return SUBSCRIPT.sub(put, line)
 
 
 def subscripts(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Set D_IO in the plain text of equations with a subscript that takes the columns of "_IO"."""
-
-    def put(match: re.Match[str]) -> str:
-        under = f'<span class="line">_</span><sub>{match[2]}</sub>'
-        return f'{match[1]}<span class="sub" style="width:{1 + len(match[2])}ch">{under}</span>'
+    """Set D_IO in the plain text of equations as D with a subscript."""
 
     def block(match: re.Match[str]) -> str:
-        return match[0] if COMMAND.search(match[0]) else SUBSCRIPT.sub(put, match[0])
+        return match[0] if COMMAND.search(match[0]) else "\n".join(map(equation, match[0].split("\n")))
 
     if "body" in context:
         context["body"] = EQUATIONS.sub(block, context["body"])
