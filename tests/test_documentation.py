@@ -18,6 +18,7 @@ import gyrobench as gb
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "docs"), str(ROOT / "docs" / "site"), str(ROOT / "reports")]
 import docstrings  # noqa: E402
+import equations  # noqa: E402
 import figures  # noqa: E402
 import front_picture  # noqa: E402
 import links  # noqa: E402
@@ -124,6 +125,15 @@ def test_docstrings_become_restructured_text() -> None:
         "- three",
         "",
     ]
+
+
+def test_equations_have_subscripts_and_keep_their_columns() -> None:
+    """_IO takes three columns, a low IO 2 x 0.72: the gap that follows is 1.56 columns wider."""
+    block = '<div class="highlight-none notranslate"><pre>D_IO = 1   u_angle1\nb  c</pre></div>'
+    low = 'D<span class="line">_</span><sub>IO</sub> = 1   <span class="gap" style="width:1.56ch"></span>u_angle1'
+    assert equations.with_subscripts(block) == block.replace("D_IO = 1   u_angle1", low)
+    command = block.replace("D_IO", "gyrobench run D_IO")
+    assert equations.with_subscripts(command) == command and equations.with_subscripts("<p>D_IO</p>") == "<p>D_IO</p>"
 
 
 @pytest.mark.skipif(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
-import re
 import sys
 from html import escape
 from pathlib import Path
@@ -15,7 +14,8 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx import addnodes
 
 sys.path.insert(0, str(Path(__file__).parent))
-from docstrings import restructured
+from docstrings import restructured  # noqa: E402
+from equations import with_subscripts  # noqa: E402
 
 project = "gyrobench"
 author = "the gyrobench authors"
@@ -61,34 +61,9 @@ def docstring(app: Any, what: str, name: str, obj: Any, options: Any, lines: lis
     lines[:] = restructured(lines)
 
 
-EQUATIONS = re.compile(r'(<div class="highlight-(?:none|text) notranslate">.*?</div>)', re.S)
-COMMAND = re.compile(r"\b(?:gyrobench|python|dask|fmpy) |://")
-SUBSCRIPT = re.compile(r"(?<![\w.])([A-Za-z\u0370-\u03ff]['\u0300-\u036f]*)_([A-Za-z0-9]{1,3})(?!\w)|  +")
-
-
-def equation(line: str) -> str:
-    """Return a line of an equation in plain text with its subscripts set, the columns after wide gaps in their places."""
-    saved = 0.0  # columns that subscripts have saved since the last gap, ch
-
-    def put(match: re.Match[str]) -> str:
-        nonlocal saved
-        if match[1] is None:
-            gap, saved = saved, 0.0
-            return f'{match[0]}<span class="gap" style="width:{gap:.2f}ch"></span>' if gap else match[0]
-        saved += 1.0 + 0.28 * len(match[2])  # the line is not shown, sub has 0.72 of the size
-        return f'{match[1]}<span class="line">_</span><sub>{match[2]}</sub>'
-
-    return SUBSCRIPT.sub(put, line)
-
-
 def subscripts(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Set D_IO in the plain text of equations as D with a subscript."""
-
-    def block(match: re.Match[str]) -> str:
-        return match[0] if COMMAND.search(match[0]) else "\n".join(map(equation, match[0].split("\n")))
-
     if "body" in context:
-        context["body"] = EQUATIONS.sub(block, context["body"])
+        context["body"] = with_subscripts(context["body"])
 
 
 def sidebar(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
