@@ -14,8 +14,8 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx import addnodes
 
 sys.path.insert(0, str(Path(__file__).parent))
-from docstrings import restructured  # noqa: E402
-from equations import with_subscripts  # noqa: E402
+from docstrings import restructured
+from equations import with_subscripts
 
 project = "gyrobench"
 author = "the gyrobench authors"
