@@ -65,6 +65,7 @@ def test_quoted_figures_are_those_of_the_file() -> None:
         text = page.read_text(encoding="utf-8")
         quoted |= set(figures.keys(text))
         assert figures.put(text, known) == text, f"{page}: python docs/figures.py --write"
+        assert not re.search(r"^\s*<!--(fig|/)", text, re.M), f"{page}: a line that begins with a mark is no prose"
     assert quoted == set(known), "figures that no page quotes"
 
 
@@ -112,7 +113,7 @@ def test_public_names_have_docstrings() -> None:
 # ------------------------------------------------------------------------------------------------ site
 def test_docstrings_become_restructured_text() -> None:
     """Marks of prose are escaped, roles and literals kept, what is set in stands as it is."""
-    lines = ["A *vector* x_ of :func:`f`, ``a*b`` and `c`:", "", "    k i = w_I | d", "", "- one", "  two", "- three"]
+    lines = ["A *vector* x_ of :func:`f`, ``a*b`` and `c`:", "", "    k i = w_I | d", "", "- one", "  two", "1.  three"]
     assert docstrings.restructured(lines) == [
         r"A \*vector\* x\_ of :func:`f`, ``a*b`` and ``c``:",
         "",
@@ -122,7 +123,7 @@ def test_docstrings_become_restructured_text() -> None:
         "",
         "- one two",
         "",
-        "- three",
+        "#. three",
         "",
     ]
 

@@ -99,7 +99,7 @@ def api(source: Path, written: set[Path]) -> None:
 
 def contents(source: Path, written: set[Path]) -> str:
     """Return the tables of contents, of every page that was written, once."""
-    left = {str(p.relative_to(source).with_suffix("")): p for p in sorted(written)}
+    left = sorted(str(p.relative_to(source).with_suffix("")) for p in written)
     text = []
     for caption, patterns in CONTENTS.items():
         names: list[str] = []

@@ -45,11 +45,9 @@ def restructured(lines: list[str]) -> list[str]:
     """Return the lines of a docstring as reStructuredText."""
     found: list[str] = []
     for part in paragraphs(lines):
-        if ITEM.match(part[0]) and indent(part[0]) < 4:
-            mark = ITEM.match(part[0])
-            assert mark
+        if (mark := ITEM.match(part[0])) and indent(part[0]) < 4:
             text = " ".join(line.strip() for line in part)[len(mark[0].strip()) :].strip()
-            found += [f"- {escaped(text)}", ""]
+            found += [f"{'#.' if mark[0].strip()[0].isdigit() else '-'} {escaped(text)}", ""]
         elif indent(part[0]) > 0:
             found += [".. code-block:: text", "", *(f"    {line}" for line in part), ""]
         else:
