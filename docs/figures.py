@@ -72,6 +72,8 @@ def put(page: str, figures: dict[str, Entry]) -> str:
         values = value(match[1])
         table = page[: match.start()].rsplit("\n\n", 1)[-1]
         names = [cell.strip() for cell in table.splitlines()[0].strip("|").split("|")]
+        if not isinstance(values, dict) or not {*names[1:]} <= values.keys():
+            raise KeyError(f"{match[1]}: its values in docs/figures.toml have other names than the columns {names[1:]}")
         cells = match[0].strip("|").split("|")
         return "|" + "|".join([cells[0], *(f" {values[name]} " for name in names[1:])]) + "|"
 
