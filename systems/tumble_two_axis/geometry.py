@@ -134,3 +134,11 @@ def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
     if polar:
         found.append("only latitudes up to 85° north or south are possible")
     return found
+
+
+def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
+    """Return what to expect of positions that are allowed but weak."""
+    if refusals(latitude, m, n, positions):
+        return []
+    seen = regression.examine(design(latitude, m, n, positions), NAMES)
+    return [f"Condition {seen.condition:.3g}: hardly seen is {seen.weakest}."] if seen.condition > 100.0 else []

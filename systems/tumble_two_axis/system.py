@@ -143,11 +143,8 @@ class TumbleTwoAxis(RebalanceTest):
         return geometry.visit_problems(self["latitude"], angles[:, 0], angles[:, 1])
 
     def warnings(self) -> list[str]:
-        from .reduction import cautions
-
-        if self["visits"]:
-            return []
-        return cautions(self["latitude"], self["m"], self["n"], self["positions"])
+        values = (self["latitude"], self["m"], self["n"], self["positions"])
+        return [] if self["visits"] else geometry.cautions(*values)
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)

@@ -199,14 +199,14 @@ def test_consistency_of_the_harmonics_is_shown() -> None:
     truth = random_truth(11)
     s = T.setup()
     w = T.record(s, truth)
-    (table,) = [t for t in T.reduction.reduce(w, s).tables if t["title"] == "Consistency of the harmonics"]
-    assert len(table["rows"]) == 8 and all(abs(row[2]) < 1e-9 for row in table["rows"])
+    (table,) = [t for t in T.reduction.reduce(w, s).tables if t.title == "Consistency of the harmonics"]
+    assert len(table.rows) == 8 and all(abs(row[2]) < 1e-9 for row in table.rows)
     w["mean"] = w["mean"] - 0.01 * DPH * np.sin(w["outer_start"]) / s.k  # B5 of a gyro has no cause in the model
     rng = np.random.default_rng(1)
     w["mean"] += rng.normal(size=72) * 1e-3 * DPH / s.k
     r = T.reduction.reduce(w, s)
-    (table,) = [t for t in r.tables if t["title"] == "Consistency of the harmonics"]
-    assert {row[0]: row[2] for row in table["rows"]}["B5"] == pytest.approx(0.01, abs=1e-3)
+    (table,) = [t for t in r.tables if t.title == "Consistency of the harmonics"]
+    assert {row[0]: row[2] for row in table.rows}["B5"] == pytest.approx(0.01, abs=1e-3)
     assert {t.name: t.p for t in r.tests}["harmonics of the positions"] < 1e-6
 
 
@@ -283,5 +283,5 @@ def test_bad_setups() -> None:
     assert "common divisor 2; 3:1 is the same path" in refuse(0.8, 6, 2, 36)[0]
     assert "8 positions for 9 coefficients" in refuse(0.8, 5, 1, 8)[0]
     assert "at least 1" in refuse(0.8, 5, 0, 36)[0] and "outside" in refuse(2.0, 5, 1, 36)[0]
-    (weak,) = T.reduction.cautions(math.radians(80.0), 2, 1, 36)
+    (weak,) = T.geometry.cautions(math.radians(80.0), 2, 1, 36)
     assert weak.startswith("Condition") and "hardly seen is" in weak
