@@ -56,7 +56,7 @@ EXTRA = {"x": ("Dy_yy − Dy_xx", "Dy_x"), "y": ("Dx_xx − Dx_yy", "Dx_y")}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class EightPositionSetup(SiteSetup):
     """terms: unknowns of a channel, 4 or 6.  sigma: two cycles are needed.  truth: coefficients Dx_0 ... Dy_xz (rad/s
     per g0^n), k_x, k_y of a simulated gyro.  quantum: resolution of the current readings.  u_nonlinearity: relative, at
     the largest current.
@@ -106,7 +106,7 @@ class Linear:
     y: Array
 
 
-def linear(channel: str, current: Array, d: Array, setup: Setup) -> Linear:
+def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) -> Linear:
     """The fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's rate."""
     w, D = rate(channel, d, setup.earth_rate), drift_columns(channel, d, setup.terms)
     names = (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]
@@ -131,7 +131,7 @@ def linear(channel: str, current: Array, d: Array, setup: Setup) -> Linear:
     return Linear(k0, start, np.column_stack([predicted, D]), w - k0 * current)
 
 
-def quantities(channel: str, setup: Setup, closed: Mapping[str, float]) -> list[Quantity]:
+def quantities(channel: str, setup: EightPositionSetup, closed: Mapping[str, float]) -> list[Quantity]:
     """What is reported of a channel: k, R, u, u_z and, with six terms, the two differences per g0^n."""
     true = truth(setup)
     found = []
@@ -150,7 +150,7 @@ def quantities(channel: str, setup: Setup, closed: Mapping[str, float]) -> list[
     return found
 
 
-def made_of(name: str, setup: Setup) -> dict[str, float]:
+def made_of(name: str, setup: EightPositionSetup) -> dict[str, float]:
     """The coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
     g = setup.gamma
     return {
@@ -165,7 +165,7 @@ def made_of(name: str, setup: Setup) -> dict[str, float]:
     }.get(name, {name: 1.0})
 
 
-def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -> Findings:
+def reported(found: Findings, wanted: list[Quantity], setup: EightPositionSetup, k0: float) -> Findings:
     """The unknowns of :class:`Linear` in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
     r, after = found.reported, found.quantities[len(wanted) :]  # effects of the nuisance model stay as they are
     factor, offset = np.ones(r.value.size), np.zeros(r.value.size)
@@ -180,7 +180,7 @@ def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -
     return replace(found, quantities=(*wanted, *after), reported=values)
 
 
-def truth(setup: Setup) -> dict[str, float]:
+def truth(setup: EightPositionSetup) -> dict[str, float]:
     """What the unknowns are for the simulated gyro, SI; empty without truth."""
     t = setup.truth
     if not t:

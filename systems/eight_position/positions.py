@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.frames import E, N, U
@@ -55,6 +56,11 @@ def estimates(
         "u_x": [q[1] - R_y, q[2] - R_y - Wc, q[3] - R_y, q[4] - R_y + Wc],
         "u_y": [p[1] + R_x - Wc, p[2] + R_x, p[3] + R_x + Wc, p[4] + R_x],
     }
+
+
+def means(position: NDArray[np.int_], value: Array) -> dict[int, float]:
+    """Return the mean of values (n,) in each position that is there."""
+    return {n: float(np.mean(value[position == n])) for n in ATTITUDES if np.any(position == n)}
 
 
 def closed(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, latitude: float) -> dict[str, float]:

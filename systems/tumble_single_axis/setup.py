@@ -11,7 +11,7 @@ from gyrobench.reduction.setup import run_metadata, setups
 
 
 @dataclass(frozen=True, kw_only=True)
-class TumbleSetup(setups.TumbleSetup):
+class TumbleSetup(setups.TurningSetup):
     """k: torquer scale factor, rad/s/A.  terms: of the model.  quantum: resolution of the current reading.
 
     tilt: the small angle of the input axis towards the output axis (where it is estimated D_O rests on the dwells).

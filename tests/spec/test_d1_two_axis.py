@@ -11,6 +11,7 @@ import pytest
 import two_axis as T
 
 from gyrobench import drift, frames
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = T.DPH
 NAMES = drift.terms(9)
@@ -22,7 +23,7 @@ def random_truth(seed: int, names: tuple[str, ...] = NAMES) -> dict[str, float]:
 
 
 def message(windows: Any, setup: Any) -> str:
-    with pytest.raises(T.reduction.ReductionError) as error:
+    with pytest.raises(ReductionError) as error:
         T.reduction.reduce(windows, setup)
     return str(error.value)
 

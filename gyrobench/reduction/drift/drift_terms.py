@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gyrobench.reduction.drift import pulses as pulse_sources
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
@@ -17,9 +18,14 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup.setups import RebalanceSetup
 from gyrobench.reduction.setup.sources import (
     CURRENT_OFFSET,
+    CURRENT_OFFSET_OF,
     CURRENT_RESOLUTION,
+    CURRENT_RESOLUTION_OF,
     TORQUER_NONLINEARITY,
+    TORQUER_NONLINEARITY_OF,
     TORQUER_SCALE,
+    TORQUER_SCALE_OF,
+    Source,
 )
 from gyrobench.result import Reason
 
@@ -49,6 +55,14 @@ def folded(s: RebalanceSetup) -> list[Reason]:
     return [Reason("drift.folded", text)] if s.fold else []
 
 
+def left_out(truth: Mapping[str, float] | None, names: Iterable[str], every: Iterable[str], model: str) -> list[Reason]:
+    """Return that terms of ``every`` are simulated (truth) which a model does not have; names: its unknowns."""
+    known = set(names)
+    missing = [n for n in every if n not in known and (truth or {}).get(n, 0.0)]
+    text = f"{', '.join(missing)} is simulated but not in the {model} model: the others are biased."
+    return [Reason("drift.left_out", text)] if missing else []
+
+
 def equation(left: str, names: Iterable[str]) -> str:
     """Return the measurement equation in Typst math: ``left``, then the polynomial of the terms ``names``."""
     parts = []
@@ -63,21 +77,39 @@ def equation(left: str, names: Iterable[str]) -> str:
     return left + " + ".join(parts)
 
 
+def torquer_sources(axis: str = "", full: str = "") -> list[Source]:
+    """Return scale factor and nonlinearity of a torquer, offset and resolution of the reading of its current.
+
+    axis: of one of two torquers.  full: the largest current of the record, for the note.
+    """
+    every = (TORQUER_SCALE, TORQUER_NONLINEARITY, CURRENT_OFFSET, CURRENT_RESOLUTION)
+    each = (TORQUER_SCALE_OF, TORQUER_NONLINEARITY_OF, CURRENT_OFFSET_OF, CURRENT_RESOLUTION_OF)
+    return [s.of(axis=axis, full=full) for s in (each if axis else every)]
+
+
+def elsewhere(axis: str) -> list[str]:
+    """Return names and ids of the sources of one of two torquers, which the other channel lacks."""
+    own = [*torquer_sources(axis), *(pulse_sources.of_loop(s, axis) for s in pulse_sources.SOURCES)]
+    return [word for s in own for word in (s.name, s.id)]
+
+
 def torquer_effects(
-    s: RebalanceSetup, found: Findings, k: float, read: Windows, quantum: float, pulses: Pulses | None = None
-) -> list[Effect]:
+    s: RebalanceSetup, found: Findings, k: float, read: Windows, quantum: float, pulses: Pulses | None = None,
+    axis: str = "",
+) -> list[Effect]:  # fmt: skip
     """Return what errors of torquer and current reading do to drift rates omega_IA - k i.
 
     k: rad/s/A.  read: currents with the sign of the precession convention.  quantum: resolution of the reading, A.
+    axis: of one of two torquers.
     """
     current = read.mean
     full = float(np.max(np.abs(current))) or 1.0
-    nonlinear = TORQUER_NONLINEARITY.of(full=f"{full * 1e3:.3g} mA")
+    scale, nonlinearity, zero, resolution = torquer_sources(axis, f"{full * 1e3:.3g} mA")
     offset = found.error(-k * np.ones_like(current))
     return [
-        TORQUER_SCALE.effect(s, found.error(-k * current)),
-        nonlinear.effect(s, found.error(-k * current * np.abs(current) / full)),
-        CURRENT_OFFSET.effect(s, offset),
-        CURRENT_RESOLUTION.effect(quantum / 12.0**0.5, offset),
-        *(pulses.effects(found, k, read, s) if pulses else ()),
+        scale.effect(s, found.error(-k * current)),
+        nonlinearity.effect(s, found.error(-k * current * np.abs(current) / full)),
+        zero.effect(s, offset),
+        resolution.effect(quantum / 12.0**0.5, offset),
+        *(pulses.effects(found, k, read, s, axis) if pulses else ()),
     ]

@@ -34,6 +34,7 @@ LATE = Source("pulse.late", "switching time of the pulses", "s", "u_switching", 
 GROWING = Source("pulse.growing", "switching time, proportional to the current", "s", "u_switching", "at full current")
 CURVED = Source("pulse.curved", "switching time, by the square of the current", "s", "u_switching", "at full current")
 RESOLUTION = Source("pulse.resolution", "resolution of the counts", "1")
+SOURCES = (ASYMMETRY, MEAN, LATE, GROWING, CURVED, RESOLUTION)
 
 
 def of_loop(source: Source, loop: str = "") -> Source:

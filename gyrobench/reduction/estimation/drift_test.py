@@ -41,6 +41,8 @@ class DriftTest(Generic[S]):
 
     #: record -> mistakes in taking or labelling it that make sense in this test (diagnosis.handling_candidates)
     handling: ClassVar[Any] = None
+    #: names and ids of sources of another channel of the same record, whose corrections are left to it
+    elsewhere: Sequence[str] = ()
 
     def __init__(self, windows: Mapping[str, Array], setup: S) -> None:
         self.windows, self.setup = windows, setup
@@ -96,7 +98,7 @@ class DriftTest(Generic[S]):
         """Return what the data say, without the checks of :meth:`problems`."""
         setup = self.setup
         found = self.regression().fit()
-        found = with_set_up(self.derived(found), self.effects, setup.corrections, remount=setup.remount)
+        found = with_set_up(self.derived(found), self.effects, setup.corrections, self.elsewhere, setup.remount)
         self.test(found)
         effects = [*self.effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
         return self.finished(found, effects)

@@ -96,6 +96,11 @@ class Fit:
     gain: Array  # (p, n): beta = gain y
 
     @property
+    def named(self) -> dict[str, float]:
+        """Return beta by name."""
+        return dict(zip(self.names, self.beta.tolist(), strict=True))
+
+    @property
     def u(self) -> Array:
         """Standard uncertainties."""
         out: Array = np.sqrt(np.diag(self.covariance))
