@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +23,9 @@ from .geometry import CROSS, specific_force
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(setups.Setup):
+class MultipointSetup(setups.Setup):
     """scale: lambda, m/s2/A.  mounts: phase -> "a" or "b".  truth: k0 ... k5; zeros: mount -> true theta_0.  quantum:
-    resolution of the current reading.  site: as the report shows it.
+    resolution of the current reading.
     """
 
     gravity: float
@@ -34,7 +33,6 @@ class Setup(setups.Setup):
     mounts: Mapping[int, str]
     zeros: Mapping[str, float] | None = None
     quantum: float = 0.0
-    site: Mapping[str, Any] = field(default_factory=dict)
     u_scale: float = 0.0
     u_current: float = 0.0
     u_gravity: float = 0.0
@@ -65,7 +63,7 @@ class Visits:
         return sorted(set(self.mount.tolist()))
 
 
-def visits(windows: Mapping[str, Array], s: Setup) -> Visits:
+def visits(windows: Mapping[str, Array], s: MultipointSetup) -> Visits:
     """Neighbouring windows of the same phase and angle averaged by their length."""
     phase = np.asarray(windows["phase"]).astype(int)
     angle, t0, t1, mean = (np.asarray(windows[c], dtype=float) for c in ("angle_start", "t_start", "t_end", "mean"))
@@ -82,7 +80,7 @@ def visits(windows: Mapping[str, Array], s: Setup) -> Visits:
     return Visits(mount, angle[new], t0[new], t1[last], means, within)
 
 
-class Model:
+class Polynomial:
     """Columns of the linearized model at zeros (mount -> theta_0); four: three terms, which stand for combinations."""
 
     def __init__(self, mounts: Sequence[str], four: bool) -> None:

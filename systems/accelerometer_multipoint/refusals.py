@@ -16,7 +16,7 @@ from .closed import spacing
 from .geometry import FACES
 
 if TYPE_CHECKING:
-    from .model import Setup
+    from .model import MultipointSetup
 
 ZERO = math.radians(1.0)  # largest theta_0
 STILL = 1e-6  # rad, largest motion within a window
@@ -58,7 +58,7 @@ def zero_problems(zeros: Mapping[str, float]) -> list[str]:
     ]
 
 
-def setup_problems(s: Setup) -> list[str]:
+def setup_problems(s: MultipointSetup) -> list[str]:
     found = frames.gravity_problems(s.gravity)
     if not (math.isfinite(s.scale) and s.scale > 0.0):
         found.append(f"scale λ = {s.scale:g} m/s²/A: a finite positive number is expected")
@@ -68,7 +68,7 @@ def setup_problems(s: Setup) -> list[str]:
     return found
 
 
-def record_problems(s: Setup, windows: Mapping[str, Array]) -> list[str]:
+def record_problems(s: MultipointSetup, windows: Mapping[str, Array]) -> list[str]:
     """Phases without a mount and windows in which the head moved; rows count from 1."""
     phase = np.asarray(windows["phase"]).astype(int)
     strange = sorted(set(phase.tolist()) - set(s.mounts))

@@ -67,7 +67,7 @@ def test_six_positions_a_mount_are_best_for_the_accelerometer() -> None:
     angle = np.tile(np.arange(24) * np.pi / 12, 2)
     v = model.Visits(np.repeat(["a", "b"], 24), angle, angle, angle, 0.0 * angle, 0.0)
     k, zeros = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), {"a": 0.0, "b": 0.0}
-    m = model.Model(["a", "b"], False)
+    m = model.Polynomial(["a", "b"], False)
     X = np.column_stack([m.columns(v, zeros, 1.0), m.slopes(v, zeros, 1.0, k)])
     M = np.einsum("mi,mj->mij", X, X)
     shares = np.zeros(48)

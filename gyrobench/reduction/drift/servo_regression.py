@@ -148,13 +148,10 @@ def window_problems(
     return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
 
 
-def tracking_problems(
-    windows: Mapping[str, Array], rows: NDArray[np.bool_], parameters: Mapping[str, Any], limit: float
-) -> list[str]:
-    """Where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and std) and
-    the gain of the gyro, as far as both are known.
+def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gain: float, limit: float) -> list[str]:
+    """Return where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and
+    std) and its gain, V/rad of the case, as far as both are known.
     """
-    gain = parameters.get("gyro.K_sg", 0.0) * parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or 1.0)
     if not gain or "mean" not in windows or not limit > 0.0:
         return []
     size = (np.abs(windows["mean"]) + np.nan_to_num(windows["std"])) / gain
@@ -171,13 +168,13 @@ def tracking_problems(
 
 def effects(
     held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
-    sizes: Mapping[str, float],
+    sizes: Any,
 ) -> list[Effect]:  # fmt: skip
-    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Return axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
 
-    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
-    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
-    columns: what is fitted.
+    sizes: a setup with u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time
+    (relative).  The axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the
+    angle errors.  columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
 
@@ -284,18 +281,3 @@ CONVENTIONS = (
     "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
     "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
 )
-
-
-def equation(names: Sequence[str]) -> str:
-    """Typst math of the measurement equation with the terms ``names``."""
-    axis = {"I": "X", "O": "Y", "S": "Z"}
-    parts = []
-    for n in names:
-        index = n[2:]
-        if n == "D_F":
-            parts.append("D_F")
-        elif len(index) == 2 and index[0] == index[1]:
-            parts.append(f'D_"{index}" {axis[index[0]]}^2')
-        else:
-            parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(axis[a] for a in index))
-    return 'dot(theta) + omega_"E,x" = omega_d, quad omega_d = ' + " + ".join(parts)
