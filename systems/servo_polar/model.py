@@ -32,7 +32,7 @@ def terms(which: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Model:
+class PolarModel:
     """names: of the terms; fitted: of the columns; mixed: what a fitted coefficient holds beside itself."""
 
     names: tuple[str, ...]
@@ -41,7 +41,7 @@ class Model:
     equal: bool = False
 
     @classmethod
-    def of(cls, route: str, mounts: Sequence[str], which: int) -> Model:
+    def of(cls, route: str, mounts: Sequence[str], which: int) -> PolarModel:
         """mounts: attitudes of the turns.  One mount alone decides by itself, whatever the route."""
         names = terms(which)
         if len(set(mounts)) == 1:

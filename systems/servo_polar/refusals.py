@@ -17,7 +17,7 @@ from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.units import DPH
 
-from .model import ROUTES, Model
+from .model import ROUTES, PolarModel
 
 
 def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, NDArray[np.int_]]:
@@ -88,7 +88,7 @@ def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
     found = []
     if which == 4:
         found.append("Four terms: the other coefficients stay in the residuals and bias D_F (low grades only).")
-    model = Model.of(route, mounts, which)
+    model = PolarModel.of(route, mounts, which)
     together = [model.words(n) for n in model.fitted if model.mixed[n]]
     if len(set(mounts)) == 1:
         found.append(

@@ -91,10 +91,13 @@ def separate(channel: str, rate: Array, g: Array, terms: int = 8) -> dict[str, f
 
 
 def reduce(
-    x: Array, y: Array, x_rate: Array, y_rate: Array, mount: NDArray[np.int_], latitude: float, g: float,
-    earth_rate: float, terms: int,
-) -> dict[str, float]:  # fmt: skip
-    """Our coefficients of both channels, rad/s per g0^n, from angles and rates of both axes (n,) in mounts (n,)."""
+    angles: tuple[Array, Array, Array, Array], mount: NDArray[np.int_], place: tuple[float, float, float], terms: int
+) -> dict[str, float]:
+    """Return our coefficients of both channels, rad/s per g0^n, from angles and rates of both axes (n,) in mounts (n,).
+
+    place: latitude, rad; gravity, g0; Earth rate, rad/s.
+    """
+    (x, y, x_rate, y_rate), (latitude, g, earth_rate) = angles, place
     alpha, beta, forces = np.empty_like(x), np.empty_like(x), np.empty((x.size, 3))
     for m in np.unique(mount).tolist():
         k = mount == m

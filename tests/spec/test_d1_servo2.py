@@ -217,7 +217,7 @@ def test_recovery_to_1e_8(seed: int, terms: int) -> None:
     for c in result.coefficients:
         assert c.estimate == pytest.approx(truth[c.name], abs=1e-8), (c.name, math.degrees(phi), pair)
         assert c.closed == pytest.approx(truth[c.name], abs=1e-8), c.name
-    book = next(t for t in result.tables if t["title"] == "Notation of Hu 1981")["rows"]
+    book = next(t for t in result.tables if t.title == "Notation of Hu 1981").rows
     expected = [v / DPH for v in (*px[:8], *py[:8])]
     assert [row[1] for row in book] == pytest.approx(expected, abs=1e-8)
 

@@ -95,7 +95,7 @@ def test_stiffness_is_what_is_left(table: Session, quiet: Any) -> None:
 
 def test_inner_axis_is_where_the_formula_says(quiet: Any) -> None:
     """The largest inner angles of mounts 2 and 4 are those of SERVO2-LOCK but for the drift; the report has both."""
-    rows = next(t for t in load_system(NAME).reduce(quiet).tables if t["title"] == "Mounts")["rows"]
+    rows = next(t for t in load_system(NAME).reduce(quiet).tables if t.title == "Mounts").rows
     for row in rows:
         assert row[5] == pytest.approx(45.75, abs=0.1) and row[6] == pytest.approx(45.75, abs=0.01)
     assert rows[1][4] == pytest.approx(-360.0, abs=4.0)  # X = N goes round once
@@ -106,7 +106,7 @@ def predicted(result: Any, source: str, row: int | None = None) -> np.ndarray[An
     """(18,) changes of the coefficients over FAINT, from the budget that both channels share: of its m independent
     errors the one of ``row``, or all at once.
     """
-    parts = [np.array(b["changes"]) for b in result.type_b if b["source"].startswith(source)]
+    parts = [np.array(b.changes) for b in result.type_b if b.source.startswith(source)]
     assert parts
     return np.array(sum(p.sum(axis=0) if row is None else p[row] for p in parts)) / FAINT
 

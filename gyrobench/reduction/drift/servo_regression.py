@@ -109,7 +109,7 @@ def held_windows(
     """
     there = "; ".join(known)
     wrong = [f"phase {p}: attitude '{n}' unknown; there are {there}" for p, n in labels.items() if n not in known]
-    if wrong := wrong or window_problems(windows, {p: {"label": n} for p, n in labels.items()}):
+    if wrong := wrong or window_problems(windows, labels):
         raise ReductionError(wrong)
     every = np.asarray(windows["phase"]).astype(int)
     rows = np.isin(every, list(labels))
@@ -135,17 +135,17 @@ def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
 
 
 def window_problems(
-    windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
+    windows: Mapping[str, Array], labels: Mapping[int, str], required: Sequence[str] = REQUIRED
 ) -> list[str]:
-    """Return what is wrong with the rows of the held phases, as sentences."""
+    """Return what is wrong with the rows of the phases in ``labels`` (phase -> attitude), as sentences."""
     for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
-        windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
+        windows = {**windows, c: np.where(np.isin(windows["phase"], list(labels)), windows[c], 0)}
     problems = window_checks.window_problems(windows, required)
     if problems:
         return problems
     present = set(np.asarray(windows["phase"]).astype(int).tolist())
-    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in present]
-    return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
+    missing = [f"phase {p} ({label}) has no windows" for p, label in labels.items() if p not in present]
+    return missing or ([] if labels else ["the record holds no phase in which the gyro holds the table"])
 
 
 def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gain: float, limit: float) -> list[str]:

@@ -27,6 +27,11 @@ class ChannelTests(DriftTest[S]):
     channel: ClassVar[Any]  # windows, setup, "x" or "y" -> the test of a channel
     label: ClassVar[str] = "{} channel"
 
+    def of_channel(self, name: str) -> DriftTest[S]:
+        """Return the test of a channel, "x" or "y"."""
+        test: DriftTest[S] = type(self).channel(self.windows, self.setup, name)
+        return test
+
     def equation(self) -> str | None:
         """Return the equation of both channels, Typst math; None: those of the channels below one another."""
         return None
@@ -49,7 +54,7 @@ class ChannelTests(DriftTest[S]):
 
     def result(self) -> DriftTestResult:
         """Return what both channels say, without the checks of :meth:`problems`."""
-        self.each: dict[str, DriftTest[S]] = {c: type(self).channel(self.windows, self.setup, c) for c in "xy"}
+        self.each = {c: self.of_channel(c) for c in "xy"}
         results = {self.label.format(c): test.result() for c, test in self.each.items()}
         noise = " ".join(f"{name}: {r.summary[0]}" for name, r in results.items())
         others = [f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]]

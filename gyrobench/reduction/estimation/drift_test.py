@@ -43,6 +43,7 @@ class DriftTest(Generic[S]):
     handling: ClassVar[Any] = None
     #: names and ids of sources of another channel of the same record, whose corrections are left to it
     elsewhere: Sequence[str] = ()
+    found: Findings  # the fit that is reported
 
     def __init__(self, windows: Mapping[str, Array], setup: S) -> None:
         self.windows, self.setup = windows, setup
@@ -60,6 +61,10 @@ class DriftTest(Generic[S]):
     def regression(self) -> Regression:
         """Return the data with their linear model.  May raise ReductionError."""
         raise NotImplementedError
+
+    def fitted(self) -> Findings:
+        """Return the fit of :meth:`regression`.  May raise ReductionError."""
+        return self.regression().fit()
 
     def derived(self, found: Findings) -> Findings:
         """Return the fit reported as functions of its unknowns (:meth:`Findings.derive`)."""
@@ -97,7 +102,7 @@ class DriftTest(Generic[S]):
     def result(self) -> DriftTestResult:
         """Return what the data say, without the checks of :meth:`problems`."""
         setup = self.setup
-        found = self.regression().fit()
+        found = self.fitted()
         found = with_set_up(self.derived(found), self.effects, setup.corrections, self.elsewhere, setup.remount)
         self.test(found)
         effects = [*self.effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
@@ -105,6 +110,7 @@ class DriftTest(Generic[S]):
 
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:
         """Return the result of a fit with its sources of error."""
+        self.found = found
         result = fit_result(found, self.account(found), effects, self.setup)
         return replace(result, summary=self.summary(found, result.coefficients))
 
