@@ -18,11 +18,12 @@ import numpy as np
 
 from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, TURNED
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -47,7 +48,6 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 LEAST = 8  # readings
-EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,14 +120,9 @@ class Reduction(DriftTest[Setup]):
         by_latitude = s.earth_rate * float(
             s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
         )
-        turned = []
-        for axis, name in ((1, "output"), (2, "spin")):
-            R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
-            rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
-            turned.append(replace(TURNED[name], option="u_attitude", note=EARTH_ONLY).effect(s, found.error(-rate)))
         offset = found.error(-s.k)
         return [
-            *turned,
+            *attitude_effects(s, found, EARTH_ONLY),
             LATITUDE.effect(s, found.error(by_latitude)),
             TORQUER_SCALE.effect(s, found.error(-s.k * self.current)),
             CURRENT_OFFSET.effect(s, offset),

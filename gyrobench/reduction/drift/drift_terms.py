@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from gyrobench import frames
 from gyrobench.reduction.drift import pulses as pulse_sources
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation.effects import Effect
@@ -25,12 +27,15 @@ from gyrobench.reduction.setup.sources import (
     TORQUER_NONLINEARITY_OF,
     TORQUER_SCALE,
     TORQUER_SCALE_OF,
+    TURNED,
     Source,
 )
 from gyrobench.result import Reason
 
 FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
 NO_OO = "D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."
+EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
+SMALL = 1e-5  # rad
 AXES = {"I": "X", "O": "Y", "S": "Z"}
 
 
@@ -75,6 +80,19 @@ def equation(left: str, names: Iterable[str]) -> str:
         else:
             parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(AXES[a] for a in index))
     return left + " + ".join(parts)
+
+
+def attitude_effects(s: Any, found: Findings, note: str = "") -> list[Effect]:
+    """Return what a gyro turned about its output and spin axes does to drift rates in one attitude: the Earth's rate.
+
+    s: a setup with attitude (rows I, O, S in E, N, U), latitude, earth_rate and u_attitude.
+    """
+    earth, turned = frames.earth_rate_local(s.latitude, s.earth_rate), []
+    for axis, name in ((1, "output"), (2, "spin")):
+        R = frames.rotation(np.eye(3)[axis], SMALL).T @ s.attitude
+        rate = float((R[0] - s.attitude[0]) @ earth) / SMALL
+        turned.append(replace(TURNED[name], option="u_attitude", note=note).effect(s, found.error(-rate)))
+    return turned
 
 
 def torquer_sources(axis: str = "", full: str = "") -> list[Source]:
