@@ -116,7 +116,7 @@ class CurrentChannel(DriftTest[EightPositionSetup]):
         )  # fmt: skip
 
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:
-        """Return the result with k in place of k - k0, and with what the single readings say of short times."""
+        """Return the result with k in place of k - k0."""
         found, c = model.reported(found, self.wanted, self.setup, self.linear.k0), self.channel
         k, u = float(found.value[0]), float(found.u[0])
         if abs(k) < 3.0 * u:
@@ -125,14 +125,14 @@ class CurrentChannel(DriftTest[EightPositionSetup]):
                 f"I_{c}{a} = I_{c}{b} within the noise: no scale factor k_{c} (relative uncertainty {u / abs(k):.2g}); "
                 "longer readings or a lower latitude are needed"
             )
-        result = super().finished(found, self.effects(found))
-        return self._short_term(result, result[f"k_{c}"].estimate * units.factor("deg/h/mA"))
+        return super().finished(found, self.effects(found))
 
-    def _short_term(self, result: DriftTestResult, k: float) -> DriftTestResult:
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
         """Return the result with Allan deviation and spectrum within the positions, from the single readings less their
         position's mean.
         """
         w, off = self.windows, np.zeros(len(self.windows["position"]))
+        k = result[f"k_{self.channel}"].estimate * units.factor("deg/h/mA")
         current, position = np.asarray(w[f"mean_{self.channel}"], dtype=float), np.asarray(w["position"]).astype(int)
         for n in positions.ATTITUDES:
             off[position == n] = -k * (current[position == n] - np.mean(current[position == n])) / DPH

@@ -51,7 +51,7 @@ LEAST = 8  # readings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class FixedPositionSetup(SiteSetup):
     """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A.  quantum: resolution of the current
     reading.
     """
@@ -76,14 +76,14 @@ class Setup(SiteSetup):
         return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
-class Reduction(DriftTest[Setup]):
+class Reduction(DriftTest[FixedPositionSetup]):
     """Composite drift of one attitude, of one day or of several."""
 
     handling = staticmethod(handling_candidates.at_rest)
 
     @classmethod
-    def setup_of(cls, run: RunDocument) -> Setup:
-        return Setup.of(
+    def setup_of(cls, run: RunDocument) -> FixedPositionSetup:
+        return FixedPositionSetup.of(
             run,
             attitude=attitude_of(run),
             k=number(run, "k", "gyro.k", "torquer scale factor"),
@@ -186,7 +186,7 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
     return None if tested is None else (float(tested[0][0]), float(tested[1][0]))
 
 
-def _conventions(s: Setup) -> list[str]:
+def _conventions(s: FixedPositionSetup) -> list[str]:
     axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
     return [
         "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
@@ -196,7 +196,7 @@ def _conventions(s: Setup) -> list[str]:
     ]
 
 
-def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> Table:
+def _table(s: FixedPositionSetup, i: Array, t0: Array, t1: Array, book: float) -> Table:
     X, Y, Z = s.xyz.tolist()
     return Table(
         "from_current_to_drift",

@@ -26,7 +26,7 @@ Number = tuple[float, float, float]  # value, standard uncertainty of type A, de
 
 
 @dataclass(frozen=True)
-class Estimates:
+class TorquerEstimates:
     """SI.  gain (5, n) of K, K_LS, K_1, K_3 and the worst departure in the K_n, cofactor (n, n) of the K_n; cubic: p of
     the test for K_3 with its F.  fitted (n,): the cubic law at the currents.  scatter: about it.
     """
@@ -55,7 +55,7 @@ QUANTITIES = [
 ]
 
 
-def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> Estimates:
+def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> TorquerEstimates:
     """i (n,) A; K_n rad/s/A; half: half differences, rad/s; theta: angle ranges, which weigh with their square."""
     n, w = i.size, (theta / theta.max()) ** 2
     one, full = np.ones((n, 1)), float(i.max())
@@ -68,7 +68,7 @@ def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> Estimates:
     pooled = math.sqrt((offset.s**2 * (n - 1) + (line.s * full) ** 2 * (n - 1)) / (2 * (n - 1)))
     k = int(np.argmax(np.abs(K_n - mean)))
     F = ((line.s**2 * (n - 1)) - (cubic.s**2 * (n - 2))) / cubic.s**2 if cubic.s > 0.0 else 0.0
-    return Estimates(
+    return TorquerEstimates(
         mean=(mean, s_mean * math.sqrt(float(np.sum(1.0 / w))) / n, dof_mean),
         line=(float(line.beta[0]), float(line.u[0]), n - 1),
         K_1=(float(cubic.beta[0]), float(cubic.u[0]), n - 2),
@@ -86,7 +86,7 @@ def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> Estimates:
     )
 
 
-def of_windows(i: Array, found: Precession) -> Estimates:
+def of_windows(i: Array, found: Precession) -> TorquerEstimates:
     """The same from a fit to all windows of a run; i (n,): its currents, A."""
     K, n, full = found.K, i.size, float(i.max())
     one, curve = np.ones((n, 1)), np.column_stack([np.ones(n), (i / full) ** 2])
@@ -110,7 +110,7 @@ def of_windows(i: Array, found: Precession) -> Estimates:
     ratio = float(beta[1] / beta[0])
     u_3, dof_3 = found.u(cubic[1])
     p = 2.0 * float(special.stdtr(min(dof_3, 1e9), -abs(float(beta[1])) / u_3)) if u_3 > 1e-12 * mean else None
-    return Estimates(
+    return TorquerEstimates(
         mean=of(mean, gain[0]),
         line=of(float(line[0] @ K), line[0]),
         K_1=of(float(beta[0]), cubic[0]),

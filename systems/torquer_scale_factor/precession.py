@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from gyrobench import frames, units
+from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.mixture import equivalent_dof
+from gyrobench.reduction.estimation.noise_estimate import Estimate
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-from .budget import Sizes, effects
+from .budget import TorquerSetup, effects
 
 DEGREE = 4
 
@@ -39,7 +39,7 @@ class Precession:
 
     K: Array
     drift: Array
-    est: noise_mixture_fit.Estimate
+    est: Estimate
     fit: Findings | None = None
     effects: Sequence[Effect] = ()
 
@@ -62,12 +62,12 @@ class Precession:
 
 
 def precession(
-    windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array, sizes: Sizes | None = None,
-    corrections: str = "", earth_rate: float = frames.EARTH_RATE,
-) -> Precession:  # fmt: skip
-    """phases: number of a phase -> number of its current in ``currents`` (A).  sizes, corrections: errors of the set-up
-    (budget.py, gyrobench.reduction.estimation.effects).  Raises ReductionError.
+    windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array, setup: TorquerSetup | None = None
+) -> Precession:
+    """Return the fit of the windows.  phases: number of a phase -> number of its current in ``currents`` (A).  setup:
+    with errors of the set-up and their corrections.  Raises ReductionError.
     """
+    setup = setup or TorquerSetup()
     phase = np.asarray(windows["phase"]).astype(int)
     mine = np.isin(phase, list(phases))
     t0, t1, a0, a1, i = (
@@ -85,9 +85,9 @@ def precession(
     found = fit(names, X, (a1 - a0) / (t1 - t0), t0, t1, [], "rate", "°/h", units.factor("deg/h"), noise="readings")
 
     def sources(f: Findings) -> Sequence[Effect]:
-        return effects(f, n, a0, a1, sizes or Sizes(), earth_rate)
+        return effects(f, n, a0, a1, setup)
 
-    found = with_set_up(found, sources, corrections)
+    found = with_set_up(found, sources, setup.corrections)
     return Precession(found.est.beta[:n], found.est.beta[n : 2 * n], found.est, found, sources(found))
 
 

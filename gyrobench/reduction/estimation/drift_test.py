@@ -81,6 +81,10 @@ class DriftTest(Generic[S]):
         """Return what the test says of itself, beside its figures."""
         raise NotImplementedError
 
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Return the result with what is not of the fit."""
+        return result
+
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         """Return the numbers that matter, as sentences: the first coefficient, the largest drift per g, the noise."""
         first, linear = coefficients[0], [c for c in coefficients if c.unit == "°/h/g"]
@@ -111,7 +115,7 @@ class DriftTest(Generic[S]):
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:
         """Return the result of a fit with its sources of error."""
         self.found = found
-        result = fit_result(found, self.account(found), effects, self.setup)
+        result = self.completed(fit_result(found, self.account(found), effects, self.setup))
         return replace(result, summary=self.summary(found, result.coefficients))
 
     @classmethod
