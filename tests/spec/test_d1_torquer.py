@@ -38,7 +38,7 @@ def test_printed_table(book: Any) -> None:
     assert named(book)["K"].estimate == pytest.approx(17.170625, abs=1e-9)
     assert named(book)["K"].unit == "°/h/mA"
     assert round(named(book)["K"].estimate, 3) == 17.171
-    rows = book.tables[0]["rows"]
+    rows = book.tables[0].rows
     assert [r[0] for r in rows] == pytest.approx(CURRENTS)
     assert [r[3] for r in rows] == pytest.approx(PRINTED_K)
     column = [round(r[5], 3) for r in rows]
@@ -52,7 +52,7 @@ def test_errata(book: Any) -> None:
     """E48: K = -omega/i would be negative, the printed K is not.  E49: 5 mA is -0.01 %, printed +0.01 %."""
     assert named(book)["K"].estimate > 0 > -named(book)["K"].estimate
     printed = (0.08, 0.01, -0.03, -0.06, 0.01, 0.01, -0.01, 0.0)
-    column = [r[5] for r in book.tables[0]["rows"]]
+    column = [r[5] for r in book.tables[0].rows]
     for n, (mine, theirs) in enumerate(zip(column, printed, strict=True)):
         assert (abs(mine - theirs) < 0.006) == (n != 1)
     assert column[1] == pytest.approx(-0.0116, abs=1e-4)

@@ -28,8 +28,8 @@ def test_printed_table(command: Command, tmp_path: Path) -> None:
     assert abs(K["estimate"] - 17.171) < 5e-4
     assert not result["simulated"]
     column = [
-        [row[k] for row in t.rows]
-        for t in result["tables"] for k, name in enumerate(t.columns) if "17.171" in name or "linearity" in name
+        [row[k] for row in t["rows"]]
+        for t in result["tables"] for k, name in enumerate(t["columns"]) if "17.171" in name or "linearity" in name
     ]  # fmt: skip
     printed = [0.076, -0.012, -0.029, -0.064, 0.006, 0.012, -0.006, 0.0]
     assert any(_numbers(c) == pytest.approx(printed, abs=6e-4) for c in column), column
