@@ -10,7 +10,6 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.setup.setups import scale_factor_problems
 
 from .setup import TumbleSetup
 
@@ -34,7 +33,7 @@ def refusals(latitude: float) -> list[str]:
 
 
 def setup_problems(s: TumbleSetup) -> list[str]:
-    problems = refusals(s.latitude) + s.problems() + scale_factor_problems(s.k)
+    problems = refusals(s.latitude) + s.problems()
     if s.terms not in drift.TERM_SETS:
         problems.append(f"{s.terms}-term model unknown; there are {', '.join(map(str, drift.TERM_SETS))}")
     if s.terms == 10 and not s.fold:

@@ -13,32 +13,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from gyrobench import drift, frames
+from gyrobench import frames
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms
-from gyrobench.reduction.drift.pulses import Pulses, Windows
-from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.drift.drift_terms import OneLoopSetup
+from gyrobench.reduction.drift.rest_test import SMALL, RestTest
 from gyrobench.reduction.setup import sources
-from gyrobench.reduction.setup.setups import scale_factor_problems
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
-    Candidate,
-    DriftTest,
     Effect,
     Findings,
     Group,
-    RebalanceSetup,
     ReductionError,
-    Regression,
     RunDocument,
     Table,
-    number,
-    truth_of,
     window_problems,
 )  # fmt: skip
 from gyrobench.units import DPH
@@ -49,49 +43,39 @@ from .geometry import ANGLES
 COLUMNS = ("phase", "t_start", "t_end", *ANGLES, "mean")
 AXES = ("outer", "inner")
 STILL = 1e-4  # rad that a table may move while the current is averaged (20 arcsec: encoders jitter)
-SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoAxisSetup(RebalanceSetup):
-    """k: torquer scale factor, rad/s/A.  m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.
-    path: the positions lie on the path of this ratio, and not anywhere.
-    quantum: resolution of the current reading.  pulses: those of a pulse-width rebalance, where it was counted.
+class TwoAxisSetup(OneLoopSetup):
+    """m, n: ratio of the angles.  harmonic: the harmonic route is insisted on.  path: the positions lie on the path of
+    this ratio, and not anywhere.
     """
 
-    k: float
     m: int = 5
     n: int = 1
     harmonic: bool = False
     path: bool = True
-    quantum: float = 0.0
-    pulses: Pulses | None = None
-    u_pulse: float = 0.0
-    u_switching: float = 0.0
     u_square: float = 0.0
     u_angle1: float = 0.0
     u_angle2: float = 0.0
     u_wobble: float = 0.0
 
 
-class Reduction(DriftTest[TwoAxisSetup]):
+class Reduction(RestTest[TwoAxisSetup]):
     """Nine drift coefficients from averages at rest: columns :data:`COLUMNS`; phase: number of the position."""
 
     handling = staticmethod(handling_candidates.two_axes)
+    names = geometry.NAMES
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> TwoAxisSetup:
         return TwoAxisSetup.of(
             run,
-            k=number(run, "k", "gyro.k", "torquer scale factor"),
             m=int(run.options.get("m", 5)),
             n=int(run.options.get("n", 1)),
             harmonic=bool(run.options.get("harmonic", False)),
             path=not run.options.get("visits", ""),
-            truth=truth_of(run, drift.NAMES),
-            quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
-            pulses=Pulses.of(run),
         )
 
     def problems(self) -> list[str]:
@@ -99,8 +83,7 @@ class Reduction(DriftTest[TwoAxisSetup]):
         problems = frames.latitude_problems(s.latitude)
         if not problems and abs(math.degrees(s.latitude)) > 85.0:
             problems = geometry.refusals(s.latitude, 5, 1, 36)
-        problems += s.problems() + scale_factor_problems(s.k) + window_problems(self.windows, COLUMNS)
-        return problems or self._position_problems()
+        return problems + s.problems() + window_problems(self.windows, COLUMNS) or self._position_problems()
 
     def _position_problems(self) -> list[str]:
         """Return tables that move while sampling, too few positions."""
@@ -121,69 +104,48 @@ class Reduction(DriftTest[TwoAxisSetup]):
             found.append(f"{len(places)} different positions for {least} coefficients: at least {least}")
         return found
 
-    def regression(self) -> Regression:
-        s = self.setup
-        w = {c: np.asarray(self.windows[c], dtype=float) for c in COLUMNS}
-        self.angles = outer, inner = tuple((w[f"{a}_start"] + w[f"{a}_end"]) / 2.0 for a in AXES)
-        self.phase, length = w["phase"], w["t_end"] - w["t_start"]
-        current = w["mean"] if s.polarity == "project" else -w["mean"]
-        spread = np.asarray(self.windows.get("std", np.zeros_like(current)), dtype=float)
-        self.read = Windows(current, spread, length)
-        self.axes = geometry.attitude(s.latitude, outer, inner)
-        rate = self.axes[:, 0] @ frames.earth_rate_local(s.latitude, s.earth_rate)
-        y, X = rate - s.k * current, self._design(self.axes)
-        self.theta = outer / s.m
-        self.harmonics: list[dict[str, Any]] = []
-        self.checks: list[Table] = []
-        book, self.no_closed = self._harmonic_route(length, y)
-        if s.harmonic and self.no_closed:
-            raise ReductionError(self.no_closed)
-        quantities = [drift_terms.quantity(s, n, book) for n in geometry.NAMES]
-        weighed = self._candidates(rate, X, y) if s.nuisances else []
-        return Regression(quantities, X, y, w["t_start"], w["t_end"], [self._group()], candidates=weighed)
+    @cached_property
+    def angles(self) -> tuple[Array, Array]:
+        """Outer and inner angle, means over each window, rad."""
+        w = {n: np.asarray(self.windows[n], dtype=float) for n in ANGLES}
+        return (w["outer_start"] + w["outer_end"]) / 2.0, (w["inner_start"] + w["inner_end"]) / 2.0
 
-    def _design(self, axes: Array) -> Array:
-        """Return the regressors (k, 9) in attitudes (k, 3, 3)."""
-        return drift.regressors(-axes @ frames.U * self.setup.gamma, geometry.NAMES)
+    @property
+    def attitudes(self) -> Array:
+        return geometry.attitude(self.setup.latitude, *self.angles)
 
-    def _candidates(self, rate: Array, X: Array, y: Array) -> list[Candidate]:
-        """Return set-up effects: misalignments of the input axis, trend, temperature, torquer.  Turned about the inner
-        axis, output and spin axis see the Earth rate by the cosine and the sine of its angle; the drift that the axis
-        sees with them is that of least squares.
-        """
-        earth = frames.earth_rate_local(self.setup.latitude, self.setup.earth_rate)
-        start = np.linalg.lstsq(X, y, rcond=None)[0]
+    @cached_property
+    def theta(self) -> Array:
+        """Place on the path, rad."""
+        out: Array = self.angles[0] / self.setup.m
+        return out
 
-        def misalignment(k: int) -> Array:
-            other = frames.rotation(np.eye(3)[k], SMALL) @ self.axes
-            out: Array = (other[:, 0] @ earth - rate - (self._design(other) - X) @ start) / SMALL
-            return out
-
-        text = "misalignment of the input axis towards the"
-        return [
-            Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2)),
-            Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1)),
-            *nuisances.common(self.windows),
-            *nuisances.torquer(nuisances.fitted(rate, X, y)),
-        ]
-
-    def _group(self) -> Group:
+    def group(self) -> Group:
         """Return drift against the path, or against the number of the visit where the positions lie on none."""
-        s, every = self.setup, np.arange(self.phase.size)
+        s, phase = self.setup, np.asarray(self.windows["phase"], dtype=float)
+        every = np.arange(phase.size)
         if not s.path:
-            return Group("positions", every, self.phase, "number of the position", "")
+            return Group("positions", every, phase, "number of the position", "")
         dense = np.radians(np.arange(0.0, 360.5, 0.5))
-        curve = self._design(geometry.attitude(s.latitude, s.m * dense, s.n * dense))
+        curve = self.design(geometry.attitude(s.latitude, s.m * dense, s.n * dense))
         x = np.degrees(np.mod(self.theta + 1e-9, TURN))
         return Group(f"positions {s.m}:{s.n}", every, x, "θ", "°", (np.degrees(dense), curve))
 
     # ----------------------------------------------------------------------------------------- harmonic route
-    def _harmonic_route(self, length: Array, y: Array) -> tuple[dict[str, float], list[str]]:
+    def closed(self, y: Array) -> dict[str, float]:
+        self.harmonics: list[dict[str, Any]] = []
+        self.checks: list[Table] = []
+        book, self.no_closed = self._harmonic_route(y)
+        if self.setup.harmonic and self.no_closed:
+            raise ReductionError(self.no_closed)
+        return book
+
+    def _harmonic_route(self, y: Array) -> tuple[dict[str, float], list[str]]:
         """Return the coefficients by the formulas of Hu 1981, and why not; amplitudes and checks are kept."""
-        s, theta, numbers = self.setup, self.theta, np.unique(self.phase)
+        s, theta, length, phase = self.setup, self.theta, self.read.length, np.asarray(self.windows["phase"])
         if not s.path:
             return {}, ["the positions do not lie on a path"]
-        rows = [self.phase == p for p in numbers]
+        rows = [phase == p for p in np.unique(phase)]
         at = np.array([float(np.mean(theta[r])) for r in rows])
         mean = np.array([float(np.average(y[r], weights=length[r])) for r in rows])
         places = np.unique(np.round(np.mod(at + 1e-5, TURN), 4))
@@ -233,44 +195,36 @@ class Reduction(DriftTest[TwoAxisSetup]):
             )  # fmt: skip
 
     def effects(self, found: Findings) -> list[Effect]:
-        s, C, earth = self.setup, self.axes, frames.earth_rate_local(self.setup.latitude, self.setup.earth_rate)
-        outer, inner = self.angles
-
-        def believed(other: Array) -> Array:  # the gyro axes are C, and are taken for these
-            return found.error((other - C)[:, 0] @ earth, self._design(other) - found.X) / SMALL
+        s, (outer, inner) = self.setup, self.angles
 
         def tilted(direction: Array) -> Array:
-            return -believed(C @ frames.rotation(direction, SMALL).T)
+            return -self.believed(found, self.axes @ frames.rotation(direction, SMALL).T)
 
         def read(axis: int, n: int) -> Array:  # an encoder that reads too much by sin n q, and by cos n q
             both = []
             for wave in (np.sin, np.cos):
                 error = SMALL * wave(n * (outer, inner)[axis])
                 wrong = (outer + error, inner) if axis == 0 else (outer, inner + error)
-                both.append(believed(geometry.attitude(s.latitude, *wrong)))
+                both.append(self.believed(found, geometry.attitude(s.latitude, *wrong)))
             return np.array(both)
 
         def wobbling(axis: int) -> Array:
             sizes = (SMALL * (axis == 0), SMALL * (axis == 1))
             turned = [geometry.attitude(s.latitude, outer, inner, 0.0, sizes, p) for p in (0.0, math.pi / 2.0)]
-            return -np.array([believed(one) for one in turned])
+            return -np.array([self.believed(found, one) for one in turned])
 
         base = geometry.base(s.latitude)
         return [
             sources.OUTER_POLE_EAST.effect(s, tilted(base[2])),
             sources.OUTER_POLE_NORMAL.effect(s, tilted(-base[1])),
-            sources.SQUARE.effect(s, -believed(geometry.attitude(s.latitude, outer, inner, SMALL))),
-            *(
-                sources.TURNED[n].effect(s, believed(frames.rotation(d, SMALL) @ C))
-                for n, d in zip(("input", "output", "spin"), np.eye(3), strict=True)
-            ),
+            sources.SQUARE.effect(s, -self.believed(found, geometry.attitude(s.latitude, outer, inner, SMALL))),
             *(
                 sources.ANGLE_OF[often].of(axis=name).effect(s, read(k, n))
                 for n, often in ((1, "once"), (2, "twice"))
                 for k, name in enumerate(AXES)
             ),
             *(sources.WOBBLE_OF.of(axis=name).effect(s, wobbling(k)) for k, name in enumerate(AXES)),
-            *drift_terms.torquer_effects(s, found, s.k, self.read, s.quantum, s.pulses),
+            *super().effects(found),
         ]
 
     def account(self, found: Findings) -> Account:
@@ -284,7 +238,7 @@ class Reduction(DriftTest[TwoAxisSetup]):
                 "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
                 "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
             ],
-            equation=drift_terms.equation('omega_"IA" - k i = omega_d = ', geometry.NAMES),
+            equation=self.equation,
             conventions=[
                 *s.sign_conventions(s.k),
                 "Gyro axes I, O, S right-handed; local frame east, north, up; table angles right-handed, outer axis "

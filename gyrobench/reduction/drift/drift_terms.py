@@ -6,18 +6,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
-from gyrobench import frames
+from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import pulses as pulse_sources
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup.setups import RebalanceSetup
+from gyrobench.reduction.setup.run_metadata import number, truth_of
+from gyrobench.reduction.setup.setups import RebalanceSetup, scale_factor_problems
 from gyrobench.reduction.setup.sources import (
     CURRENT_OFFSET,
     CURRENT_OFFSET_OF,
@@ -37,6 +39,31 @@ NO_OO = "D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS
 EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
 SMALL = 1e-5  # rad
 AXES = {"I": "X", "O": "Y", "S": "Z"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneLoopSetup(RebalanceSetup):
+    """One rebalance loop.  k: torquer scale factor, rad/s/A.  quantum: resolution of the current reading.  pulses:
+    those of a pulse-width rebalance, where the current was counted.
+    """
+
+    k: float
+    quantum: float = 0.0
+    pulses: Pulses | None = None
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        """Return the setup that a run.json describes.  Scale factor: option ``k``, else the gyro's parameter ``k``."""
+        shared: dict[str, Any] = {"k": number(run, "k", "gyro.k", "torquer scale factor")}
+        shared["truth"] = truth_of(run, drift.NAMES)
+        shared["quantum"] = float(run.parameters.get("rebalance.resolution", 0.0))
+        shared["pulses"] = Pulses.of(run)
+        return super().of(run, **{**shared, **own})
+
+    def problems(self, folding: bool = True) -> list[str]:
+        return super().problems(folding) + scale_factor_problems(self.k)
 
 
 def quantity(s: RebalanceSetup, name: str, closed: Mapping[str, float]) -> Quantity:
