@@ -108,7 +108,7 @@ def _judged(
         if reason.becomes == INCONCLUSIVE:
             text = f"Inconclusive instead of {words}: {which}. {reason.text}"
             taken.append(Reason(f"{WITHHELD}:{reason.id}", text, severity="error"))
-    ordered = sorted([*taken, *dict.fromkeys(reasons)], key=lambda r: SEVERITIES.index(r.severity))
+    ordered = sorted([*dict.fromkeys(reasons), *taken], key=lambda r: SEVERITIES.index(r.severity))
     return judged, ordered
 
 
