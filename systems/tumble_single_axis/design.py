@@ -20,7 +20,7 @@ from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
-from .setup import TumbleSetup, setup_of
+from .reduction import Reduction, TumbleSetup
 
 TURN = 2.0 * math.pi
 TURNS = (1, 2, 4)
@@ -33,7 +33,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
 
     Faster turning costs no time and lifts the signal above slow drift; the rate is kept below 60 Earth rates.
     """
-    setup, p = setup_of(record.run), record.run.parameters
+    setup, p = Reduction.setup_of(record.run), record.run.parameters
     share = float(system["dwell"] * system["rate"] / (TURN * system["turns"]))
     own = (int(system["turns"]), share)
     each = [own, *((n, s) for n in TURNS for s in SHARES if (n, s) != own)]

@@ -15,27 +15,64 @@ Not modelled: change of the drift with time other than linear, torquer nonlinear
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms
+from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
+from gyrobench.reduction.setup.setups import TurningSetup
 from gyrobench.reduction.setup.sources import INPUT_TO_OUTPUT, INPUT_TO_SPIN, TURNED
-from gyrobench.reduction.toolkit import Account, Array, Findings, Quantity, Reason, Regression, window_problems
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Findings,
+    Quantity,
+    Reason,
+    Regression,
+    RunDocument,
+    Site,
+    window_problems,
+)
 
 from . import closed
-from .refusals import plan_problems, setup_problems
-from .setup import TumbleSetup, setup_of
+from .refusals import refusals
+
+
+@dataclass(frozen=True, kw_only=True)
+class TumbleSetup(TurningSetup, OneLoopSetup):
+    """terms: of the model.  tilt: the small angle of the input axis towards the output axis (where it is estimated D_O
+    rests on the dwells).
+    """
+
+    terms: int = 9
+
+    def problems(self, folding: bool = True) -> list[str]:
+        problems = refusals(self.latitude) + super().problems(folding)
+        if self.terms not in drift.TERM_SETS:
+            problems.append(f"{self.terms}-term model unknown; there are {', '.join(map(str, drift.TERM_SETS))}")
+        if self.terms == 10 and not self.fold:
+            problems.append(
+                "ten terms have rank 9 at constant |g|: the data do not see D_II + D_OO + D_SS − γ² D_F; reduce nine "
+                "terms, or set fold to report the combinations"
+            )
+        return problems
 
 
 class Reduction(TurningTest[TumbleSetup]):
     """Nine drift coefficients from the windows of a tumble."""
 
     handling = staticmethod(handling_candidates.tumble)
-    setup_of = staticmethod(setup_of)
     mounting = ((INPUT_TO_OUTPUT, 2, 1.0), (INPUT_TO_SPIN, 1, -1.0), (TURNED["input"], 0, 1.0))
 
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> TumbleSetup:
+        faces = frames.tumble_faces(Site.of(run).latitude)
+        return TumbleSetup.of_plan(run, faces, terms=int(run.options.get("terms", 9)))
+
     def problems(self) -> list[str]:
-        return setup_problems(self.setup) + window_problems(self.windows) or plan_problems(self.setup, self.windows)
+        return self.setup.problems() + window_problems(self.windows) or self.plan_problems()
 
     def regression(self) -> Regression:
         s = self.setup

@@ -1,17 +1,13 @@
-"""What makes a tumble impossible: latitude, setup, plan and record.  [TUM1-SING; INPUT-LIMITS]"""
+"""Latitudes at which a tumble is impossible.  [TUM1-SING; INPUT-LIMITS]"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
-
-from .setup import TumbleSetup
 
 
 def refusals(latitude: float) -> list[str]:
@@ -30,31 +26,3 @@ def refusals(latitude: float) -> list[str]:
     if design.rank < 9:
         return [f"{where}rank {design.rank} of 9, the record does not see {'; '.join(design.lost)}"]
     return [f"{where}condition {design.condition:.3g}, hardly seen is {design.weakest}"]
-
-
-def setup_problems(s: TumbleSetup) -> list[str]:
-    problems = refusals(s.latitude) + s.problems()
-    if s.terms not in drift.TERM_SETS:
-        problems.append(f"{s.terms}-term model unknown; there are {', '.join(map(str, drift.TERM_SETS))}")
-    if s.terms == 10 and not s.fold:
-        problems.append(
-            "ten terms have rank 9 at constant |g|: the data do not see D_II + D_OO + D_SS − γ² D_F; reduce nine "
-            "terms, or set fold to report the combinations"
-        )
-    return problems
-
-
-def plan_problems(s: TumbleSetup, w: Mapping[str, Array]) -> list[str]:
-    """Missing phases, mounts and dwells, tables that stand still, windows too wide."""
-    problems = s.table_problems(w)
-    if len(s.sides(1)) < 2:
-        problems.append(
-            "only one mount: two are needed, output axis along +pole and −pole (D_I, D_IO and D_S, D_OS mix)"
-        )
-    dwells = s.dwells()
-    if len(set(dwells.values())) < 2:
-        problems.append(
-            f"{'only one dwell' if dwells else 'no dwells'} with the output axis vertical, up and down are needed: D_F "
-            "cannot be told from D_II + D_SS"
-        )
-    return problems

@@ -28,9 +28,7 @@ AXIS = {"x": 0, "y": 1}
 #: of the simple model, in the order of the R, u, u_z, Q of Hu 1981
 SIMPLE = {"x": ("Dx_0", "Dx_x", "Dx_z", "Dx_xz"), "y": ("Dy_0", "Dy_y", "Dy_z", "Dy_yz")}
 
-
-#: channel -> the square that cannot be told from the others at constant |g|, and the three that take it up
-FOLD = {channel: (square, drift.FOLDED[square]) for channel, square in (("x", "Dx_yy"), ("y", "Dy_xx"))}
+SQUARES = {"x": "Dx_yy", "y": "Dy_xx"}  # of each channel, what cannot be told from the others at constant |g|
 
 
 def terms(model: str, channel: str) -> tuple[str, ...]:

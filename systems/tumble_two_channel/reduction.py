@@ -14,15 +14,17 @@ independent mount errors.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gyrobench import drift
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms, window_regressors
+from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.setup.setups import TurningSetup, scale_factor_problems
 from gyrobench.reduction.setup.sources import TURNED
 from gyrobench.reduction.toolkit import (
     Account,
@@ -31,22 +33,44 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Quantity,
     Reason,
+    RunDocument,
+    Site,
     Table,
+    number,
+    truth_of,
     window_problems,
 )
 from gyrobench.units import DPH
 
 from . import closed, geometry
-from .refusals import plan_problems, setup_problems
-from .setup import OTHER, TwoChannelSetup, setup_of
 
 COLUMNS = ("phase", "t_start", "t_end", "angle_start", "angle_end", "mean_x", "mean_y")
+
+
+OTHER = {"x": "y", "y": "x"}  # the torquer that measures a channel stands about the other axis
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoChannelSetup(TurningSetup):
+    """k: scale factors of the torquers about x and y, rad/s/A.  model: simple or nine.  fold: Dx_yy and Dy_xx may be
+    there and are folded into others.  tilt: those of the measuring axes towards the spin axis.
+    quantum: resolution of each current reading.  pulses: of pulse-width rebalances, by the torquer's axis.
+    """
+
+    k: Mapping[str, float]
+    model: str = "nine"
+    quantum: Mapping[str, float] = field(default_factory=dict)
+    pulses: Mapping[str, Pulses | None] = field(default_factory=dict)
+    u_pulse: float = 0.0
+    u_switching: float = 0.0
 
 
 class TumbleChannel(TurningTest[TwoChannelSetup]):
     """One channel, with the current of the torquer about the other axis."""
 
     across = 2
+    rotates, upright = "spin axis", "y axis"
+    mixed, lost = "constants and z terms mix", "the constants cannot be told from the squares"
     mounting = tuple((TURNED[n], k, 1.0) for k, n in enumerate("xyz"))
 
     def __init__(self, windows: Mapping[str, Array], setup: TwoChannelSetup, channel: str) -> None:
@@ -57,7 +81,7 @@ class TumbleChannel(TurningTest[TwoChannelSetup]):
         self.terms, self.k = geometry.terms(setup.model, channel), setup.k[self.torquer]
         self.quantum, self.pulses = setup.quantum.get(self.torquer, 0.0), setup.pulses.get(self.torquer)
         self.elsewhere = drift_terms.elsewhere(channel)
-        self.square, self.into = geometry.FOLD[channel]
+        self.square = geometry.SQUARES[channel]
 
     def closed(self, y: Array) -> Formulas:
         s, c = self.setup, self.channel
@@ -73,26 +97,11 @@ class TumbleChannel(TurningTest[TwoChannelSetup]):
         return {closed.BOOK[b][0]: closed.BOOK[b][1] * v for b, v in symbols.items()}, fits, ""
 
     def quantity(self, name: str) -> Quantity:
-        s, truth = self.setup, None
-        nine = s.model == "nine" and name in self.into
-        constant = name == self.into[0]
-        if s.truth is not None:
-            extra = s.truth.get(self.square, 0.0) * (s.gamma**2 if constant else -1.0) if nine else 0.0
-            truth = s.truth.get(name, 0.0) + extra
-        q = Quantity.drift(name, truth, self.book.get(name))
-        if not (nine and s.fold):
-            return q
-        shown = f"{name} + γ² {self.square}" if constant else f"{name} − {self.square}"
-        return replace(q, shown=shown, meaning=f"{q.meaning}, with {self.square} folded in")
+        return drift_terms.quantity(self.setup, name, self.book, self.square if self.setup.model == "nine" else "")
 
     def account(self, found: Findings) -> Account:
-        s, (square, into) = self.setup, (self.square, self.into)
-        simple = s.model == "simple"
+        s, simple = self.setup, self.setup.model == "simple"
         part = ("two mounts, simple model", "A") if simple else ("two mounts and two dwells, nine terms", "B")
-        folded = (
-            f"{square} is folded: at constant |g| only {into[0]} + γ² {square}, {into[1]} − {square} and {into[2]} − "
-            f"{square} can be had (γ = g/g0 = {s.gamma:.6f}); separating them needs a centrifuge."
-        )
         left_out, said = self._left_out(found)
         return Account(
             method=f"Torque-rebalance tumble of both channels about the polar axis, {part[0]}; least squares of each "
@@ -113,7 +122,7 @@ class TumbleChannel(TurningTest[TwoChannelSetup]):
             repeatability=self.turns.repeatability(),
             reasons=[
                 *said,
-                *([Reason("drift.folded", folded)] if not simple and s.fold else []),
+                *([] if simple else drift_terms.folded(s, self.square)),
                 *(Reason("latitude.weak", text) for text in geometry.cautions(s.latitude)),
             ],
         )
@@ -151,12 +160,34 @@ class Reduction(ChannelTests[TwoChannelSetup]):
     """Both channels from windows with :data:`COLUMNS` (mean_x, mean_y: currents of the torquers about x and y, A)."""
 
     handling = staticmethod(handling_candidates.tumble)
-    setup_of = staticmethod(setup_of)
     channel = TumbleChannel
 
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> TwoChannelSetup:
+        model = str(run.options.get("model", "nine"))
+        return TwoChannelSetup.of_plan(
+            run,
+            geometry.faces(model, Site.of(run).latitude),
+            k={a: number(run, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}") for a in "xy"},
+            model=model,
+            truth=truth_of(run, (n for c in "xy" for n in drift.NAMES_2DOF[c])),
+            quantum={a: float(run.parameters.get(f"rebalance_{a}.resolution", 0.0)) for a in "xy"},
+            pulses={a: Pulses.of(run, f"rebalance_{a}") for a in "xy"},
+        )
+
     def problems(self) -> list[str]:
-        problems = setup_problems(self.setup) + window_problems(self.windows, COLUMNS)
-        return problems or plan_problems(self.setup, self.windows)
+        s, w, nine = self.setup, self.windows, self.setup.model == "nine"
+        problems = geometry.refusals(s.latitude, s.model) + s.problems(nine)
+        problems += [text for a, k in s.k.items() for text in scale_factor_problems(k, f"k_{a}")]
+        if problems := problems + window_problems(w, COLUMNS):
+            return problems
+        x = TumbleChannel(w, s, "x")
+        problems = x.plan_problems(nine)
+        turned = np.asarray(w["angle_end"], dtype=float) - np.asarray(w["angle_start"], dtype=float)
+        turning = np.isin(x.phase, [p for p in s.faces if s.turns(p)])
+        if s.tilt and len(set(np.sign(turned[turning]).tolist())) < 2:
+            problems.append("tilt: turns in both senses are needed to tell the tilt from the z terms")
+        return problems
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
         """Return the simple model in the symbols of Hu 1981."""

@@ -34,7 +34,6 @@ from gyrobench.reduction.setup.sources import (
 )
 from gyrobench.result import Reason
 
-FOLDED = {"D_F": "D_F + γ² D_OO", "D_II": "D_II − D_OO", "D_SS": "D_SS − D_OO"}
 NO_OO = "D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."
 EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
 SMALL = 1e-5  # rad
@@ -66,23 +65,29 @@ class OneLoopSetup(RebalanceSetup):
         return super().problems(folding) + scale_factor_problems(self.k)
 
 
-def quantity(s: RebalanceSetup, name: str, closed: Mapping[str, float]) -> Quantity:
-    """Return a coefficient of the model at one |g|, where D_OO cannot be told from the others: it is in their truth."""
-    truth = None
+def quantity(s: RebalanceSetup, name: str, closed: Mapping[str, float], square: str = "D_OO") -> Quantity:
+    """Return a coefficient of the model at one |g|, where a square cannot be told from others: it is in their truth.
+
+    square: D_OO, or of a channel Dx_yy or Dy_xx; "" where the model has no squares.
+    """
+    into = drift.FOLDED.get(square, ())
+    constant, truth = name == into[0] if into else False, None
     if s.truth is not None:
-        oo = s.truth.get("D_OO", 0.0)
-        truth = s.truth.get(name, 0.0) + {"D_F": oo * s.gamma**2, "D_II": -oo, "D_SS": -oo}.get(name, 0.0)
+        extra = s.truth.get(square, 0.0) * (s.gamma**2 if constant else -1.0) if name in into else 0.0
+        truth = s.truth.get(name, 0.0) + extra
     q = Quantity.drift(name, truth, closed.get(name))
-    if not s.fold or name not in FOLDED:
+    if not s.fold or name not in into:
         return q
-    return replace(q, meaning=f"{q.meaning}, with D_OO folded in", shown=FOLDED[name])
+    shown = f"{name} + γ² {square}" if constant else f"{name} − {square}"
+    return replace(q, meaning=f"{q.meaning}, with {square} folded in", shown=shown)
 
 
-def folded(s: RebalanceSetup) -> list[Reason]:
-    """Return that D_OO is folded into others, where it is."""
+def folded(s: RebalanceSetup, square: str = "D_OO") -> list[Reason]:
+    """Return that a square is folded into others, where it is."""
+    a, b, c = drift.FOLDED[square]
     text = (
-        "D_OO is folded: at constant |g| only D_F + γ² D_OO, D_II − D_OO and D_SS − D_OO can be had (γ = g/g0 = "
-        f"{s.gamma:.6f}); separating them needs |f| ≠ 1 g, a centrifuge."
+        f"{square} is folded: at constant |g| only {a} + γ² {square}, {b} − {square} and {c} − {square} can be had "
+        f"(γ = g/g0 = {s.gamma:.6f}); separating them needs |f| ≠ 1 g, a centrifuge."
     )
     return [Reason("drift.folded", text)] if s.fold else []
 

@@ -50,7 +50,9 @@ class TurningTest(DriftTest[T]):
 
     axis: of the gyro, that is measured.  across: towards which it may lean, by an angle called ``tilt``.  held: highest
     harmonic of the model.  mounting: sources of the mount, with the axis (and its sense) that the gyro is turned about.
-    channel, torquer: of a gyro with two channels, which one, and the axis of the torquer that measures it.
+    channel, torquer: of a gyro with two channels, which one, and the axis of the torquer that measures it.  rotates,
+    upright: name of the gyro axis along that of the turning table, and of the one that is vertical in dwells; mixed,
+    lost: what one mount mixes, and what dwells of one sense leave together.
     """
 
     axis: int = 0
@@ -58,6 +60,9 @@ class TurningTest(DriftTest[T]):
     tilt: str = "ε_IO"
     tilt_meaning: str = "misalignment of the input axis towards the output axis"
     held: int = 2
+    rotates = upright = "output axis"
+    mixed = "D_I, D_IO and D_S, D_OS mix"
+    lost = "D_F cannot be told from D_II + D_SS"
     channel: str = ""
     torquer: str = ""
     mounting: ClassVar[Sequence[tuple[Source, int, float]]] = ()
@@ -113,6 +118,17 @@ class TurningTest(DriftTest[T]):
         base = self.setup.base if base is None else base
         X = window_regressors.regressors(turning, base, self.setup.gravity, self.terms)
         return np.column_stack([X, -self.rate(turning, base, self.across)]) if self.setup.tilt else X
+
+    def plan_problems(self, dwells: bool = True) -> list[str]:
+        """Return missing phases and mounts, tables that stand still, windows too wide; with ``dwells`` missing ones."""
+        s, problems = self.setup, self.setup.table_problems(self.windows)
+        if len(s.sides(self.across)) < 2:
+            problems.append(f"only one mount: two are needed, {self.rotates} along +pole and −pole ({self.mixed})")
+        found = s.dwells()
+        if dwells and len(set(found.values())) < 2:
+            few = "only one dwell" if found else "no dwells"
+            problems.append(f"{few} with the {self.upright} vertical, up and down are needed: {self.lost}")
+        return problems
 
     # ------------------------------------------------------------------------------ fit
     def regression(self) -> Regression:
