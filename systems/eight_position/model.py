@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench import units
+from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
@@ -36,6 +36,7 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import positions
 
+SMALL = 1e-5  # rad, step of the perturbations
 MEANING = {
     "k_x": "scale factor of the torquer about x",
     "k_y": "scale factor of the torquer about y",
@@ -97,7 +98,7 @@ def drift_columns(channel: str, d: Array, terms: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearCurrent:
     """y = X a for a current: X (n, terms), y (n,) in rad/s; unknowns k - k0 (rad/s/A), R, u, u_z, q, s (rad/s)."""
 
     k0: float
@@ -106,7 +107,7 @@ class Linear:
     y: Array
 
 
-def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) -> Linear:
+def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) -> LinearCurrent:
     """The fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's rate."""
     w, D = rate(channel, d, setup.earth_rate), drift_columns(channel, d, setup.terms)
     names = (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]
@@ -128,7 +129,26 @@ def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) ->
             f"the {channel} current round (or the positions {a} and {b} are exchanged)"
         )
     predicted = (w - D @ start) / k0
-    return Linear(k0, start, np.column_stack([predicted, D]), w - k0 * current)
+    return LinearCurrent(k0, start, np.column_stack([predicted, D]), w - k0 * current)
+
+
+def turned(axis: str, angle: float, numbers: tuple[int, ...]) -> dict[int, Array]:
+    """Return attitudes with the gyro turned by ``angle`` (rad) about its own ``axis`` in the positions ``numbers``."""
+    R = frames.rotation(np.eye(3)["xyz".index(axis)], angle)
+    return {n: R.T @ positions.ATTITUDES[n] for n in numbers}
+
+
+def attitude_error(
+    channel: str, setup: EightPositionSetup, found: Findings, lin: LinearCurrent, position: NDArray[np.int_],
+    attitudes: dict[int, Array],
+) -> Array:  # fmt: skip
+    """Return the error of the data (n,) when the positions were ``attitudes`` and the nominal ones are believed."""
+    believed = directions(position, setup.latitude)
+    real = directions(position, setup.latitude, attitudes)
+    # y = w - k I is formed with the believed w while k I = w_real - drift_real
+    dw = rate(channel, real, setup.earth_rate) - rate(channel, believed, setup.earth_rate)
+    D = drift_columns(channel, real, setup.terms) - drift_columns(channel, believed, setup.terms)
+    return found.error(D @ lin.start - dw)
 
 
 def quantities(channel: str, setup: EightPositionSetup, closed: Mapping[str, float]) -> list[Quantity]:
@@ -166,7 +186,7 @@ def made_of(name: str, setup: EightPositionSetup) -> dict[str, float]:
 
 
 def reported(found: Findings, wanted: list[Quantity], setup: EightPositionSetup, k0: float) -> Findings:
-    """The unknowns of :class:`Linear` in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
+    """Return the unknowns of a current in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
     r, after = found.reported, found.quantities[len(wanted) :]  # effects of the nuisance model stay as they are
     factor, offset = np.ones(r.value.size), np.zeros(r.value.size)
     offset[0] = k0

@@ -12,6 +12,7 @@ otherwise than evenly or as noise, motion between the positions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -23,8 +24,10 @@ from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.pulses import Pulses, Windows
 from gyrobench.reduction.estimation import nuisances, residual_series
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.setup.run_metadata import phases
+from gyrobench.reduction.setup.sources import LATITUDE, TURNED
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -40,6 +43,7 @@ from gyrobench.reduction.toolkit import (
     ReductionError,
     Regression,
     RunDocument,
+    Source,
     Table,
     told,
     truth_of,
@@ -47,9 +51,14 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import DPH
 
-from . import budget, model, positions, refusals, tables
+from . import model, positions, refusals, tables
 from .model import EightPositionSetup
 
+ATTITUDE = Source(
+    "position.attitude", "attitude of each position", "rad", "u_attitude",
+    "about each axis, the positions independent of one another",
+)  # fmt: skip
+IN_FIXTURE = {n: replace(TURNED[n], name=f"{TURNED[n].name} in the fixture") for n in "xyz"}
 AVERAGED = 4  # cycles from which on the readings of a position are averaged first
 COLUMNS = ("position", "cycle", "t_start", "t_end", "mean_x", "mean_y")
 ALONE = {"x": ("1", "3"), "y": ("2", "4")}  # positions whose difference is the scale factor
@@ -104,7 +113,35 @@ class CurrentChannel(DriftTest[EightPositionSetup]):
         return found
 
     def effects(self, found: Findings) -> list[Effect]:
-        return budget.effects(self.channel, self.setup, found, self.linear, self.read, self.position)
+        """Return all sources with their sensitivities; sizes come from the setup and may be 0.
+
+        An attitude error turns the gyro by a small angle about one of its axes in one position (independent: the
+        squares of the eight add up; an error of the index head is one of them) or in all of them (mount).  Largest: W
+        eps, 7.3e-4 deg/h for 10 arcsec.  A latitude stated too large by delta changes k by -tan(latitude) delta
+        relative.  Not modelled: products of gravity components that an attitude error lets in (D_xy eps and the like),
+        drift of the meters.
+        """
+        c, s, lin, position, current = self.channel, self.setup, self.linear, self.position, self.read.mean
+        pulses, every = s.pulses.get(c), tuple(positions.ATTITUDES)
+        wrong = {a: model.turned(a, model.SMALL, every) for a in "xyz"}
+        turns = {a: model.attitude_error(c, s, found, lin, position, w) / model.SMALL for a, w in wrong.items()}
+        d0, d1 = (model.directions(position, x) for x in (s.latitude, s.latitude + model.SMALL))
+        dw = model.rate(c, d1, s.earth_rate) - model.rate(c, d0, s.earth_rate)
+        full = float(np.max(np.abs(current))) or 1.0
+        offset = found.error(-lin.k0)
+        _, nonlinearity, zero, resolution = drift_terms.torquer_sources(
+            c, f"{full * 1e3:.3g} mA"
+        )  # the scale factor is a result
+        parts = tuple(f"position {n} about {axis}" for axis in turns for n in np.unique(position))
+        return [
+            ATTITUDE.effect(s, np.vstack([one_by_one(turn, position) for turn in turns.values()]), parts=parts),
+            *(IN_FIXTURE[axis].effect(s, turn) for axis, turn in turns.items()),
+            LATITUDE.effect(s, found.error(dw) / model.SMALL),
+            zero.effect(s, offset),
+            resolution.effect(s.quantum.get(c, 0.0) / math.sqrt(12.0), offset),
+            nonlinearity.effect(s, found.error(-lin.k0 * current * np.abs(current) / full)),
+            *(pulses.effects(found, lin.k0, self.read, s, c) if pulses else ()),
+        ]
 
     def test(self, found: Findings) -> None:
         each = [(self.position == n).astype(float) for n in tables.left_over(self.channel, self.setup.terms)]

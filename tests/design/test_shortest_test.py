@@ -90,7 +90,7 @@ def test_windows_of_a_tumble_are_those_of_its_reduction() -> None:
     assert isinstance(protocol, OptionProtocol) and protocol.noise is not None
     length = 2.0 * np.pi / float(system["rate"])
     module = importlib.import_module(".design", type(system).__module__)
-    setup = importlib.import_module(".setup", type(system).__module__).setup_of(record.run)
+    setup = importlib.import_module(".reduction", type(system).__module__).Reduction.setup_of(record.run)
     X, t0, t1 = module._windows(system, setup, 1, 100.0 / length, length)
     fit = fits[0][0]
     assert pytest.approx(fit.X, abs=5e-4) == X

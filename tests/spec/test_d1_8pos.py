@@ -332,7 +332,6 @@ def test_attitude_shift_as_predicted() -> None:
     """Each position turned by 20 arcsec about each axis, one at a time: what the reduction gives is what the
     sensitivities say, to second order.
     """
-    budget = importlib.import_module(".budget", PACKAGE)
     rng, phi = np.random.default_rng(13), math.radians(38.0)
     p, s = gyro(rng), setup(math.radians(38.0))
     I_x, I_y = torque_balance(p, phi)
@@ -341,7 +340,7 @@ def test_attitude_shift_as_predicted() -> None:
     position = w["position"]
     d = M.directions(position, phi)
     for n, axis in itertools.product((1, 4, 5, 6), "xyz"):
-        turned = budget.turned(axis, eps, (n,))
+        turned = M.turned(axis, eps, (n,))
         C = turned[n]
         omega, g = C @ (W * np.array([0.0, math.cos(phi), math.sin(phi)])), C @ -U
         M_x = p["R_x"] - p["u_zx"] * g[1] + p["u_y"] * g[2]
@@ -349,7 +348,7 @@ def test_attitude_shift_as_predicted() -> None:
         lin = M.linear("x", w["mean_x"], d, s)
         found = fit([str(j) for j in range(6)], lin.X, lin.y, w["t_start"], w["t_end"], [], "", "", DPH)
         found = M.reported(found, M.quantities("x", s, {}), s, lin.k0)
-        change = found.gain @ budget.attitude_error("x", s, found, lin, position, turned)
+        change = found.gain @ M.attitude_error("x", s, found, lin, position, turned)
         for j, name in enumerate(("k_x", "R_x", "u_y", "u_zx")):
             scale = KU if name == "k_x" else DPH
             shift = (moved[name].closed - plain[name].closed) * scale  # all readings weigh alike
