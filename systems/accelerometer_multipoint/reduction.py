@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from gyrobench.reduction.toolkit import (
     Array,
     Coefficient,
     DriftTest,
+    DriftTestResult,
     Effect,
     Findings,
     Group,
@@ -230,7 +232,6 @@ class Reduction(DriftTest[MultipointSetup]):
             no_closed=self.no_closed,
             closed_caption="From the same data; where both mounts give a coefficient, the mean of the two",
             tables=_mounts_apart(self.fits),
-            harmonics=self._harmonics(),
             repeatability=self._repeatability(found),
             reasons=self._reasons(),
             random="noise of the accelerometer and scatter of the positions",
@@ -243,6 +244,10 @@ class Reduction(DriftTest[MultipointSetup]):
         if math.isfinite(self.v.within):
             out["scatter of the readings within a position / µg"] = self.v.within / UG
         return out
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Return the result with the harmonics of each mount."""
+        return replace(result, harmonics=self._harmonics())
 
     def _harmonics(self) -> list[dict[str, Any]]:
         out: list[dict[str, Any]] = []

@@ -21,7 +21,7 @@ import numpy as np
 from gyrobench import frames, units
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms
-from gyrobench.reduction.drift.pulses import Pulses, Windows
+from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.estimation import nuisances, residual_series
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.effects import one_by_one
@@ -83,7 +83,7 @@ class CurrentChannel(DriftTest[EightPositionSetup]):
         self.position = position = np.asarray(data["position"]).astype(int)
         current, t0, t1 = (np.asarray(data[n], dtype=float) for n in (f"mean_{c}", "t_start", "t_end"))
         spread = np.asarray(data.get(f"std_{c}", np.zeros_like(current)), dtype=float)
-        self.read = Windows(current, spread, t1 - t0)
+        self.read = CurrentWindows(current, spread, t1 - t0)
         d = model.directions(position, s.latitude)
         self.linear = model.linear(c, current, d, s)
         self.wanted = model.quantities(c, s, closed_formulas(w, s))
@@ -248,7 +248,7 @@ class Reduction(ChannelTests[EightPositionSetup]):
     def result(self) -> DriftTestResult:
         position, cycle = (np.asarray(self.windows[n]).astype(int) for n in ("position", "cycle"))
         mean = {c: np.asarray(self.windows[f"mean_{c}"], dtype=float) for c in "xy"}
-        self.readings = tables.Readings(position, cycle, mean, self.setup)
+        self.readings = tables.PositionReadings(position, cycle, mean, self.setup)
         return replace(super().result(), repeatability=self.readings.repeatability())
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:

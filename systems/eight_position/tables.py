@@ -35,7 +35,7 @@ def scale(name: str) -> float:
     return KU if name.startswith("k") else DPH
 
 
-class Readings:
+class PositionReadings:
     """Readings of both currents: position, cycle (n,); mean: about x and y (n,), A."""
 
     def __init__(

@@ -58,7 +58,7 @@ class PolarModel:
             gone = {"D_II"}
         return cls(names, tuple(n for n in names if n not in gone), mixed, equal)
 
-    def columns(self, held: servo_regression.Held, site: Site) -> Array:
+    def columns(self, held: servo_regression.HeldWindows, site: Site) -> Array:
         """(n, len(fitted))"""
         X = servo_regression.design(held, site, self.names)
         if self.equal:

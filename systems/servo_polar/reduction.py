@@ -82,7 +82,9 @@ class Reduction(HeldTest[PolarSetup]):
 
     def record_problems(self) -> list[str]:
         s = self.setup
-        wrong = refusals.record_problems(self.held, self.phase, s.labels)
+        each = {p: int(np.count_nonzero(self.mine(p))) for p, n in s.labels.items() if n in POLAR}
+        few = "windows: at least 8 are needed"
+        wrong = [f"phase {p} ({s.labels[p]}) has {n} {few}" for p, n in each.items() if 0 < n < 8]
         dwells = {n for n in s.labels.values() if n not in POLAR}
         if s.route == "dwells" and len(set(s.mounts)) > 1 and dwells != {"x east, y up", "x east, y down"}:
             wrong.append(
@@ -93,7 +95,7 @@ class Reduction(HeldTest[PolarSetup]):
             wrong.append(f"no polar mount in the record; phases are {', '.join(s.labels.values())}")
         return wrong
 
-    def columns(self, held: servo_regression.Held) -> Array:
+    def columns(self, held: servo_regression.HeldWindows) -> Array:
         return self.model.columns(held, self.setup.place)
 
     def regression(self) -> Regression:
@@ -112,8 +114,14 @@ class Reduction(HeldTest[PolarSetup]):
         try:
             return data.fit()
         except ReductionError as error:
-            turned = refusals.turned_words(self.held, self.phase, self.setup.labels)
-            raise ReductionError([*error.problems, turned]) from None
+            h, labels = self.held, self.setup.labels
+            turned = [
+                f"{n} {refusals.turned(h.angle_start[self.mine(p)], h.angle_end[self.mine(p)]):.4g}°"
+                for p, n in labels.items()
+                if n in POLAR
+            ]
+            advice = f"the mounts turned by {', '.join(turned)}: more of a turn tells more"
+            raise ReductionError([*error.problems, advice]) from None
 
     def derived(self, found: Findings) -> Findings:
         return self.model.report(found, self.reported)
@@ -126,7 +134,7 @@ class Reduction(HeldTest[PolarSetup]):
         angle = np.degrees(np.mod(((h.angle_start + h.angle_end) / 2.0)[mine], TURN))
         dense = np.radians(np.arange(0.0, 361.0, 3.0))
         axes = np.broadcast_to(on_servo_table(label, self.setup.latitude), (dense.size, 3, 3))
-        still = servo_regression.Held(dense, dense, 0.0 * dense, np.ones_like(dense), axes)
+        still = servo_regression.HeldWindows(dense, dense, 0.0 * dense, np.ones_like(dense), axes)
         return Group(label, mine, angle, "table angle", "°", (np.degrees(dense), self.columns(still)))
 
     def test(self, found: Findings) -> None:

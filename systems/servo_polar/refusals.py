@@ -20,7 +20,9 @@ from gyrobench.units import DPH
 from .model import ROUTES, PolarModel
 
 
-def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, NDArray[np.int_]]:
+def held(
+    latitude: float, phases: Sequence[str], points: int = 36
+) -> tuple[servo_regression.HeldWindows, NDArray[np.int_]]:
     """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(
@@ -28,7 +30,7 @@ def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[serv
     )
     phase = np.repeat(np.arange(len(phases)), [a.size for a in angles])
     a, t = np.concatenate(angles), np.arange(phase.size, dtype=float)
-    return servo_regression.Held(a, a, t, t + 1.0, axes), phase
+    return servo_regression.HeldWindows(a, a, t, t + 1.0, axes), phase
 
 
 def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
@@ -104,24 +106,3 @@ def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
 def turned(start: Array, end: Array) -> float:
     """Degrees turned by the windows of a mount, rad, in their order."""
     return math.degrees(abs(float(end[-1] - start[0])))
-
-
-def turned_words(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> str:
-    """How far each mount turned, for a record that does not tell the coefficients apart."""
-    words = []
-    for p, label in labels.items():
-        if label in POLAR:
-            words.append(f"{label} {turned(held.angle_start[phase == p], held.angle_end[phase == p]):.4g}°")
-    return f"the mounts turned by {', '.join(words)}: more of a turn tells more"
-
-
-def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
-    """Too few windows in a polar mount."""
-    found = []
-    for p, label in labels.items():
-        mine = phase == p
-        if label not in POLAR or not mine.any():
-            continue
-        if np.count_nonzero(mine) < 8:
-            found.append(f"phase {p} ({label}) has {np.count_nonzero(mine)} windows: at least 8 are needed")
-    return found

@@ -11,6 +11,7 @@ gyrobench.reduction.drift.servo_regression.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -43,9 +44,18 @@ class Reduction(HeldTest[HeldSetup]):
     attitudes = (*VERTICAL, *LEVEL)
 
     def record_problems(self) -> list[str]:
-        return refusals.record_problems(self.held, self.phase, self.setup.labels)
+        """Return level attitudes beyond 1 degree."""
+        found, angles = [], np.maximum(np.abs(self.held.angle_start), np.abs(self.held.angle_end))
+        for p, label in self.setup.labels.items():
+            worst = float(np.max(angles[self.mine(p)], initial=0.0))
+            if label in LEVEL and worst > refusals.LIMIT * 1.001:
+                found.append(
+                    f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
+                    "small-angle test: shorten the dwell, or start on the other side of level"
+                )
+        return found
 
-    def columns(self, held: servo_regression.Held) -> Array:
+    def columns(self, held: servo_regression.HeldWindows) -> Array:
         return servo_regression.design(held, self.setup.place, self.seen.names)
 
     def regression(self) -> Regression:

@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP, VERTICAL
-from gyrobench.reduction.drift import servo_regression
 
 LIMIT = math.radians(1.0)  # of the angle in a level attitude
 #: in the order in which they are kept while the attitudes tell more
@@ -101,21 +99,5 @@ def option_problems(
             found.append(
                 f"{name}: {what} the table by {math.degrees(abs(rate) * time):.3g}° in settle and dwell of "
                 f"{time:g} s; 1° either side of level allows {most:.0f} s"
-            )
-    return found
-
-
-def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
-    """Level attitudes beyond 1 degree."""
-    found = []
-    for p, label in labels.items():
-        mine = phase == p
-        if label not in LEVEL or not mine.any():
-            continue
-        worst = float(np.max(np.abs(np.concatenate([held.angle_start[mine], held.angle_end[mine]]))))
-        if worst > LIMIT * 1.001:
-            found.append(
-                f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
-                "small-angle test: shorten the dwell, or start on the other side of level"
             )
     return found

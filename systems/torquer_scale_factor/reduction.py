@@ -45,7 +45,7 @@ from gyrobench.result import BudgetLine, Series, Test
 
 from . import marks, row_checks
 from .budget import AMMETER, TorquerSetup
-from .estimates import DPH, KU, UNIT, Number, of_table, of_windows
+from .estimates import DPH, KU, UNIT, of_table, of_windows
 from .precession import Precession, precession
 from .row_checks import MA
 
@@ -108,19 +108,19 @@ class Reduction:
         e, full = self.e, f"{self.full / MA:g} mA"
         cubic = f"relative change of the scale factor from 0 to {full}, as i²"
         worst = f"largest departure (K_n − K)/K, at {self.i[e.worst_at] / MA:g} mA"
-        rows: list[tuple[str, str, str, Number, float]] = [
-            ("K", "scale factor, mean of the K_n of all currents", UNIT, e.mean, 1.0 / KU),
-            ("K_LS", "scale factor, weighted least squares", UNIT, e.line, 1.0 / KU),
-            ("K_1", "scale factor at zero current of the cubic torquer", UNIT, e.K_1, 1.0 / KU),
-            ("K_3/K_1", cubic, "%", e.cubic, 100.0),
-            ("linearity", worst, "%", e.worst, 100.0),
-            ("drift", "drift along the torqued axis, half the difference of the two senses", "°/h", e.drift, 1.0 / DPH),
-        ]
+        rows = (
+            ("K", "scale factor, mean of the K_n of all currents", UNIT, 1.0 / KU),
+            ("K_LS", "scale factor, weighted least squares", UNIT, 1.0 / KU),
+            ("K_1", "scale factor at zero current of the cubic torquer", UNIT, 1.0 / KU),
+            ("K_3/K_1", cubic, "%", 100.0),
+            ("linearity", worst, "%", 100.0),
+            ("drift", "drift along the torqued axis, half the difference of the two senses", "°/h", 1.0 / DPH),
+        )
         return [self._coefficient(j, *row) for j, row in enumerate(rows)]
 
-    def _coefficient(self, j: int, name: str, meaning: str, unit: str, number: Number, size: float) -> Coefficient:
+    def _coefficient(self, j: int, name: str, meaning: str, unit: str, size: float) -> Coefficient:
         """Return a coefficient in its printed unit, from its estimate (SI) and ``size``, the unit's inverse."""
-        s = self.setup
+        s, number = self.setup, self.e.numbers[j]
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
         b = [abs(value) * s.u_current, abs(value) * s.u_time] if unit == UNIT else []
@@ -143,7 +143,8 @@ class Reduction:
         covariance = gain @ e.cofactor @ gain.T
         covariance[5, 5] = 1.0
         curve = np.column_stack([np.ones(n), (i / self.full) ** 2]) * self.theta[:, None]
-        seen = e.p is not None and e.p < 0.05
+        F, p = e.test
+        seen = p is not None and p < 0.05
         text = "the scale factor depends on the current" if seen else "no curvature beyond the scatter"
         noise = "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
         return DriftTestResult(
@@ -165,7 +166,7 @@ class Reduction:
             rank=2,
             dof=float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
             noise=self._noise(),
-            tests=[Test("cubic", "cubic term", e.F, e.p, "curvature of the torquer", text)],
+            tests=[Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
             residual_std=e.scatter / KU,
             residual_unit=UNIT,
             budget=self._budget(),
@@ -208,7 +209,7 @@ class Reduction:
     def _budget(self) -> list[BudgetLine]:
         if self.e.reported:
             return budget_lines(self.e.reported, self.sources, RANDOM)
-        a, size = self.e.mean[1] / KU, self.e.mean[0] / KU
+        a, size = self.e.numbers[0][1] / KU, self.e.numbers[0][0] / KU
         note = "type A, with the linearity error in it"
         scatter = BudgetLine(TYPE_A, "scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", note)
         known = [(source, source.size(self.setup)) for source in (AMMETER, TIME_BASE)]
@@ -230,7 +231,7 @@ class Reduction:
         return found
 
     def _tables(self) -> list[Table]:
-        i, mean, reported, fit = self.i, self.book.mean[0], self.e.reported, self.fit
+        i, mean, reported, fit = self.i, self.book.numbers[0][0], self.e.reported, self.fit
         printed = round(mean / KU, 3)
         off, off_printed = (self.marked - mean) / mean, (self.marked / KU - printed) / printed
         columns = (i / MA, self.plus / DPH, self.minus / DPH, self.marked / KU, off * 100.0, off_printed * 100.0,

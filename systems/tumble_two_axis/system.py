@@ -68,8 +68,9 @@ class TumbleTwoAxis(RebalanceTest):
         | FOLD
         | NUISANCES
         | CORRECTIONS
-        | type_b("square", "mount", "angle1", "angle2", "wobble", "scale_factor", "nonlinearity", "current", "pulse",
-                 "switching", axis="standard uncertainty of the outer axis against the pole")
+        | type_b("square", "mount", "angle1", "angle2", "wobble",
+                 axis="standard uncertainty of the outer axis against the pole")
+        | type_b("scale_factor", "nonlinearity", "current", "pulse", "switching")
         | TORQUER
     )  # fmt: skip
     measured_data = MEASURED

@@ -14,7 +14,7 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import pulses as pulse_sources
-from gyrobench.reduction.drift.pulses import Pulses, Windows
+from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
@@ -144,7 +144,7 @@ def elsewhere(axis: str) -> list[str]:
 
 
 def torquer_effects(
-    s: RebalanceSetup, found: Findings, k: float, read: Windows, quantum: float, pulses: Pulses | None = None,
+    s: RebalanceSetup, found: Findings, k: float, read: CurrentWindows, quantum: float, pulses: Pulses | None = None,
     axis: str = "",
 ) -> list[Effect]:  # fmt: skip
     """Return what errors of torquer and current reading do to drift rates omega_IA - k i.

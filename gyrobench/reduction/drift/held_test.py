@@ -83,7 +83,7 @@ class HeldTest(DriftTest[H]):
     handling = staticmethod(handling_candidates.servo)
     attitudes: ClassVar[Collection[str]]
 
-    def columns(self, held: servo_regression.Held) -> Array:
+    def columns(self, held: servo_regression.HeldWindows) -> Array:
         """Return the design matrix (n, p) of windows."""
         raise NotImplementedError
 

@@ -26,7 +26,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
-from gyrobench.reduction.drift.pulses import Windows
+from gyrobench.reduction.drift.pulses import CurrentWindows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.drift_test import DriftTest
 from gyrobench.reduction.estimation.effects import Effect
@@ -73,11 +73,11 @@ class RestTest(DriftTest[S]):
         return self.attitudes
 
     @cached_property
-    def read(self) -> Windows:
+    def read(self) -> CurrentWindows:
         """Torquer currents, A, with the sign of the precession convention."""
         mean, t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("mean", "t_start", "t_end"))
         spread = np.asarray(self.windows.get("std", np.zeros_like(mean)), dtype=float)
-        return Windows(mean if self.setup.polarity == "project" else -mean, spread, t1 - t0)
+        return CurrentWindows(mean if self.setup.polarity == "project" else -mean, spread, t1 - t0)
 
     def problems(self) -> list[str]:
         return frames.latitude_problems(self.setup.latitude) + self.setup.problems() + window_problems(self.windows)

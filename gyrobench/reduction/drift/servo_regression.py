@@ -61,7 +61,7 @@ BOOK: dict[str, tuple[str, int]] = {
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldWindows:
     """Windows of a held table: angles (n,) rad, times (n,) s, and the gyro axes x, y, z (rows, in ENU) at angle 0 of
     each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.
     """
@@ -84,7 +84,7 @@ class Held:
         """Angles (n, 12) at which the windows are averaged."""
         return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
 
-    def turned(self, **axes_or_body: Array) -> Held:
+    def turned(self, **axes_or_body: Array) -> HeldWindows:
         """The same windows on other axes or of another gyro."""
         other = replace(self, **axes_or_body)
         other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
@@ -102,7 +102,7 @@ class Held:
 
 def held_windows(
     windows: Mapping[str, Array], labels: Mapping[int, str], known: Collection[str], latitude: float
-) -> tuple[Held, NDArray[np.int_], NDArray[np.bool_]]:
+) -> tuple[HeldWindows, NDArray[np.int_], NDArray[np.bool_]]:
     """Return the windows of the phases in ``labels`` (phase -> attitude), their phase numbers, and their rows.
 
     Raises ReductionError for an attitude that is not one of ``known``, and for windows that cannot be read.
@@ -118,10 +118,10 @@ def held_windows(
     axes = np.array([of_phase[p] for p in phase.tolist()])
     columns = (np.asarray(windows[c], dtype=float)[rows] for c in ("angle_start", "angle_end", "t_start", "t_end"))
     start, end, t0, t1 = columns
-    return Held(start, end, t0, t1, axes), phase, rows
+    return HeldWindows(start, end, t0, t1, axes), phase, rows
 
 
-def drift_rate(held: Held, site: Site) -> Array:
+def drift_rate(held: HeldWindows, site: Site) -> Array:
     """Return the data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
@@ -129,7 +129,7 @@ def drift_rate(held: Held, site: Site) -> Array:
     return out
 
 
-def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
+def design(held: HeldWindows, site: Site, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names``."""
     return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
@@ -167,7 +167,7 @@ def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gai
 
 
 def effects(
-    held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
+    held: HeldWindows, site: Site, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
     sizes: Any,
 ) -> list[Effect]:  # fmt: skip
     """Return axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
@@ -178,7 +178,7 @@ def effects(
     """
     y, X = drift_rate(held, site), columns(held)
 
-    def moved(other: Held) -> Array:
+    def moved(other: HeldWindows) -> Array:
         return fit.error(drift_rate(other, site) - y, columns(other) - X) / SMALL
 
     def axis(k: int) -> Array:
@@ -227,13 +227,17 @@ def effects(
     ]
 
 
-def _mounted(held: Held, k: int) -> Held:
+def _mounted(held: HeldWindows, k: int) -> HeldWindows:
     """The windows with the gyro turned by SMALL about its axis k on the table."""
     return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
 
 
 def candidates(
-    held: Held, site: Site, columns: Callable[[Held], Array], phase: NDArray[np.int_], windows: Mapping[str, Array]
+    held: HeldWindows,
+    site: Site,
+    columns: Callable[[HeldWindows], Array],
+    phase: NDArray[np.int_],
+    windows: Mapping[str, Array],
 ) -> list[Candidate]:
     """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
     differ from phase to phase, each of which is set up by itself.

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift import drift_terms, harmonic, window_regressors
-from gyrobench.reduction.drift.pulses import Pulses, Windows
+from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.drift_test import DriftTest
@@ -94,13 +94,13 @@ class TurningTest(DriftTest[T]):
         return window_regressors.Turning(a0, a1, t0, t1, face)
 
     @cached_property
-    def read(self) -> Windows:
+    def read(self) -> CurrentWindows:
         """Torquer currents, A, with the sign of the precession convention."""
         end, t = f"_{self.torquer}" if self.torquer else "", self.turning
         mean = np.asarray(self.windows[f"mean{end}"], dtype=float)
         mean = mean if self.setup.polarity == "project" else -mean
         spread = np.asarray(self.windows.get(f"std{end}", np.zeros_like(mean)), dtype=float)
-        return Windows(mean, spread, t.t_end - t.t_start)
+        return CurrentWindows(mean, spread, t.t_end - t.t_start)
 
     @property
     def names(self) -> tuple[str, ...]:
