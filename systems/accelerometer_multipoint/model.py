@@ -64,7 +64,7 @@ class Visits:
 
 
 def visits(windows: Mapping[str, Array], s: MultipointSetup) -> Visits:
-    """Neighbouring windows of the same phase and angle averaged by their length."""
+    """Return neighbouring windows of the same phase and angle, averaged by their length."""
     phase = np.asarray(windows["phase"]).astype(int)
     angle, t0, t1, mean = (np.asarray(windows[c], dtype=float) for c in ("angle_start", "t_start", "t_end", "mean"))
     new = np.concatenate([[True], (np.diff(phase) != 0) | (np.abs(np.diff(angle)) > closed.EQUAL)])
@@ -91,7 +91,7 @@ class Polynomial:
         self.names = [*self.terms, *(f"θ₀ {m}" for m in self.mounts)]
 
     def columns(self, v: Visits, zeros: Mapping[str, float], gamma: float) -> Array:
-        """(n, terms): what each k multiplies."""
+        """Return (n, terms): what each k multiplies."""
         X, cross = np.empty_like(v.y), {k: np.zeros_like(v.y) for k in ("k4", "k5")}
         for m in self.mounts:
             mine = v.mount == m
@@ -102,7 +102,7 @@ class Polynomial:
         return np.column_stack([every[k] for k in self.terms])
 
     def slopes(self, v: Visits, zeros: Mapping[str, float], gamma: float, k: Array) -> Array:
-        """(n, mounts): change of the data per rad of each theta_0."""
+        """Return (n, mounts): change of the data per rad of each theta_0."""
         step = 1e-4
         out = np.zeros((v.y.size, len(self.mounts)))
         high, low = ({m: z + d for m, z in zeros.items()} for d in (step, -step))
@@ -112,7 +112,9 @@ class Polynomial:
         return out
 
     def solve(self, v: Visits, gamma: float) -> tuple[dict[str, float], Array]:
-        """theta_0 of the mounts and k by ordinary least squares; the start is theta_0 from the first harmonic."""
+        """Return theta_0 of the mounts and k by ordinary least squares; the start is theta_0 from the first
+        harmonic.
+        """
         zeros = {}
         for m in self.mounts:
             mine = v.mount == m

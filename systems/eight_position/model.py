@@ -77,19 +77,21 @@ class EightPositionSetup(SiteSetup):
 
 
 def directions(position: NDArray[np.int_], latitude: float, turned: Mapping[int, Array] | None = None) -> Array:
-    """(n, 2, 3): unit vectors of Earth rate and gravity in gyro axes; ``turned``: attitudes in place of the nominal."""
+    """Return (n, 2, 3): unit vectors of Earth rate and gravity in gyro axes; ``turned``: attitudes in place of the
+    nominal.
+    """
     known = {**positions.ATTITUDES, **(turned or {})}
     each = {n: np.stack(positions.earth_and_gravity(a, latitude)) for n, a in known.items()}
     return np.array([each[n] for n in position.tolist()])
 
 
 def rate(channel: str, d: Array, earth_rate: float) -> Array:
-    """Earth rate (rad/s) that the current of ``channel`` measures."""
+    """Return the Earth rate (rad/s) that the current of ``channel`` measures."""
     return earth_rate * d[:, 0, 1 if channel == "x" else 0]
 
 
 def drift_columns(channel: str, d: Array, terms: int) -> Array:
-    """Columns of the drift w - k I of a channel: R, u, u_z and, with six terms, q, s; unit: rad/s each."""
+    """Return the columns of the drift w - k I of a channel: R, u, u_z and, with six terms, q, s; unit: rad/s each."""
     g = d[:, 1]
     along, across = (g[:, 1], g[:, 0]) if channel == "x" else (g[:, 0], g[:, 1])
     constant = np.ones_like(along) if channel == "x" else -np.ones_like(along)
@@ -108,7 +110,9 @@ class LinearCurrent:
 
 
 def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) -> LinearCurrent:
-    """The fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's rate."""
+    """Return the fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's
+    rate.
+    """
     w, D = rate(channel, d, setup.earth_rate), drift_columns(channel, d, setup.terms)
     names = (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]
     A = np.column_stack([w, -D])
@@ -152,7 +156,7 @@ def attitude_error(
 
 
 def quantities(channel: str, setup: EightPositionSetup, closed: Mapping[str, float]) -> list[Quantity]:
-    """What is reported of a channel: k, R, u, u_z and, with six terms, the two differences per g0^n."""
+    """Return what is reported of a channel: k, R, u, u_z and, with six terms, the two differences per g0^n."""
     true = truth(setup)
     found = []
     for name in (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]:
@@ -171,7 +175,7 @@ def quantities(channel: str, setup: EightPositionSetup, closed: Mapping[str, flo
 
 
 def made_of(name: str, setup: EightPositionSetup) -> dict[str, float]:
-    """The coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
+    """Return the coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
     g = setup.gamma
     return {
         "R_x": {"Dy_0": 1.0},
@@ -201,7 +205,7 @@ def reported(found: Findings, wanted: list[Quantity], setup: EightPositionSetup,
 
 
 def truth(setup: EightPositionSetup) -> dict[str, float]:
-    """What the unknowns are for the simulated gyro, SI; empty without truth."""
+    """Return what the unknowns are for the simulated gyro, SI; empty without truth."""
     t = setup.truth
     if not t:
         return {}

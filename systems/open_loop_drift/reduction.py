@@ -79,24 +79,25 @@ class OpenLoopSetup(SiteSetup):
     u_float_gain: float = 0.0
 
     def earth(self, axis: int = 0) -> float:
-        """Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
+        """Return the Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
         return float(self.attitude[axis] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
     def xyz(self, angle: float) -> Array:
-        """X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
+        """Return X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
         c, s = math.cos(angle), math.sin(angle)
         I, O, S = self.attitude  # noqa: E741
         out: Array = np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0
         return out
 
     def true_drift(self, angle: float) -> float:
-        """Drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
+        """Return the drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
         return float(drift.drift(self.xyz(angle), self.truth or {}))
 
 
 def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
-    """Return the mean case angle (rad) between the middles of successive readings: half a reading before the step, the step at
-    even mean rate, the rest after it.
+    """Return the mean case angle (rad) between the middles of successive readings.
+
+    Half a reading before the step, the step at even mean rate, the rest after it.
     """
     pause = t0[1:] - t1[:-1]
     move = np.zeros_like(pause) if wait is None else np.clip(pause - wait, 0.0, pause)
@@ -109,8 +110,8 @@ def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array
 def null_angles(
     theta: Array, between: Array, t: Array, u: Array, setup: OpenLoopSetup
 ) -> tuple[Array, float | None, Array]:
-    """Case angle (rad, against the Earth) of the null at each reading; the gain G (V/rad; None where all u are 0); the
-    mean rate w_S b (rad/s) of each interval, ``between``: its mean case angle.
+    """Return the case angle (rad, against the Earth) of the null at each reading; the gain G (V/rad; None if all u are
+    0); the mean rate w_S b (rad/s) of each interval, ``between``: its mean case angle.
     """
     dt, earth = np.diff(t), setup.earth()
     spin = np.cos(between) * setup.earth(2) - np.sin(between) * setup.earth(1)

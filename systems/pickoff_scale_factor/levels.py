@@ -36,8 +36,8 @@ class Levels:
 
     @classmethod
     def of(cls, angle: Array, seen: Array, t: Array, u: Array, moved: Array, fitted: int) -> Levels:
-        """seen: what the float sees of the angle.  moved: what the drift changed of the voltage, V, by ``fitted``
-        coefficients.
+        """Return the levels.  seen: what the float sees of the angle.  moved: what the drift changed of the voltage, V,
+        by ``fitted`` coefficients.
         """
         steady = u - moved
         slope, zero = (float(v) for v in np.polyfit(seen, steady, 1))
@@ -68,7 +68,7 @@ class Levels:
         return Coefficient(name, meaning, unit, value, u, k, interval, u_a=u, dof=float(self.dof))
 
     def series(self, dense: Array, seen: Array) -> Series:
-        """Voltage over angle; dense, seen: of the drawn line."""
+        """Return the voltage over angle; dense, seen: of the drawn line."""
         order = np.argsort(self.angle, kind="stable")
         return Series(
             label="pickoff voltage", x=(self.angle[order] / ARCMIN).tolist(), x_name="table angle", x_unit="′",

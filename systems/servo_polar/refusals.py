@@ -23,7 +23,9 @@ from .model import ROUTES, PolarModel
 def held(
     latitude: float, phases: Sequence[str], points: int = 36
 ) -> tuple[servo_regression.HeldWindows, NDArray[np.int_]]:
-    """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
+    """Return ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase
+    numbers.
+    """
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(
         [np.repeat(on_servo_table(p, latitude)[None], a.size, axis=0) for p, a in zip(phases, angles, strict=True)]
@@ -34,13 +36,13 @@ def held(
 
 
 def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
-    """What phases at a latitude can tell apart: rank, condition, lost combinations."""
+    """Return what phases at a latitude can tell apart: rank, condition, lost combinations."""
     windows, _ = held(latitude, phases)
     return regression.examine(servo_regression.design(windows, Site(latitude, g * 9.80665), names), names)
 
 
 def latitude_problems(latitude: float) -> list[str]:
-    """Below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
+    """Return that below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
     if problems := frames.latitude_problems(latitude):
         return problems
     if 10.0 <= abs(math.degrees(latitude)) <= 80.0:
@@ -56,7 +58,7 @@ def latitude_problems(latitude: float) -> list[str]:
 
 
 def option_problems(options: Mapping[str, Any]) -> list[str]:
-    """What is wrong with the options, as sentences."""
+    """Return what is wrong with the options, as sentences."""
     found = latitude_problems(options["latitude"])
     mounts = options["mounts"].replace(",", " ").split()
     if not mounts or any(m not in ("S", "N") for m in mounts):
@@ -75,7 +77,7 @@ def option_problems(options: Mapping[str, Any]) -> list[str]:
 
 
 def model_problems(parameters: Mapping[str, Any]) -> list[str]:
-    """What the simulated gyro has and the model has not."""
+    """Return what the simulated gyro has and the model has not."""
     square = parameters.get("gyro.D_OO", 0.0) / DPH
     if square:
         return [
@@ -86,7 +88,7 @@ def model_problems(parameters: Mapping[str, Any]) -> list[str]:
 
 
 def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
-    """What the plan cannot see, said before the run."""
+    """Return what the plan cannot see, said before the run."""
     found = []
     if which == 4:
         found.append("Four terms: the other coefficients stay in the residuals and bias D_F (low grades only).")
@@ -104,5 +106,5 @@ def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
 
 
 def turned(start: Array, end: Array) -> float:
-    """Degrees turned by the windows of a mount, rad, in their order."""
+    """Return the degrees turned by the windows of a mount, rad, in their order."""
     return math.degrees(abs(float(end[-1] - start[0])))

@@ -87,5 +87,5 @@ def _others(seen: Track) -> dict[str, list[Track]]:
 
 
 def _turned(k: int) -> Array:
-    """Rows: axes turned by SMALL about the k-th of them, in what they were."""
+    """Return rows: axes turned by SMALL about the k-th of them, in what they were."""
     return frames.rotation(np.eye(3)[k], SMALL).T

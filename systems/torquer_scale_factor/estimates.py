@@ -124,8 +124,9 @@ def _gain(n: int, k: int, line: Array, cubic: Array) -> Array:
 
 
 def _scatter_beside_mean(K_n: Array, w: Array, line: regression.Fit) -> tuple[float, int]:
-    """Standard deviation of unit weight from what neither weighted nor plain mean takes up, so that the t of the
-    plain mean is a t; with its degrees of freedom."""
+    """Return the standard deviation of unit weight, with its degrees of freedom, from what neither weighted nor plain
+    mean takes up, so that the t of the plain mean is a t.
+    """
     if np.ptp(w) < 1e-9:
         return line.s, line.dof
     fit = regression.least_squares(np.column_stack([np.ones_like(w), 1.0 / w]), K_n, ("K", "1/w"), w)

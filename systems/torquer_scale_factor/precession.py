@@ -44,7 +44,9 @@ class Precession:
     effects: Sequence[Effect] = ()
 
     def weights(self, columns: Array, of: Array | slice) -> Array:
-        """(q, n) W of generalized least squares W values = c of ``values = columns c``, under their covariance."""
+        """Return (q, n) W of generalized least squares W values = c of ``values = columns c``, under their
+        covariance.
+        """
         C = self.est.covariance[of, of]
         size = np.sqrt(np.diag(C))
         A, B = columns / size[:, None], C / np.outer(size, size)
@@ -53,7 +55,7 @@ class Precession:
         return out
 
     def u(self, of_K: Array | None = None, of_drift: Array | None = None) -> tuple[float, float]:
-        """Standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
+        """Return the standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
         n, J = self.K.size, np.zeros(self.est.beta.size)
         J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
         sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
@@ -92,7 +94,7 @@ def precession(
 
 
 def _mean_legendre(j: int, start: Array, end: Array) -> Array:
-    """Mean of P_j between two arguments: its integral is (P_(j+1) - P_(j-1)) / (2 j + 1)."""
+    """Return the mean of P_j between two arguments: its integral is (P_(j+1) - P_(j-1)) / (2 j + 1)."""
 
     def integral(x: Array) -> Any:
         return (special.eval_legendre(j + 1, x) - special.eval_legendre(j - 1, x)) / (2.0 * j + 1.0)

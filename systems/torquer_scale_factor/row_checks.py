@@ -97,7 +97,9 @@ def _far(K_n: Array) -> list[str]:
 
 
 def _departing(i: Array, K_n: Array, theta: Array) -> list[str]:
-    """Rows outside the noise of the others about the cubic torquer: t of the row left out, over the number of rows."""
+    """Return rows outside the noise of the others about the cubic torquer: t of the row left out, over the number of
+    rows.
+    """
     n = i.size
     X, w = np.column_stack([np.ones(n), (i / i.max()) ** 2]), theta / theta.max()
     if n < 5:

@@ -24,7 +24,9 @@ from gyrobench.frames import G0
 def formulas(
     one: Mapping[str, float], two: Mapping[str, float], y3: float, y4: float, latitude: float, gravity: float
 ) -> dict[str, float]:
-    """Nine coefficients from the amplitudes A0 A1 B1 A2 B2 of both mounts and the two dwells (unit of the data)."""
+    """Return nine coefficients from the amplitudes A0 A1 B1 A2 B2 of both mounts and the two dwells (unit of the
+    data).
+    """
     g, c, s2 = gravity / G0, math.cos(latitude), math.sin(2.0 * latitude)
     mean, second, dwell = one["A0"] + two["A0"], one["A2"] + two["A2"], y3 + y4
     return {

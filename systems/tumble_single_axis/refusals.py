@@ -11,7 +11,7 @@ from gyrobench.reduction.estimation import regression
 
 
 def refusals(latitude: float) -> list[str]:
-    """Why a tumble at ``latitude`` (rad) cannot give the nine coefficients, as sentences; empty when it can."""
+    """Return why a tumble at ``latitude`` (rad) cannot give the nine coefficients, as sentences; empty when it can."""
     if problems := frames.latitude_problems(latitude):
         return problems
     size = abs(math.degrees(latitude))

@@ -26,14 +26,14 @@ LIMIT = 1e3  # of the condition
 
 
 def base(latitude: float) -> Array:
-    """Table axes at angles 0 in ENU, rows: outer axis p, inner axis (0, -sin phi, cos phi), east."""
+    """Return table axes at angles 0 in ENU, rows: outer axis p, inner axis (0, -sin phi, cos phi), east."""
     p = frames.pole(latitude)
     inner = np.array([0.0, -p[2], p[1]])
     return np.array([p, inner, np.cross(p, inner)])
 
 
 def _turned(axis: int, angle: Array) -> Array:
-    """Passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
+    """Return passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
     j, m = (axis + 1) % 3, (axis + 2) % 3
     R = np.zeros((angle.size, 3, 3))
     R[:, axis, axis] = 1.0
@@ -44,7 +44,9 @@ def _turned(axis: int, angle: Array) -> Array:
 
 
 def _wobble(axis: int, angle: Array, size: float, phase: float) -> Array:
-    """Rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part table_two_axis."""
+    """Return rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part
+    table_two_axis.
+    """
     a = 2.0 * angle + phase
     return _turned((axis + 2) % 3, size * np.sin(a)) @ _turned((axis + 1) % 3, size * np.cos(a))
 
@@ -53,7 +55,7 @@ def attitude(
     latitude: float, outer: Array, inner: Array, squareness: float = 0.0,
     wobble: tuple[float, float] = (0.0, 0.0), phase: float = 0.0,
 ) -> Array:  # fmt: skip
-    """Gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]
+    """Return gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]
 
     wobble: of the outer and the inner axis, twice a turn, at this phase at angle 0.
     """
@@ -65,18 +67,18 @@ def attitude(
 
 
 def frequencies(m: int, n: int) -> list[int]:
-    """The twelve signed frequencies of the drift over theta.  [eq. 3-50, 3-51]"""
+    """Return the twelve signed frequencies of the drift over theta.  [eq. 3-50, 3-51]"""
     return [m - 2 * n, m - n, n, 2 * (m - n), m, 2 * n, 2 * m - n, m + n, 2 * m, m + 2 * n, 2 * m + n, 2 * (m + n)]
 
 
 def design(latitude: float, m: int, n: int, positions: int) -> Array:
-    """Nine regressors at equally spaced positions, gamma = 1."""
+    """Return nine regressors at equally spaced positions, gamma = 1."""
     theta = np.arange(positions) * 2.0 * math.pi / positions
     return drift.regressors(-attitude(latitude, m * theta, n * theta) @ frames.U, NAMES)
 
 
 def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[str]:
-    """Why the harmonic route cannot be had, as sentences."""
+    """Return why the harmonic route cannot be had, as sentences."""
     found = []
     f = frequencies(m, n)
     size = [abs(v) for v in f]
@@ -97,7 +99,7 @@ def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[s
 
 
 def visit_problems(latitude: float, outer: Array, inner: Array) -> list[str]:
-    """Why positions at these angles (k,) cannot give nine coefficients, as sentences."""
+    """Return why positions at these angles (k,) cannot give nine coefficients, as sentences."""
     if found := frames.latitude_problems(latitude):
         return found
     X = drift.regressors(-attitude(latitude, outer, inner) @ frames.U, NAMES)
@@ -112,7 +114,7 @@ def visit_problems(latitude: float, outer: Array, inner: Array) -> list[str]:
 
 
 def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
-    """Why these positions cannot give nine coefficients, as sentences."""
+    """Return why these positions cannot give nine coefficients, as sentences."""
     if found := frames.latitude_problems(latitude):
         return found
     if min(m, n) < 1:

@@ -92,7 +92,7 @@ class TumbleTwoAxis(RebalanceTest):
         return {**super().field_axes(), "surroundings.inner": 1}
 
     def plan(self) -> Plan:
-        """The positions in order, every one with both angles; angles are counted on through the turns.
+        """Return the positions in order, every one with both angles; angles are counted on through the turns.
 
         Of visits, in their order; each axis takes the shorter way.
         """

@@ -45,7 +45,7 @@ def simple(channel: str, one: Amplitudes, two: Amplitudes, latitude: float, grav
 def nine(
     channel: str, one: Amplitudes, two: Amplitudes, y3: float, y4: float, latitude: float, gravity: float
 ) -> dict[str, float]:
-    """Nine coefficients of a channel from the amplitudes of its drift in mounts 1 and 2 and the dwells."""
+    """Return nine coefficients of a channel from the amplitudes of its drift in mounts 1 and 2 and the dwells."""
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
     mean, second, dwell = one["A0"] + two["A0"], one["A2"] + two["A2"], y3 + y4
     d = f"D{channel}_"

@@ -32,12 +32,12 @@ SQUARES = {"x": "Dx_yy", "y": "Dy_xx"}  # of each channel, what cannot be told f
 
 
 def terms(model: str, channel: str) -> tuple[str, ...]:
-    """Coefficient names of a channel (x, y) in a model (simple, nine)."""
+    """Return the coefficient names of a channel (x, y) in a model (simple, nine)."""
     return SIMPLE[channel] if model == "simple" else drift.terms_2dof(channel, 9)
 
 
 def faces(model: str, latitude: float) -> dict[str, Array]:
-    """Mounts by name, rows x, y, z in table axes at angle 0."""
+    """Return the mounts by name, rows x, y, z in table axes at angle 0."""
     x, y, z = np.eye(3)
     if model == "simple":
         return {"mount 1": np.array([y, -x, z]), "mount 2": np.array([y, x, -z])}
@@ -51,7 +51,7 @@ def faces(model: str, latitude: float) -> dict[str, Array]:
 
 
 def design(model: str, channel: str, latitude: float, points: int = 36) -> Array:
-    """Regressors of a channel in ``points`` attitudes a mount and both dwells, gamma = 1."""
+    """Return the regressors of a channel in ``points`` attitudes a mount and both dwells, gamma = 1."""
     base, rows = frames.polar_base(latitude), []
     for name, face in faces(model, latitude).items():
         turn = np.arange(points) * 2.0 * math.pi / points if name.startswith("mount") else [0.0]
@@ -60,7 +60,7 @@ def design(model: str, channel: str, latitude: float, points: int = 36) -> Array
 
 
 def refusals(latitude: float, model: str) -> list[str]:
-    """Why a test at ``latitude`` (rad) cannot give the coefficients of ``model``, as sentences; [TUM2B-SING]."""
+    """Return why a test at ``latitude`` (rad) cannot give the coefficients of ``model``, as sentences; [TUM2B-SING]."""
     if model not in MODELS:
         return [f"model = {model}: no such model; there are {' and '.join(MODELS)}"]
     if problems := frames.latitude_problems(latitude):
@@ -79,7 +79,7 @@ def refusals(latitude: float, model: str) -> list[str]:
 
 
 def cautions(latitude: float) -> list[str]:
-    """What to expect outside 20 to 70 degrees."""
+    """Return what to expect outside 20 to 70 degrees."""
     size = abs(math.degrees(latitude))
     if 20.0 <= round(size, 9) <= 70.0:
         return []

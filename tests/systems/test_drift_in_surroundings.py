@@ -43,7 +43,7 @@ def ramp(prepared: Session) -> Record:
 def reduced(record: Record, **columns: Any) -> DriftTestResult:
     reduction = importlib.import_module(".reduction", type(load()).__module__)
     windows = {n: v for n, v in record.windows.items() if n in columns or n != "temperature"} | columns
-    result = reduction.from_record.__wrapped__(Record(windows, {}, record.run))
+    result = reduction.Reduction.from_record.__wrapped__(Record(windows, {}, record.run))
     assert isinstance(result, DriftTestResult)
     return result
 

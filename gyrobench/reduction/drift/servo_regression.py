@@ -85,7 +85,7 @@ class HeldWindows:
         return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
 
     def turned(self, **axes_or_body: Array) -> HeldWindows:
-        """The same windows on other axes or of another gyro."""
+        """Return the same windows on other axes or of another gyro."""
         other = replace(self, **axes_or_body)
         other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
         return other
@@ -228,7 +228,7 @@ def effects(
 
 
 def _mounted(held: HeldWindows, k: int) -> HeldWindows:
-    """The windows with the gyro turned by SMALL about its axis k on the table."""
+    """Return the windows with the gyro turned by SMALL about its axis k on the table."""
     return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
 
 
@@ -262,7 +262,9 @@ def candidates(
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
-    """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
+    """Return the estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those
+    names.
+    """
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
