@@ -166,7 +166,7 @@ def test_from_a_run() -> None:
     document = RunDocument(
         options=dict(system.values), plan=plan, parameters=parameters, complete=False, stopped_at=9.0
     )
-    s = T.reduction.setup_of(document)
+    s = T.reduction.Reduction.setup_of(document)
     assert s.gravity == pytest.approx(frames.normal_gravity(system["latitude"]))
     assert {p: s.turns(p) for p in s.faces} == {r["phase"]: r["mode"] == "rate" for r in plan}
     assert s.faces[2] == pytest.approx(faces["mount 1"])
@@ -175,4 +175,4 @@ def test_from_a_run() -> None:
     assert "before the end of its plan" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
     del document.parameters["gyro.k"]
     with pytest.raises(ReductionError, match="scale factor unknown"):
-        T.reduction.setup_of(document)
+        T.reduction.Reduction.setup_of(document)
