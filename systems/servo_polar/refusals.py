@@ -51,10 +51,10 @@ def latitude_problems(latitude: float) -> list[str]:
     phases = ("x east, y up", "x east, y down", *POLAR)
     found = examine(latitude, phases, names)
     where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
-    if found.rank < 8:
-        return [f"{where}rank {found.rank} of 8, the record does not see {'; '.join(found.lost)}"]
+    if found.short:
+        return [f"{where}{found.weakness}"]
     X = servo_regression.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
-    return [f"{where}condition {np.linalg.cond(X):.3g}, hardly seen is {found.weakest}"]
+    return [f"{where}condition {np.linalg.cond(X):.3g}, least determined: {found.weakest}"]
 
 
 def option_problems(options: Mapping[str, Any]) -> list[str]:

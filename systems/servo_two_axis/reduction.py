@@ -191,9 +191,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
                 found += [f"{a} axis: {text}" for text in problems]
         for c, X in self.X.items():
             seen = regression.examine(X, s.names(c))
-            if seen.lost:
-                lost = "; ".join(seen.lost)
-                found.append(f"{c} channel: rank {seen.rank} of {X.shape[1]}, the record does not see {lost}")
+            if seen.short:
+                found.append(f"{c} channel: {seen.weakness}")
         most = refusals.MOST_SINGLE if np.unique(self.mount).size == 1 else refusals.MOST
         if not found and (k := refusals.condition(self.X)) > most:
             mounts = " ".join(map(str, np.unique(self.mount)))
@@ -206,7 +205,7 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
             return []
         weak = [f"{regression.examine(X, self.setup.names(c)).weakest} ({c})" for c, X in self.X.items()]
         which = " ".join(str(m) for m in dict.fromkeys(self.mount.tolist()))
-        text = f"Mounts {which}: condition {k:.3g} of the coefficients per g; hardly seen: {', '.join(weak)}."
+        text = f"Mounts {which}: condition {k:.3g} of the coefficients per g; least determined: {', '.join(weak)}."
         return [Reason("mounts.weak", text)]
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:

@@ -105,7 +105,7 @@ def lock_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
             f"mount {m}: gimbal lock: at latitude {math.degrees(latitude):.4g}° its inner angle reaches "
             f"{math.degrees(a):.4g}° ({math.degrees(math.acos(geometry.LEAST)):.3g}° allowed), where the outer axis "
             "turns the gyro about its spin axis and the x channel, x' cos y, is lost; "
-            f"{'the mounts that are left do not see ' + lost + '; ' if lost else ''}"
+            f"{'the mounts that are left: ' + lost + '; ' if lost else ''}"
             f"{_advice(latitude, time, terms, earth_rate)}"
         )
     return found
@@ -115,8 +115,8 @@ def _lost(mounts: Sequence[int], latitude: float, time: float, terms: int, earth
     out = []
     for c, X in designs(mounts, latitude, time, terms, earth_rate).items():
         seen = regression.examine(X, drift.terms_2dof(c, terms))
-        if seen.lost:
-            out.append(f"{c} channel, rank {seen.rank} of {len(seen.names)}: {'; '.join(seen.lost)}")
+        if seen.short:
+            out.append(f"{c} channel, {seen.weakness}")
     return out
 
 
@@ -126,7 +126,7 @@ def rank_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
     where = f"{which} at latitude {math.degrees(latitude):.4g}° for {time / 3600.0:.3g} h"
     lost = _lost(mounts, latitude, time, terms, earth_rate)
     if lost:
-        text = f"{where} do not see {'; and '.join(lost)}"
+        text = f"{where}: {'; and '.join(lost)}"
     else:
         k = condition(designs(mounts, latitude, time, terms, earth_rate))
         most = MOST_SINGLE if len(set(mounts)) == 1 else MOST
@@ -139,7 +139,7 @@ def rank_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
 def _weakest(mounts: Sequence[int], latitude: float, time: float, terms: int, earth_rate: float) -> str:
     X = designs(mounts, latitude, time, terms, earth_rate)
     words = [f"{regression.examine(v, drift.terms_2dof(c, terms)).weakest} ({c} channel)" for c, v in X.items()]
-    return f"hardly seen are {' and '.join(words)}"
+    return f"least determined: {' and '.join(words)}"
 
 
 def cautions(mounts: Sequence[int], latitude: float, time: float, earth_rate: float, terms: int) -> list[str]:

@@ -23,6 +23,4 @@ def refusals(latitude: float) -> list[str]:
     rows += [frames.to_face(-frames.U, faces[s], base, 0.0) for s in ("static 3", "static 4")]
     design = regression.examine(drift.regressors(np.array(rows), drift.terms(9)), drift.terms(9))
     where = f"latitude {math.degrees(latitude):.4g}° (5° to 85° north or south is possible): "
-    if design.rank < 9:
-        return [f"{where}rank {design.rank} of 9, the record does not see {'; '.join(design.lost)}"]
-    return [f"{where}condition {design.condition:.3g}, hardly seen is {design.weakest}"]
+    return [f"{where}{design.weakness}"]

@@ -106,11 +106,7 @@ def visit_problems(latitude: float, outer: Array, inner: Array) -> list[str]:
     if len(X) < len(NAMES):
         return [f"visits: {len(X)} positions for {len(NAMES)} coefficients: at least {len(NAMES)} different ones"]
     seen = regression.examine(X, NAMES)
-    if seen.rank < len(NAMES):
-        return [f"visits: rank {seen.rank} of {len(NAMES)}, not estimable: {'; '.join(seen.lost)}"]
-    if seen.condition > LIMIT:
-        return [f"visits: condition {seen.condition:.3g}, least determined is {seen.weakest}"]
-    return []
+    return [f"visits: {seen.weakness}"] if seen.condition > LIMIT else []
 
 
 def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
@@ -129,10 +125,8 @@ def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
         return found
     where = f"latitude {math.degrees(latitude):.4g}°, ratio {m}:{n}, {positions} positions"
     seen = regression.examine(design(latitude, m, n, max(positions, 9)), NAMES)
-    if seen.rank < len(NAMES):
-        found.append(f"{where}: rank {seen.rank} of {len(NAMES)}, not seen: {'; '.join(seen.lost)}")
-    elif seen.condition > LIMIT or polar:
-        found.append(f"{where}: condition {seen.condition:.3g}, hardly seen is {seen.weakest}")
+    if seen.condition > LIMIT or polar:
+        found.append(f"{where}: {seen.weakness}")
     if polar:
         found.append("only latitudes up to 85° north or south are possible")
     return found
@@ -143,4 +137,4 @@ def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
     if refusals(latitude, m, n, positions):
         return []
     seen = regression.examine(design(latitude, m, n, positions), NAMES)
-    return [f"Condition {seen.condition:.3g}: hardly seen is {seen.weakest}."] if seen.condition > 100.0 else []
+    return [f"{seen.weakness[:1].upper()}{seen.weakness[1:]}."] if seen.condition > 100.0 else []

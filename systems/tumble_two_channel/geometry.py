@@ -67,15 +67,10 @@ def refusals(latitude: float, model: str) -> list[str]:
         return problems
     if 10.0 <= round(abs(math.degrees(latitude)), 9) <= 80.0:
         return []
-    lost, seen = [], []
-    for channel in "xy":
-        found = regression.examine(design(model, channel, latitude), terms(model, channel))
-        if found.rank < len(found.names):
-            text = f"rank {found.rank} of {len(found.names)}, the record does not see {'; '.join(found.lost)}"
-            lost.append(f"{channel} channel: {text}")
-        seen.append(f"{channel} channel: condition {found.condition:.3g}, hardly seen is {found.weakest}")
-    where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
-    return [where + "; ".join(lost or seen)]
+    seen = {c: regression.examine(design(model, c, latitude), terms(model, c)) for c in "xy"}
+    short = any(found.short for found in seen.values())
+    words = [f"{c} channel: {found.weakness}" for c, found in seen.items() if found.short or not short]
+    return [f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): {'; '.join(words)}"]
 
 
 def cautions(latitude: float) -> list[str]:

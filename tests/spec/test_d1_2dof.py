@@ -207,10 +207,10 @@ def test_latitudes() -> None:
     (pole,) = refused(-math.pi / 2, "nine")
     assert "rank 4 of 9" in pole and "Dx_x" in pole and "Dy_y" in pole
     (simple,) = refused(0.0, "simple")
-    assert "x channel: rank 2 of 4, the record does not see Dx_xz; Dx_z" in simple
+    assert "x channel: rank 2 of 4, not estimable: Dx_xz; Dx_z" in simple
     for latitude in (9.9, -80.1, 5.0):
         (text,) = refused(math.radians(latitude), "nine")
-        assert "10° to 80°" in text and "x channel: condition" in text and "hardly seen is" in text
+        assert "10° to 80°" in text and "x channel: condition" in text and "least determined: " in text
     for latitude in (10.0, -10.0, 80.0, 45.0):
         assert refused(math.radians(latitude), "nine") == refused(math.radians(latitude), "simple") == []
     assert "outside −90..90" in refused(1.6, "nine")[0] and "no such model" in refused(0.5, "eight")[0]

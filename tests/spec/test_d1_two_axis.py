@@ -140,7 +140,7 @@ def test_condition_numbers(m: int, n: int, expected: tuple[float, ...]) -> None:
 def test_one_to_one_has_rank_eight(latitude: float) -> None:
     assert np.linalg.matrix_rank(T.geometry.design(math.radians(latitude), 1, 1, 36), tol=1e-9) == 8
     (text,) = T.geometry.refusals(math.radians(latitude), 1, 1, 36)
-    assert "rank 8 of 9, not seen: " in text
+    assert "rank 8 of 9, not estimable: " in text
     s = T.setup(latitude, m=1, n=1)
     assert "rank 8" in message(T.record(s, random_truth(1)), s)
 
@@ -285,4 +285,4 @@ def test_bad_setups() -> None:
     assert "8 positions for 9 coefficients" in refuse(0.8, 5, 1, 8)[0]
     assert "at least 1" in refuse(0.8, 5, 0, 36)[0] and "outside" in refuse(2.0, 5, 1, 36)[0]
     (weak,) = T.geometry.cautions(math.radians(80.0), 2, 1, 36)
-    assert weak.startswith("Condition") and "hardly seen is" in weak
+    assert weak.startswith("Condition") and "least determined: " in weak

@@ -24,7 +24,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 
 Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'
-DIAGNOSIS = "Diagnosis of handling errors"
+DIAGNOSIS = "handling.diagnosis"
 
 
 @pytest.fixture(scope="module")

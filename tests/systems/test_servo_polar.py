@@ -218,8 +218,8 @@ def test_saturated_pickoff_is_refused(day: Any) -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ({"latitude": "5deg"}, r"latitude 5° \(10° to 80° .*condition 9\d\d, hardly seen is"),
-        ({"latitude": "0deg"}, r"rank 4 of 8, the record does not see"),
+        ({"latitude": "5deg"}, r"latitude 5° \(10° to 80° .*condition 9\d\d, least determined: "),
+        ({"latitude": "0deg"}, r"rank 4 of 8, not estimable: "),
         ({"latitude": "-85deg"}, r"latitude -85°"),
         ({"route": "guess"}, "one of dwells, equal, combination"),
         ({"mounts": "S E"}, "the mounts S and N"),
