@@ -3,7 +3,6 @@
 flight = Flight(gates, "platform.attitude", rest)
 flight.error                                                      # rad, at flight.t
 lock_table(flight, {"lock": flight["platform.lock"]}, pitch, "pitch")   # one row for each time of lock
-over_time("gimbal angles", flight.t, {"roll": roll / DEG})        # a figure
 
 SI inside, degrees where people read.
 """
@@ -12,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +18,9 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Response, Table
+from gyrobench.result import Table
 
 DEG = math.pi / 180.0
-SHOWN = 700  # points of a drawn line
 
 
 class Flight:
@@ -143,38 +140,3 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
         ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
         rows,
     )
-
-
-def over_time(
-    name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = ""
-) -> Response:
-    """Return the figure of several quantities (printed units) over time; runs are compared by the first one.
-
-    Each stretch of samples is drawn by its smallest and largest value.
-    """
-    drawn = []
-    for label, y in lines.items():
-        x, thin = _envelope(t, y)
-        drawn.append({"label": label, "x": x.tolist(), "y": thin.tolist(), "phase": []})
-    return Response(
-        name=name,
-        kind="time",
-        caption=caption or f"{name[:1].upper()}{name[1:]} over time.",
-        x=drawn[0]["x"],
-        x_name="time",
-        x_unit="s",
-        y=drawn[0]["y"],
-        y_name=y_name or name,
-        y_unit=unit,
-        curves=drawn,
-    )
-
-
-def _envelope(t: Array, y: Array) -> tuple[Array, Array]:
-    if t.size <= SHOWN:
-        return t, y
-    edges = np.linspace(0, t.size, SHOWN // 2 + 1).astype(int)
-    pick = []
-    for a, b in pairwise(edges):
-        pick += sorted({a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))})
-    return t[pick], y[pick]
