@@ -183,13 +183,13 @@ def test_a_motor_at_its_limit_makes_the_loop_unstable(caplog: pytest.LogCaptureF
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, with the gyro's noise."""
     result = load().reduce(whole)
-    table = next(t for t in result.tables if t["title"].startswith("Linear models and"))
-    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
+    table = next(t for t in result.tables if t.kind == "margins.agreement")
+    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table.rows
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(31.5, abs=0.1) and count >= 14
     assert db < 0.02 and degrees < 0.15
     assert db_c < 0.2 and degrees_c < 1.0
-    note = next(t for t in result.tables if t["title"].startswith("Stability margins"))["caption"]
+    note = next(t for t in result.tables if t.kind == "margins").caption
     assert "stabilizer.v → platform.v: 0.0001 s" in note
 
 

@@ -107,7 +107,7 @@ def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: s
             worst = float(np.max(flight.error[a : b + 1])) / DEG
             rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
     return Table(
-        "gimbal_lock",
+        "flight.lock",
         "Gimbal lock",
         "Intervals in which the gimbals were locked or close to lock; times are those of the record",
         [
@@ -134,7 +134,7 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
         known = [gate.label, float(gate.t[-1] - gate.t[0]), float(base.max()) / DEG]
         rows.append([*known, *(float(value(s)) for value in columns.values()), float(error.max()), float(error[-1])])
     return Table(
-        "legs_of_the_flight",
+        "flight.legs",
         "Legs of the flight",
         caption,
         ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],

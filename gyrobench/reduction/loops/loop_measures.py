@@ -400,4 +400,4 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
             cells.append(None if direct is None or coupled is None or not direct else 100.0 * abs(coupled / direct))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
-    return Table(f"cross_axis_coupling:{what}", f"Cross-axis coupling, {what}", "", columns, rows)
+    return Table("cross_axis", f"Cross-axis coupling, {what}", "", columns, rows)
