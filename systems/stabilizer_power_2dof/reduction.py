@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.margins import measured_values
-from gyrobench.reduction.loops.platform_measures import isolation_near
+from gyrobench.reduction.loops.platform_measures import isolation_near, stiffness
 from gyrobench.reduction.loops.toolkit import (
     ARCSEC,
     DPH,
@@ -121,8 +121,7 @@ class Reduction(LoopTest):
         figure: dict[str, Any] = {"scale": ARCSEC, "unit": "″", "quiet": self.quiet}
         b = found.step(gate, "gyro.beta", y_name="precession β", **figure)
         a = found.loaded(gate, ALPHA, self.own, y_name="platform α", plus=BASE, **figure)
-        found.measure("K_m", "stiffness of the correction, M / β*", "N·m/rad", *_inverse(M, b.change, b.u_change),
-                      closed=K_m, unsettled=b.unsettled)  # fmt: skip
+        stiffness(found, "K_m", "stiffness of the correction, M / β*", M, b, K_m)
         t_star = transient(H, K_m)
         near = np.interp([t_star, t_star + b.u_settled], gate.t - gate.t[0], gate["gyro.beta"] - b.initial)
         left = 1.0 - float(near[0]) / b.change
@@ -135,8 +134,7 @@ class Reduction(LoopTest):
         found.measure("α*", "steady platform angle", "″", a.change, a.u_change, scale=ARCSEC, closed=closed,
                       unsettled=a.unsettled)  # fmt: skip
         if closed:
-            found.measure("S", "stiffness of the platform, M / α*", "N·m/rad", *_inverse(M, a.change, a.u_change),
-                          closed=M / closed, unsettled=a.unsettled)  # fmt: skip
+            stiffness(found, "S", "stiffness of the platform, M / α*", M, a, M / closed)
         u = 100.0 * a.u_change / abs(a.change)
         found.measure("overshoot α", "of the platform angle", "%", 100.0 * a.overshoot, u)
         found.measure("t_5 α", "settling of the platform to 5 %", "s", a.settled_5, a.u_settled)
@@ -174,7 +172,3 @@ class Reduction(LoopTest):
 def _platform(gate: Gate) -> Any:
     """Return the inertial angle of the platform, rad: against the base, and the base."""
     return gate[ALPHA] + gate[BASE]
-
-
-def _inverse(M: float, change: float, u: float) -> tuple[float | None, float]:
-    return (M / change, abs(M / change**2) * u) if change else (None, 0.0)

@@ -35,8 +35,7 @@ def each(runs: int, *phases: LoopPhase, wires: str = "", **values: Any) -> list[
         system.wires = wires
     with Session(system) as session:
         results = [system.reduce(session.run({**IDEAL, **values}, seed=seed)) for seed in range(1, runs + 1)]
-    tables = [next((t for t in r.tables if t.kind == "budget.sources"), {"rows": []}) for r in results]
-    return [(r, {(x[0], x[1]): x[2:] for x in t.rows}) for r, t in zip(results, tables, strict=True)]
+    return [(r, {(x[0], x[1]): x[2:] for t in r.tables if t.kind == "budget.sources" for x in t.rows}) for r in results]
 
 
 def swing(axis: int, f: float, size: float = 0.08) -> LoopPhase:

@@ -46,6 +46,11 @@ class UncertainValue:
         return float(special.stdtrit(self.dof, 0.975)) if math.isfinite(self.dof) else NORMAL
 
     @property
+    def pair(self) -> tuple[float, float]:
+        """Return value and u, for an interval of normal size."""
+        return self.value, self.u
+
+    @property
     def interval(self) -> tuple[float, float]:
         half = self.k * self.u
         return self.value - half, self.value + half

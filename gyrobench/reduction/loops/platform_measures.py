@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.loops.loop_measures import Gate, Point
+from gyrobench.reduction.loops.loop_measures import Gate, Point, Step
 from gyrobench.reduction.loops.loop_result import LoopFindings
 
 DECIBEL = 8.686  # of a relative uncertainty
@@ -60,3 +60,20 @@ def level_drift(p: Mapping[str, Any], slot: str = "gyro") -> float | None:
         return None
     fixed, along, squared = (float(p[f"{slot}.{n}"]) for n in LEVEL)
     return fixed - along + squared
+
+
+def stiffness(
+    found: LoopFindings, name: str, meaning: str, torque: float, step: Step, closed: float | None = None
+) -> None:  # fmt: skip
+    """Add the torque of a step over the angle that it leaves; nothing where it leaves none."""
+    if step.change:
+        u = abs(torque / step.change**2) * step.u_change
+        found.measure(name, meaning, "N·m/rad", torque / step.change, u, closed=closed, unsettled=step.unsettled)
+
+
+def settling(found: LoopFindings, key: str, what: str, step: Step, *bands: int) -> None:
+    """Add the times to stay within bands of 5 or 2 % of a change."""
+    for band in bands:
+        time = step.settled_5 if band == 5 else step.settled_2
+        meaning = f"settling {what.format(band=f'{band} %')}"
+        found.measure(f"t_{band}{key}", meaning, "s", time, step.u_settled, unsettled=step.unsettled)
