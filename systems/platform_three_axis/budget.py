@@ -52,19 +52,15 @@ POINTS = 400  # of it
 LEAST = 1e-3  # of the variance: what is less in size and share is one row
 WRONG = 0.2  # relative: a measured angle that differs more from the computed one is not the linear model's
 OUTPUT_AXES = "output axes of the gyros"
-TITLE = "Error budget of the platform, by source"
-GYRO = ("H", "J", "C", "K_sg", "mount")
-NOISE = (
-    "white",
-    "pickoff",
-    "markov",
-    "markov_tau",
-    "flicker",
-    "flicker_tau",
-    "walk",
-    "quantization",
-    "quantization_tau",
+CAPTION = (
+    "Angle of the inner element in each motion, root sum of squares of the three axes about mean and slope (commands: "
+    "the two other axes), computed from the linear model, and its share of the variance. Ways of one motion add with "
+    "their phases: a negative share cancels part of the others. Without it: what would be left if this source were "
+    "switched off."
 )
+GYRO = ("H", "J", "C", "K_sg", "mount")
+SLOW = "markov markov_tau flicker flicker_tau walk quantization quantization_tau"
+NOISE = ("white", "pickoff", *SLOW.split())
 PLATFORM = ("viscous", "k_t", "k_e", "R", "L", "friction", "stiction", "presliding", "I_r", "I_f", "I_a")
 
 
@@ -85,7 +81,6 @@ class Loop:
         self.platform = {n: np.asarray(p[f"platform.{n}"], float) for n in PLATFORM}
         self.gyros = [{n: np.asarray(p[f"{gyro}.{n}"], float) for n in GYRO} for gyro in GYROS]
         self.noise = [{n: float(p.get(f"{g}.{n}") or 0.0) for n in NOISE} for g in GYROS]
-
         self.contact = _stiffness(self.platform) if slides else np.zeros((2, 3))
         self.f_noise = m.grid(LOWEST, 0.5 / model.step, POINTS)
         self.by_noise = self.to("command", self.f_noise)
@@ -256,10 +251,11 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
         if abs(measured / math.sqrt(square) - 1.0) > WRONG + random / square:  # a random walk has few independent parts
             if gate.kind == "command":
                 continue  # hardly coupled: what is left is of large angles
-            found.warnings.append(
+            text = (
                 f"No error budget by source for {name}: the linear model gives {math.sqrt(square) / ARCSEC:.3g}″, "
                 f"measured are {measured / ARCSEC:.3g}″ (a limit, unbalance, stiction, or a motion beyond it)."
             )
+            found.warn(f"budget.not_linear:{name}", text)
             continue
         entries = [(n, _mean(x, x), _mean(x, whole), -2.0 * _mean(x, whole) + _mean(x, x)) for n, x in parts.items()]
         entries += [(n, x * x, x * x, -x * x) for n, x in noise.items()]
@@ -274,18 +270,9 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
         rows.append([name, "together", math.sqrt(square) / ARCSEC, None, None])
         rows.append([name, "measured", measured / ARCSEC, None, None])
     if rows:
-        found.tables.append(
-            Table(
-                "title",
-                TITLE,
-                "Angle of the inner element in each motion, root sum of squares of the three axes about "
-                "mean and slope (commands: the two other axes), computed from the linear model, and its share of the "
-                "variance. Ways of one motion add with their phases: a negative share cancels part of the others. "
-                "Without it: what would be left if this source were switched off.",
-                ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"],
-                rows,
-            )
-        )
+        columns = ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"]
+        title = "Error budget of the platform, by source"
+        found.tables.append(Table("budget.sources", title, CAPTION, columns, rows))
     return shares
 
 

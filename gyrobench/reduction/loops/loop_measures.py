@@ -386,7 +386,9 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
 
 
 # ------------------------------------------------------------------------------------------- axes
-def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> Table:
+def cross_axis(
+    points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str, caption: str = ""
+) -> Table:  # fmt: skip
     """Return the table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
 
     points: (k, j) -> complex ratio at one frequency, numbered from 1.  axes: their names.  A missing pair stays empty.
@@ -400,4 +402,4 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
             cells.append(None if direct is None or coupled is None or not direct else 100.0 * abs(coupled / direct))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
-    return Table("cross_axis", f"Cross-axis coupling, {what}", "", columns, rows)
+    return Table("cross_axis", f"Cross-axis coupling, {what}", caption, columns, rows)
