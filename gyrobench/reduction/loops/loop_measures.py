@@ -84,6 +84,11 @@ class Gate:
         return self.row.frequency
 
 
+def wrapped(angle: Array) -> Array:
+    """Return angles in -pi to pi."""
+    return np.asarray(angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5))
+
+
 def gates(record: Record, slot: str = "exciter") -> list[Gate]:
     """Return the phases of a record (gyrobench.record.record.Record) in their order, those that were run to their end.
 
