@@ -14,7 +14,14 @@ import numpy as np
 
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops.margins import interpolate_response, measured_values
-from gyrobench.reduction.loops.platform_measures import command_step, isolation_near, late_noise, settling, stiffness
+from gyrobench.reduction.loops.platform_measures import (
+    command_step,
+    isolation_near,
+    late_noise,
+    lower_limit,
+    settling,
+    stiffness,
+)  # fmt: skip
 from gyrobench.reduction.loops.toolkit import (
     ARCSEC,
     DRIFTS,
@@ -147,11 +154,8 @@ class Reduction(LoopTest):
             u = abs(slopes[1] - slopes[0])
             found.measure("slope", "of |L| at the crossover", "dB/dec", slopes[0], u, closed=closed)
         at = None if loop is None else loop.limit()
-        if "lower" in values:
-            f_lower, share = (None, None) if at is None else (at[0] / (2.0 * math.pi), at[1])
-            meaning = "share of the gain at which the loop becomes unstable"
-            found.measure("lower limit", meaning, "1", *values["lower"], closed=share)
-            found.measure("f_lower", "frequency at that limit", "Hz", *values["f_lower"], closed=f_lower)
+        share, w = (None, None) if at is None else (at[1], at[0] / (2.0 * math.pi))
+        lower_limit(found, values, share, w)
         if loop is not None and points:
             found.tables.append(_forms(loop, values))
 

@@ -77,3 +77,16 @@ def settling(found: LoopFindings, key: str, what: str, step: Step, *bands: int) 
         time = step.settled_5 if band == 5 else step.settled_2
         meaning = f"settling {what.format(band=f'{band} %')}"
         found.measure(f"t_{band}{key}", meaning, "s", time, step.u_settled, unsettled=step.unsettled)
+
+
+def lower_limit(
+    found: LoopFindings, values: Mapping[str, tuple[float, float]], share: float | None, f: float | None
+) -> None:  # fmt: skip
+    """Add the limit to which the gain of a conditionally stable loop may fall, and the frequency there.
+
+    values: of margins.measured_values; nothing without "lower" in them.  share, f: closed forms, f in Hz.
+    """
+    if "lower" in values:
+        meaning = "share of the gain at which the loop becomes unstable"
+        found.measure("lower limit", meaning, "1", *values["lower"], closed=share)
+        found.measure("f_lower", "frequency at that limit", "Hz", *values["f_lower"], closed=f)
