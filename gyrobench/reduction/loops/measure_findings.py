@@ -21,7 +21,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
-from gyrobench.result import NO_VERDICT, BudgetLine, Coefficient, LoopResult, Reason, Response, Table, Test
+from gyrobench.result import NO_VERDICT, BudgetLine, Coefficient, Limit, LoopResult, Reason, Response, Table, Test
 
 EVERY = ("pass", "fail", "inconclusive", NO_VERDICT)
 
@@ -52,13 +52,14 @@ class MeasureFindings:
     def measure(
         self, name: str, meaning: str, unit: str, estimate: float | None, u: float | None = None, *,
         scale: float = 1.0, closed: float | None = None, truth: float | None = None, no_value: str = "",
-        unsettled: str = "", dof: float = math.inf,
+        unsettled: str = "", dof: float = math.inf, limit: Limit | None = None,
     ) -> None:  # fmt: skip
         """Add a row of the table of coefficients; nothing for an estimate of None without a reason.
 
         scale: SI of all numbers per printed unit; 1: they are in that unit.  u: standard uncertainty, None or 0 where
         the data leave none; dof: its degrees of freedom.  closed: the closed form.  no_value: why there is no estimate;
-        without a limit such a row says no more than that.  unsettled: the same, with the verdict void.
+        without a limit such a row says no more than that.  unsettled: the same, with the verdict void.  limit: printed
+        unit, what the test itself requires.
         """
         no_value = unsettled or no_value
         if no_value:
@@ -76,6 +77,7 @@ class MeasureFindings:
                 name=name, meaning=meaning, unit=unit, estimate=value, u=size, k=k, u_a=size, closed=known, truth=true,
                 interval=(value - k * size, value + k * size), dof=dof if math.isfinite(dof) else None,
                 z=(value - true) / size if true is not None and size > 0.0 else None, no_value=no_value,
+                limit=limit,
             )
         )  # fmt: skip
 
