@@ -174,7 +174,7 @@ class Reduction(LoopTest):
         columns = ["phase crossover / Hz", "factor on the gain", "factor / dB", "unstable 5 % above it"]
         found.tables.append(Table("loop.limits", "Gain limits of the closed form", caption, columns, rows))
         resonance = loop.H / math.sqrt(loop.J * loop.J_g)
-        if not self.damped and loop.w_c < 2.0 * resonance:
+        if loop.network in (3, 4) and loop.w_c < 2.0 * resonance:
             text = (
                 "The crossover is below twice the resonance of table and float, "
                 f"{resonance / (2.0 * math.pi):.3g} Hz: the loop is poorly damped. Raise the crossover."
