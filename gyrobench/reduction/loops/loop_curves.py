@@ -59,20 +59,22 @@ def trace(
 
 def over_time(
     name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = "",
-    shown: int = ENVELOPE, envelope: bool = True,
+    shown: int = ENVELOPE, envelope: bool = True, x_unit: str = "s", compared: str = "",
 ) -> Response:  # fmt: skip
-    """Return the figure of several quantities (printed units) over time; runs are compared by the first one.
+    """Return the figure of several quantities (printed units) over time; runs are compared by ``compared``, "": the
+    first one.
 
     Of more points than ``shown`` each stretch of samples is drawn by its smallest and largest value; without
     ``envelope``, by one of them.
     """
-    drawn = []
+    drawn = {}
     for label, y in lines.items():
         pick = _envelope(y, shown) if envelope else thinned(t.size, shown)
-        drawn.append(line(label, t[pick], y[pick]))
+        drawn[label] = line(label, t[pick], y[pick])
+    first = drawn[compared or next(iter(drawn))]
     return Response(
-        name, "time", caption or f"{name[:1].upper()}{name[1:]} over time.", drawn[0]["x"], "time", "s", drawn[0]["y"],
-        y_name or name, unit, curves=drawn,
+        name, "time", caption or f"{name[:1].upper()}{name[1:]} over time.", first["x"], "time", x_unit, first["y"],
+        y_name or name, unit, curves=[*drawn.values()],
     )  # fmt: skip
 
 

@@ -24,12 +24,17 @@ from gyrobench.result import LoopResult
 class MeasureTest:
     """One reduction of one record; see the module."""
 
+    part: ClassVar[str] = ""  # slot of the part that the test is of; "": the instrument that the record names
     ranked_by: ClassVar[str] = ""  # the coefficient that ranks runs in a comparison, smallest first
     found: MeasureFindings
 
     def __init__(self, record: Record) -> None:
         self.record, self.run = record, record.run
         self.found = self.findings()
+        if self.part:
+            self.found.facts["instrument"] = self.name = (
+                self.run.parts[self.part].name if self.part in self.run.parts else ""
+            )
 
     def findings(self) -> MeasureFindings:
         """Return what collects the figures, empty."""
