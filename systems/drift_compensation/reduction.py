@@ -132,7 +132,7 @@ class Reduction(MeasureTest):
 
     def _figures(self, n: int, step: float) -> None:
         parts, model = self.parts, self.model
-        hours = (np.arange(n) + 1) * step / 3600.0
+        hours: Array = (np.arange(n, dtype=np.float64) + 1) * step / 3600.0
         lines = {
             "without": np.sqrt(np.mean(parts["table.theta_free"] ** 2, axis=0)),
             "with": np.sqrt(np.mean(parts["table.theta"] ** 2, axis=0)),
@@ -145,12 +145,9 @@ class Reduction(MeasureTest):
             "Rms over all records of the table angle with and without compensation, by the time since the record "
             "began: logarithm to base 10 of the angle in ″; expected: closed form."
         )
-        drift, estimate, left = (
-            parts["table.M"],
-            parts["compensator.estimate"],
-            parts["table.M"] - parts["compensator.u"],
-        )
-        drawn = {"drift": drift[-1] / DPH, "estimate": estimate[-1] / DPH, "left": left[-1] / DPH}
+        rates = {"drift": parts["table.M"], "estimate": parts["compensator.estimate"]}
+        rates["left"] = parts["table.M"] - parts["compensator.u"]
+        drawn = {k: rate[-1] / DPH for k, rate in rates.items()}
         said = "Last record: drift, its estimate, and the rate that is left (drift less u)."
         self.found.responses += [
             over_time("angle", hours, lines, unit="″", y_name="log₁₀ of the angle", caption=caption, shown=SHOWN,
