@@ -5,7 +5,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.sentences import Sentence, told
-from gyrobench.reduction.loops.loop_curves import line, over_time, trace
+from gyrobench.reduction.loops.loop_curves import line, over_time, thinned, trace
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift, wrapped
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins
@@ -45,6 +45,7 @@ __all__ = [
     "line",
     "margins",
     "over_time",
+    "thinned",
     "told",
     "trace",
     "wrapped",
