@@ -36,6 +36,14 @@ PHI, J, I, V, D, M, A, KAPPA, Y = 0, 3, 5, 6, 8, 11, 14, 16, 17  # noqa: E741
 NOISE = {3: (1.2640, 0.9939), 2: (0.5746, 0.6139)}
 #: white drift, Gauss-Markov drift, tilt: number of the noise, and the states that it drives
 DRIVEN = ((0, slice(D, D + 3)), (1, slice(M, M + 3)), (2, slice(A, A + 2)))
+#: sources of a heading's error, by their ids
+SOURCES = {
+    **{f"gyro.drift.{axis}": f"constant drift along {axis}" for axis in "xyz"},
+    **{f"accelerometer.bias.{axis}": f"accelerometer bias along {axis}" for axis in "xy"},
+    "latitude": "latitude", "torquer.azimuth": "azimuth torquer", "gyro.white": "white drift",
+    "gyro.markov": "Gauss-Markov drift", "accelerometer.noise": "accelerometer noise",
+    "start": "start: tilt 0.1 rad, heading unknown", "base.vibration": "vibration of the base",
+}  # fmt: skip
 FREQUENCIES = 20  # that a gyrocompass may fall to: those that are tried
 SHARE = 0.3  # of a goal, noise of the gyrocompass at last
 
@@ -143,26 +151,24 @@ class History:
     variance: Array
 
     def sources(self, settings: Settings, s: Sensors) -> dict[str, tuple[float, str, Array]]:
-        """Return, by source, size and unit of a constant error (0 of a noise), and what it does to phi over t (n, 3).
+        """Return, by the ids of :data:`SOURCES`, size and unit of a constant error (0 of a noise), and what it does to
+        phi over t (n, 3).
 
         Of constant errors with sign, the response to one standard deviation; of noises their standard deviation.
         """
-        r, g = self.response, settings.gravity
-        north = settings.north
+        r, g, north = self.response, settings.gravity, settings.north
         lean = s.accelerometer / g
-        out = {
-            f"constant drift along {axis}": (s.bias, "rad/s", s.bias * r[:, :, D + k]) for k, axis in enumerate("xyz")
-        }
-        out["accelerometer bias along x"] = (s.accelerometer, "m/s2", -lean * r[:, :, A + 1])  # t_y = phi_y - b_x/g
-        out["accelerometer bias along y"] = (s.accelerometer, "m/s2", lean * r[:, :, A])
+        out = {f"gyro.drift.{axis}": (s.bias, "rad/s", s.bias * r[:, :, D + k]) for k, axis in enumerate("xyz")}
+        out["accelerometer.bias.x"] = (s.accelerometer, "m/s2", -lean * r[:, :, A + 1])  # t_y = phi_y - b_x/g
+        out["accelerometer.bias.y"] = (s.accelerometer, "m/s2", lean * r[:, :, A])
         out["latitude"] = (s.latitude, "rad", s.latitude * (north * r[:, :, D + 2]))
-        out["azimuth torquer"] = (s.scale, "1", s.scale * r[:, :, KAPPA])
-        names = ("white drift", "Gauss-Markov drift", "accelerometer noise")
-        for k, (name, size) in enumerate(zip(names, (s.white, s.markov, s.force / g), strict=True)):
+        out["torquer.azimuth"] = (s.scale, "1", s.scale * r[:, :, KAPPA])
+        noises = {"gyro.white": s.white, "gyro.markov": s.markov, "accelerometer.noise": s.force / g}
+        for k, (name, size) in enumerate(noises.items()):
             out[name] = (0.0, "", size * np.sqrt(np.maximum(self.variance[:, k], 0.0)))
-        out["start: tilt 0.1 rad, heading unknown"] = (0.0, "", np.sqrt(
-            np.sum((0.1 * r[:, :, :2]) ** 2, axis=2) + 0.5 * north**2 * np.sum(r[:, :, J : J + 2] ** 2, axis=2)
-        ))  # fmt: skip
+        tilts = np.sum((0.1 * r[:, :, :2]) ** 2, axis=2)
+        heading = 0.5 * north**2 * np.sum(r[:, :, J : J + 2] ** 2, axis=2)
+        out["start"] = (0.0, "", np.sqrt(tilts + heading))
         return out
 
     def sigma(self, settings: Settings, s: Sensors) -> Array:
@@ -298,15 +304,8 @@ def history(c: Settings, psi: float, total: float, tau: float = 300.0) -> Histor
         X, P = T @ X, T @ P @ T.T + driven
         t += p.time
         at = p.psi
-        rows.append(
-            (
-                t,
-                p.stage,
-                p.stage >= FAST or (p.stage == TO_NORTH and not p.turning),
-                X[:3].copy(),
-                P[:, [0, 1, 2], [0, 1, 2]].copy(),
-            )
-        )
+        usable = p.stage >= FAST or (p.stage == TO_NORTH and not p.turning)
+        rows.append((t, p.stage, usable, X[:3].copy(), P[:, [0, 1, 2], [0, 1, 2]].copy()))
     return History(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

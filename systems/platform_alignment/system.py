@@ -230,11 +230,11 @@ class PlatformAlignment(System):
             arcmin = DEG / 60.0
             h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
             sources = {n: float(np.abs(v[-1, 2])) for n, (_, _, v) in h.sources(c, s).items()}
-            worst = max(sources, key=lambda n: sources[n])
+            worst, most = max(sources.items(), key=lambda x: x[1])
             found.append(
                 f"A standard deviation of {self['wanted'] / arcmin:.3g}′ is not expected within {self['time']:g} s: "
-                f"{sigma[-1] / arcmin:.3g}′ then, {sources[worst] / arcmin:.3g}′ of it by {worst}. Take two positions, "
-                "better sensors, or more time."
+                f"{sigma[-1] / arcmin:.3g}′ then, {most / arcmin:.3g}′ of it by {plans.SOURCES[worst]}. Take two "
+                "positions, better sensors, or more time."
             )
         return found
 
