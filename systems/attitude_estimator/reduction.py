@@ -14,17 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.toolkit import (
-    DEG,
-    DPH,
-    Account,
-    Array,
-    LoopTest,
-    ReductionError,
-    Table,
-    over_time,
-    thinned,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import Account, Array, LoopTest, ReductionError, Table, over_time, thinned
+from gyrobench.units import DEG, DPH
 
 SHOWN = 800  # points of a drawn line
 CALM = ("rest", "rocking")  # phases in which the models of the filters hold: no acceleration of the vehicle before

@@ -11,17 +11,8 @@ from scipy import special
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.toolkit import (
-    ARCSEC,
-    DPH,
-    Account,
-    Array,
-    MeasureTest,
-    ReductionError,
-    RunDocument,
-    over_time,
-    told,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, RunDocument, over_time
+from gyrobench.units import ARCSEC, DPH
 
 from .closed_form import Expected, Model, expected
 
@@ -33,6 +24,10 @@ class Reduction(MeasureTest):
     """Rms of residual rate and angle over records that each begin with the table at zero."""
 
     part = "compensator"
+    said = (
+        "The drift alone turns the table by {angle free} (rms) in a record, compensated it turns by {angle}.",
+        "The drift rate of {rate free} is reduced to {rate}; the drift is known to {error}.",
+    )
     ranked_by = "angle"
 
     def measure(self) -> Account:
@@ -80,13 +75,6 @@ class Reduction(MeasureTest):
                 f"{count} records of {n} readings; u from their number (angles at one time) or their scatter.",
                 "Closed forms: covariance of table and filter together, torquer not limited.",
             ],
-        )
-
-    def summary(self) -> list[str]:
-        return told(
-            self.found.coefficients,
-            "The drift alone turns the table by {angle free} (rms) in a record, compensated it turns by {angle}.",
-            "The drift rate of {rate free} is reduced to {rate}; the drift is known to {error}.",
         )
 
     def _size(self, name: str, meaning: str, values: Array, closed: float | None, unit: str = "″") -> None:

@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.estimator_result import RANKED, Signals, measure
-from gyrobench.reduction.loops.toolkit import (
-    Account,
-    Array,
-    MeasureTest,
-    ReductionError,
-    Response,
-    line,
-    told,
-    trace,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, Response, line, told, trace
 
 from .benchmarks import BENCHMARKS
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
-from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Table, told, trace, wrapped
+from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Table, trace, wrapped
 
 from .field import FieldError, field_at
 
@@ -18,6 +18,12 @@ SHOWN = "heading shown"
 class Reduction(LoopTest):
     """Heading of a slaved gyro against the true one: alignment, rest, sines, turn, disturbed field."""
 
+    said = (
+        "At rest the heading is off by {error at rest}; noise {heading noise}.",
+        "The turn brings the magnetic heading off by up to {magnetic error in the turn}, the heading shown by "
+        "{error in the turn}, and {error after the turn} afterwards.",
+        "A disturbed field moves it by {error in the disturbed field}.",
+    )
     ranked_by = "error after the turn"
 
     def __init__(self, record: Record) -> None:
@@ -60,15 +66,6 @@ class Reduction(LoopTest):
                 "Headings are clockwise from north. Error: heading shown less the one wanted, magnetic or true.",
                 "L is the open loop of the slaving, k/s: its crossover k/2 pi is the cut-off of both filters.",
             ],
-        )
-
-    def summary(self) -> list[str]:
-        return told(
-            self.found.coefficients,
-            "At rest the heading is off by {error at rest}; noise {heading noise}.",
-            "The turn brings the magnetic heading off by up to {magnetic error in the turn}, the heading shown by "
-            "{error in the turn}, and {error after the turn} afterwards.",
-            "A disturbed field moves it by {error in the disturbed field}.",
         )
 
     def _error(self, gate: Gate) -> Array:

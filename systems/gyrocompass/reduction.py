@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Response, line, told, wrapped
+from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Response, line, wrapped
 
 from .findings import KNOWN, CompassFindings, error, means, steaming, wrap
 from .linear import LinearCompass, Steaming
@@ -29,6 +29,12 @@ NAMES = {
 class Reduction(LoopTest):
     """Heading shown less the ship's: settling, free oscillation, change of speed, turn, rolling."""
 
+    said = (
+        "Settled after {settling time} with an error of {latitude error}; undamped period {period}.",
+        "The speed changes the heading shown by {speed error}; then {ballistic error} is left to settle.",
+        "After the turn {ballistic error in the turn} is left to settle.",
+        "Rolling between the quarters moves it by {rolling error}.",
+    )
     ranked_by = "settling time"
     found: CompassFindings
 
@@ -60,15 +66,6 @@ class Reduction(LoopTest):
                 "less the true one, so that an axis that points east of north shows a negative error.",
                 "Closed forms are of small angles, of the compass and the ship as they are in the parts.",
             ],
-        )
-
-    def summary(self) -> list[str]:
-        return told(
-            self.found.coefficients,
-            "Settled after {settling time} with an error of {latitude error}; undamped period {period}.",
-            "The speed changes the heading shown by {speed error}; then {ballistic error} is left to settle.",
-            "After the turn {ballistic error in the turn} is left to settle.",
-            "Rolling between the quarters moves it by {rolling error}.",
         )
 
     def _settling(self, gate: Gate) -> None:

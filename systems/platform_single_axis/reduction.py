@@ -8,16 +8,7 @@ import numpy as np
 
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.platform_measures import command_step, late_noise, level_drift
-from gyrobench.reduction.loops.toolkit import (
-    ARCSEC,
-    DRIFTS,
-    Account,
-    Gate,
-    LoopTest,
-    isolation,
-    margins,
-    told,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import ARCSEC, DRIFTS, Account, Gate, LoopTest, isolation, margins, told
 
 from .budget import ride_budget
 from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, period

@@ -13,28 +13,11 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.loops import platform_measures as common
 from gyrobench.reduction.loops.margins import interpolate_response, measured_values
-from gyrobench.reduction.loops.platform_measures import (
-    command_step,
-    isolation_near,
-    late_noise,
-    lower_limit,
-    settling,
-    stiffness,
-)  # fmt: skip
-from gyrobench.reduction.loops.toolkit import (
-    ARCSEC,
-    DRIFTS,
-    Account,
-    Gate,
-    LoopTest,
-    Point,
-    Table,
-    drift,
-    isolation,
-    margins,
-    told,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import DRIFTS, Account, Gate, LoopTest, Point, drift, isolation, margins, told
+from gyrobench.result import Table
+from gyrobench.units import ARCSEC
 
 from .closed import Loop
 from .system import loop_of
@@ -55,13 +38,13 @@ class Reduction(LoopTest):
             if gate.label == "load step":
                 self._load(gate)
         for gate in found.of("command", 1, "step"):
-            command_step(found, gate, RATE, ("t_5 rate", "settling of the rate to 5 %"), y_name="platform rate")
+            common.command_step(found, gate, RATE, ("t_5 rate", "settling of the rate to 5 %"), y_name="platform rate")
         self._margins(found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]"))
         base = found.ratio(
             "isolation", "motion", 1, ANGLE, "exciter.motion_angle[1]",
             caption="Isolation: inertial angle of the platform over that of the base. Points: measured; lines: linear.",
         )  # fmt: skip
-        isolation_near(found, base, self._transmission)
+        common.isolation_near(found, base, self._transmission)
         if self.hold is not None:
             self._drift(self.hold)
         self.said = self._blow()
@@ -130,11 +113,11 @@ class Reduction(LoopTest):
         M, loop, why = gate.amplitude, self.loop, a.unsettled
         found.measure("θ*", "platform angle under the load, at rest", "″", a.change, a.u_change, scale=ARCSEC,
                       closed=None if loop is None else M / loop.K, unsettled=why)  # fmt: skip
-        stiffness(found, "S", "stiffness at rest, M / θ*", M, a, None if loop is None else loop.K)
+        common.stiffness(found, "S", "stiffness at rest, M / θ*", M, a, None if loop is None else loop.K)
         y = gate[ANGLE] - a.initial
         meaning = "largest platform angle after the load step"
-        found.measure("θ_max", meaning, "″", float(y[np.argmax(np.abs(y))]), late_noise(y), scale=ARCSEC)
-        settling(found, "", "to {band} of θ*", a, 5, 2)
+        found.measure("θ_max", meaning, "″", float(y[np.argmax(np.abs(y))]), common.late_noise(y), scale=ARCSEC)
+        common.settling(found, "", "to {band} of θ*", a, 5, 2)
 
     def _margins(self, points: list[Point]) -> None:
         """Measure the slope at the crossover and the lower gain limit, beside the closed forms of the loop without step
@@ -155,7 +138,7 @@ class Reduction(LoopTest):
             found.measure("slope", "of |L| at the crossover", "dB/dec", slopes[0], u, closed=closed)
         at = None if loop is None else loop.limit()
         share, w = (None, None) if at is None else (at[1], at[0] / (2.0 * math.pi))
-        lower_limit(found, values, share, w)
+        common.lower_limit(found, values, share, w)
         if loop is not None and points:
             found.tables.append(_forms(loop, values))
 

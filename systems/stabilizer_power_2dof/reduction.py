@@ -11,22 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import isolation_near, stiffness
-from gyrobench.reduction.loops.toolkit import (
-    ARCSEC,
-    DPH,
-    DRIFTS,
-    Account,
-    Drift,
-    Gate,
-    LoopTest,
-    Point,
-    drift,
-    isolation,
-    margins,
-    told,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import DRIFTS, Account, LoopTest, isolation, margins, told
+from gyrobench.units import ARCSEC, DPH
 
 ALPHA, BASE = "gyro.alpha", "motion.angle[1]"  # platform against the base, and the base, to be added
 

@@ -11,19 +11,8 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import lower_limit
-from gyrobench.reduction.loops.toolkit import (
-    ARCSEC,
-    Account,
-    Array,
-    Drift,
-    Gate,
-    LoopTest,
-    Point,
-    Table,
-    drift,
-    margins,
-    told,
-)  # fmt: skip
+from gyrobench.reduction.loops.toolkit import Account, Array, Drift, Gate, LoopTest, Point, Table, drift, margins, told
+from gyrobench.units import ARCSEC
 
 from .closed import ServoLoop, loop_of, sense_torque
 

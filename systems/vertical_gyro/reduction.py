@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.toolkit import ARCMIN, DEG, Account, Array, Gate, LoopTest, Table, told, trace
+from gyrobench.reduction.loops.toolkit import ARCMIN, DEG, Account, Array, Gate, LoopTest, Table, trace
 from gyrobench.units import G0
 
 SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks
@@ -51,6 +51,12 @@ def erection_time(tilt: float, zone: float, law: str, rate: float, gain: float) 
 class Reduction(LoopTest):
     """Pitch and roll of the gyro against those of the vehicle, in erection, rest and manoeuvre."""
 
+    said = (
+        "Erected to the dead zone in {t_zone}; at rest it then hangs off by {hang-off}.",
+        "The acceleration leaned the rotor by {lean}.",
+        "After the erection the rotor was never more than {max} from the vertical, and what pitch and roll show "
+        "never more than {shown max}.",
+    )
     ranked_by = "max"
     linearized = False
 
@@ -89,15 +95,6 @@ class Reduction(LoopTest):
                 "The closed figures are those without Earth rate and drift, but where they say so.",
                 "u: what the period of the record leaves of a time, and a step of the erection of an angle.",
             ],
-        )
-
-    def summary(self) -> list[str]:
-        return told(
-            self.found.coefficients,
-            "Erected to the dead zone in {t_zone}; at rest it then hangs off by {hang-off}.",
-            "The acceleration leaned the rotor by {lean}.",
-            "After the erection the rotor was never more than {max} from the vertical, and what pitch and roll show "
-            "never more than {shown max}.",
         )
 
     def _figures(self, t: Array, tilt: Array, shown: Array, first: int) -> None:

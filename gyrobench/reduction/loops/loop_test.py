@@ -16,6 +16,7 @@ from typing import ClassVar
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.fit_result import Account
+from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.result import LoopResult
@@ -26,6 +27,7 @@ class MeasureTest:
 
     part: ClassVar[str] = ""  # slot of the part that the test is of; "": the instrument that the record names
     ranked_by: ClassVar[str] = ""  # the coefficient that ranks runs in a comparison, smallest first
+    said: ClassVar[tuple[str, ...]] = ()  # the numbers that matter, as sentences with coefficients in braces
     found: MeasureFindings
 
     def __init__(self, record: Record) -> None:
@@ -46,7 +48,7 @@ class MeasureTest:
 
     def summary(self) -> list[str]:
         """Return the numbers that matter, as sentences, of a run that has values."""
-        return []
+        return told(self.found.coefficients, *self.said)
 
     @classmethod
     def from_record(cls, record: Record) -> LoopResult:
