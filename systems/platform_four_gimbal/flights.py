@@ -6,12 +6,10 @@ z, the flights of PLATFORM-4GIMBAL (axes forward, left, up) are these.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from gyrobench.system.flight_plan import Leg
-
-DEG = math.pi / 180.0
+from gyrobench.units import DEG
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,7 @@ FLIGHTS = {
     ),
     "roll": Plan("a full roll", (_leg("roll 360°", 5.0, roll=72.0, yaw=0.5), _leg("rest", 1.0))),
     "loop": Plan(
-        "a full loop, through both verticals",
-        (_leg("loop 360°", 5.0, pitch=72.0, yaw=0.5), _leg("rest", 1.0)),
+        "a full loop, through both verticals", (_leg("loop 360°", 5.0, pitch=72.0, yaw=0.5), _leg("rest", 1.0)),
         vertical=True,
     ),
     "crossing": Plan(
@@ -46,27 +43,15 @@ FLIGHTS = {
         (_leg("pitch 180°", 5.0, pitch=36.0, roll=-1.0, yaw=1.0), _leg("inverted", 5.0, roll=-1.0, yaw=1.0)),
         vertical=True,
     ),
-    "beyond": Plan(
-        "at rest at 120° of pitch, the inner roll begins at 1°",
-        (_leg("rest", 2.0),),
-        pitch=-2.1,
-        inner=DEG,
-        vertical=True,
-    ),
+    "beyond": Plan("at rest at 120° of pitch, the inner roll begins at 1°", (_leg("rest", 2.0),), -2.1, DEG, True),
     "wobble": Plan(
-        "on the launcher: a wobble of 3°/s in yaw",
-        (_leg("wobble", 10.0, yaw=3.0, frequency=0.3, rest=0.1),),
-        pitch=90.0 * DEG,
-        vertical=True,
+        "on the launcher: a wobble of 3°/s in yaw", (_leg("wobble", 10.0, yaw=3.0, frequency=0.3, rest=0.1),),
+        90.0 * DEG, vertical=True,
     ),
     "launch": Plan(
         "from the vertical over to level flight, roll 90°, yaw 50°",
-        (
-            _leg("pitch over", 5.0, pitch=-18.0, yaw=0.5),
-            _leg("roll 90°", 2.5, roll=-36.0, yaw=0.5),
-            _leg("yaw 50°", 2.5, yaw=20.5),
-        ),
-        pitch=90.0 * DEG,
-        vertical=True,
+        (_leg("pitch over", 5.0, pitch=-18.0, yaw=0.5), _leg("roll 90°", 2.5, roll=-36.0, yaw=0.5),
+         _leg("yaw 50°", 2.5, yaw=20.5)),
+        90.0 * DEG, vertical=True,
     ),
-}
+}  # fmt: skip
