@@ -38,7 +38,7 @@ class Reduction(LoopTest):
         budgeted = [*self.slowest, *found.of("command", shape="sine"), *found.of("hold")]
         self.shares = budget(found, {_motion(g): g for g in budgeted}, ANGLES)
         coupled, taken, ride = self._coupling(), self._isolation(), self._ride()
-        self.said = (taken, coupled, ride)
+        self.sentences = (taken, coupled, ride)
         for gate in found.of("torque", shape="step"):
             self._load(gate)
         for gate in found.of("command", shape="step"):
@@ -66,7 +66,7 @@ class Reduction(LoopTest):
 
     def summary(self) -> list[str]:
         found, text = self.found, "At rest it drifts by {drift x}, {drift y} and {drift z}."
-        return [*margins(found, *AXES), *bandwidth(found, self._lags()), *told(found.coefficients, *self.said, text)]
+        return [*margins(found, *AXES), *bandwidth(found, self._lags()), *told(found.coefficients, *self.sentences, text)]
 
     def _by(self, motion: str, before: str) -> str:
         """Return the largest source of a motion and its share: "by viscous friction (99 %)"; "" without a budget."""

@@ -47,7 +47,7 @@ class Reduction(LoopTest):
         common.isolation_near(found, base, self._transmission)
         if self.hold is not None:
             self._drift(self.hold)
-        self.said = self._blow()
+        self.after_blow = self._blow()
         return Account(
             method="Load step, command by the gyro's torquer, sine sweeps of loop and base, and drift hold",
             sources=["STAB-FLOATED-2DOF; GSP ch. 5, eq. 5-24..5-26, corrected by EG7, EG8"],
@@ -65,7 +65,7 @@ class Reduction(LoopTest):
         text = "The load leaves the platform {θ*} off and turns it by up to {θ_max}; stiffness {S}."
         found = self.found
         told_ = told(found.coefficients, text, DRIFTS)
-        return [*margins(found), *isolation(found, "isolation", ANGLE), *told_, *self.said]
+        return [*margins(found), *isolation(found, "isolation", ANGLE), *told_, *self.after_blow]
 
     def _truth(self, angle: float) -> float | None:
         """Return the static drift of the x channel, rad/s, on a platform turned by ``angle`` from level: Y = -sin,

@@ -54,7 +54,7 @@ class GimbalTest(LoopTest):
     def measure(self) -> Account:
         found, self.rest = self.found, self.found.at_rest
         legs = [g for g in found.of("hold") if g is not self.rest]
-        self.said = self._flight(Flight(legs, "platform.attitude", self.rest)) if legs else []
+        self.flown_said = self._flight(Flight(legs, "platform.attitude", self.rest)) if legs else []
         for gate in found.of("torque", shape="step"):
             output = self.loaded.format(axis=gate.axis)
             rate, y_name = self.own_rate(output), self.turned(gate)
@@ -67,7 +67,7 @@ class GimbalTest(LoopTest):
     def summary(self) -> list[str]:
         found, lag = self.found, {"servo": float(self.run.parameters.get("platform.lag", 0.0))}
         lags = bandwidth(found, {axis: lag for axis in AXES})
-        return [*self.said, *margins(found, *AXES), *lags, *told(found.coefficients, DRIFTS)]
+        return [*self.flown_said, *margins(found, *AXES), *lags, *told(found.coefficients, DRIFTS)]
 
     def own_rate(self, output: str) -> float:
         """Return the rate of an angle at rest, rad/s; 0 without a drift hold."""
