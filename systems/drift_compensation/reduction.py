@@ -14,7 +14,7 @@ from gyrobench.reduction.loops.estimator_result import consistency_test
 from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, RunDocument, over_time
 from gyrobench.units import ARCSEC, DPH
 
-from .closed_form import Expected, Model, expected
+from .closed_form import CompensatedDrift, ExpectedErrors, expected
 
 SHOWN = 400  # points of a drawn line
 ENOUGH = 1e-3  # p below which a filter is called inconsistent
@@ -197,14 +197,14 @@ def _known(run: RunDocument) -> bool:
     )
 
 
-def _expected(run: RunDocument, n: int) -> Expected:
+def _expected(run: RunDocument, n: int) -> ExpectedErrors:
     p = {k: float(v) for k, v in run.parameters.items() if isinstance(v, int | float)}
     gain = p["table.k"] * (1.0 + p.get("table.k_error", 0.0)) / p["compensator.k"]
     reading = math.hypot(p["table.reading"], p.get("table.quantum", 0.0) / math.sqrt(12.0))
-    true = Model(
+    true = CompensatedDrift(
         p["table.drift"], p["table.drift_tau"], p["table.lag"], reading, p.get("table.white", 0.0), gain
     )  # fmt: skip
-    believed = Model(
+    believed = CompensatedDrift(
         p["compensator.rms"], p["compensator.tau"], p["compensator.lag"], p["compensator.sigma"],
         p.get("compensator.white", 0.0),
     )  # fmt: skip

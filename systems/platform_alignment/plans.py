@@ -125,7 +125,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Piece:
+class AlignmentStretch:
     """A stretch of time with one law: heading in its middle, rate of turning (of the heading), weight of the window."""
 
     stage: int
@@ -176,7 +176,7 @@ class History:
         return np.asarray(np.sqrt(sum(v**2 for _, _, v in self.sources(settings, s).values())))
 
 
-def models(c: Settings, stretches: list[Piece]) -> Array:
+def models(c: Settings, stretches: list[AlignmentStretch]) -> Array:
     """Return F of each stretch (n, 18, 18)."""
     k1, k2, j1, j2, kz, ki = np.array([c.gains(p.stage, p.w, p.rise) for p in stretches]).T
     turning, weight, w = np.array([(p.turning, p.weight, p.w) for p in stretches]).T
@@ -219,33 +219,33 @@ def windowed(c: Settings, stage: int, psi: float) -> Array:
     return T
 
 
-def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
+def pieces(c: Settings, psi: float, total: float) -> Iterator[AlignmentStretch]:
     """Yield the stretches of an alignment whose axis y points to psi at switch-on, for ``total`` s."""
     w = c.level_frequency
-    yield from (Piece(LEVEL, c.level / 60, psi, w=w) for _ in range(60))
+    yield from (AlignmentStretch(LEVEL, c.level / 60, psi, w=w) for _ in range(60))
 
-    def window(stage: int, at: float) -> Iterator[Piece]:
+    def window(stage: int, at: float) -> Iterator[AlignmentStretch]:
         n = 40
         for k in range(n):
             x = (k + 0.5) / n
-            yield Piece(stage, c.coarse_time / n, at, weight=6.0 * x * (1.0 - x) / c.coarse_time, w=w)
+            yield AlignmentStretch(stage, c.coarse_time / n, at, weight=6.0 * x * (1.0 - x) / c.coarse_time, w=w)
 
-    def turn(stage: int, start: float, angle: float) -> Iterator[Piece]:
+    def turn(stage: int, start: float, angle: float) -> Iterator[AlignmentStretch]:
         n = max(1, math.ceil(abs(angle) / 0.2))
         for k in range(n):
             rate = math.copysign(c.rate_max, angle)
-            yield Piece(stage, abs(angle) / c.rate_max / n, start + angle * (k + 0.5) / n, rate, w=w)
+            yield AlignmentStretch(stage, abs(angle) / c.rate_max / n, start + angle * (k + 0.5) / n, rate, w=w)
 
     yield from window(COARSE, psi)
     if c.positions == 2:
         yield from turn(TURN, psi, math.pi)
         rest = 3.0 / (c.damping * w)
-        yield from (Piece(TURN, rest / 5, psi + math.pi, w=w) for _ in range(5))
+        yield from (AlignmentStretch(TURN, rest / 5, psi + math.pi, w=w) for _ in range(5))
         psi = math.remainder(psi + math.pi, 2.0 * math.pi)
         yield from window(SECOND, psi)
     yield from turn(TO_NORTH, psi, -psi)
     level = 1.0 / (c.damping * c.fast_frequency)
-    yield from (Piece(TO_NORTH, level / 10, 0.0, w=c.fast_frequency) for _ in range(10))
+    yield from (AlignmentStretch(TO_NORTH, level / 10, 0.0, w=c.fast_frequency) for _ in range(10))
     begun = c.level + c.positions * c.coarse_time + abs(psi) / c.rate_max + level
     if c.positions == 2:
         begun += math.pi / c.rate_max + rest
@@ -257,7 +257,7 @@ def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
             frequency = max(c.slow_frequency, 1.0 / (1.0 / frequency + FALL * (elapsed - c.fast_time)))
         step = min(0.15 / frequency, left - elapsed, *([c.fast_time - elapsed] if fast else []))
         rise = min((elapsed + 0.5 * step) * c.fast_frequency / RISE, 1.0)
-        yield Piece(FAST if fast else SLOW, step, 0.0, w=frequency, rise=rise)
+        yield AlignmentStretch(FAST if fast else SLOW, step, 0.0, w=frequency, rise=rise)
         elapsed += step
 
 
@@ -267,7 +267,7 @@ def transition(F: Array) -> Array:
     return np.asarray(unit + F @ (unit + F @ (unit + F @ (unit + F / 4.0) / 3.0) / 2.0))
 
 
-def steps(c: Settings, stretches: list[Piece], tau: float) -> tuple[Array, Array]:
+def steps(c: Settings, stretches: list[AlignmentStretch], tau: float) -> tuple[Array, Array]:
     """Return the transition over each stretch (n, 18, 18) and what each noise adds to the covariance (n, 3, 18, 18)."""
     F = models(c, stretches)
     F[:, M : M + 3, M : M + 3] = -np.eye(3) / tau

@@ -27,7 +27,7 @@ TOLD = ("bias", "markov", "white", "accelerometer", "force", "tau", "latitude", 
 
 
 @dataclass(frozen=True)
-class Run:
+class AlignmentColumns:
     """What a record holds, as columns over time; true, lean: true heading, true tilt about x and y."""
 
     t: Array
@@ -76,7 +76,7 @@ def attitude(theta: Array, tilt: Array) -> tuple[Array, Array]:
     return np.arctan2(C[1, 0], C[1, 1]), np.column_stack([C[1, 2], -C[0, 2]])
 
 
-def read(record: Record) -> Run:
+def read(record: Record) -> AlignmentColumns:
     """Return the columns of a record.  Raises ReductionError where one is missing."""
     c = record.channels
     names = ("controller.heading", "controller.sigma", "controller.mode", "controller.status", "controller.ready")
@@ -91,7 +91,7 @@ def read(record: Record) -> Run:
     tilt = columns("site.tilt", 3) if "site.tilt[1]" in c else np.zeros_like(theta)
     true, lean = attitude(theta, tilt)
     psi, sigma, mode, status, ready = (np.asarray(c[n], dtype=float) for n in names)
-    return Run(
+    return AlignmentColumns(
         np.asarray(c["time"], dtype=float), mode, status, ready, psi, sigma, columns("controller.tilt", 2),
         columns("controller.sigma_tilt", 2), true, lean,
     )  # fmt: skip

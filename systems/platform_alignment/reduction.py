@@ -19,7 +19,7 @@ from gyrobench.reduction.loops.toolkit import ARCMIN, Account, MeasureTest, told
 from gyrobench.reduction.setup.run_metadata import Site
 
 from . import plans, shown
-from .record import Alignment, Run
+from .record import Alignment, AlignmentColumns
 
 AT_LIMIT = 0.1  # share of the second half of the gyrocompass with a limit active
 RESTLESS = 2.0  # rms of the tilt as measured over the one expected, beyond which the platform moves more than is stated
@@ -163,7 +163,7 @@ class Reduction(MeasureTest):
             found.doubt(id, said)
 
 
-def _final(run: Run) -> int | None:
+def _final(run: AlignmentColumns) -> int | None:
     """Return the row that the heading is stated for: where it became ready for good, else the last one."""
     if run.first(plans.FAST) is None:
         return None
@@ -172,7 +172,7 @@ def _final(run: Run) -> int | None:
     return int(run.t.size - 1)
 
 
-def _why_not(run: Run, wanted: float) -> str:
+def _why_not(run: AlignmentColumns, wanted: float) -> str:
     words = {2.0: "the rates contradict the Earth rate", 3.0: "the platform is not level"}
     if run.status[-1] in words:
         return words[float(run.status[-1])]

@@ -11,13 +11,13 @@ from gyrobench.result import BudgetLine, Response, Table
 from gyrobench.units import ARCMIN, ARCSEC, DEG
 
 from . import plans
-from .record import Alignment, K, Run
+from .record import Alignment, AlignmentColumns, K
 
 GOALS = (60.0, 30.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5)  # ′
 UNITS = {"rad/s": (plans.DPH, "°/h"), "m/s2": (1e-6 * 9.80665, "µg"), "rad": (DEG, "°"), "1": (1.0, "1")}
 
 
-def figures(run: Run, fine: int) -> list[Response]:
+def figures(run: AlignmentColumns, fine: int) -> list[Response]:
     """Return the heading error with its interval, from the coarse heading on and in the gyrocompass; tilt; standard
     deviation.
     """
@@ -41,7 +41,7 @@ def figures(run: Run, fine: int) -> list[Response]:
     return [heading, tilt, _against(run, fine)]
 
 
-def _reached(run: Run, goal: float) -> int | None:
+def _reached(run: AlignmentColumns, goal: float) -> int | None:
     """Return the row from which the standard deviation of the heading at north stays at the goal (rad); None: never."""
     bad = run.sigma > goal
     if run.north is None or bad[-1]:
@@ -50,7 +50,7 @@ def _reached(run: Run, goal: float) -> int | None:
     return max(stays, run.north)
 
 
-def _against(run: Run, fine: int) -> Response:
+def _against(run: AlignmentColumns, fine: int) -> Response:
     """Return the figure of the time to be ready against the standard deviation wanted."""
     goals = np.geomspace(max(run.sigma[fine:].min(), 1e-9), run.sigma[fine:].max(), 60)
     rows = [(g / ARCMIN, float(run.t[k])) for g in goals for k in [_reached(run, float(g))] if k is not None]

@@ -64,7 +64,7 @@ NOISE = ("white", "pickoff", *SLOW.split())
 PLATFORM = ("viscous", "k_t", "k_e", "R", "L", "friction", "stiction", "presliding", "I_r", "I_f", "I_a")
 
 
-class Loop:
+class ElementResponses:
     """Responses of the element's angles (rows x, y, z) in the closed linear model of a run.
 
     slides: the joints move.  The linear model takes dry friction for its elastic contact, K_c = K + s sqrt(K J); a
@@ -179,7 +179,7 @@ def joints(base: Array, start: Array) -> Array:
     return np.array([-np.arcsin(c[:, 2, 1]), np.arctan2(c[:, 2, 0], c[:, 2, 2]), np.arctan2(c[:, 0, 1], c[:, 1, 1])])
 
 
-def torques(loop: Loop, base: Array, theta: Array, dt: float) -> dict[str, Array]:
+def torques(loop: ElementResponses, base: Array, theta: Array, dt: float) -> dict[str, Array]:
     """Return source -> torque (3, samples; A order, N.m) of the moving base about the motor axes."""
     p = loop.platform
 
@@ -233,7 +233,7 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
     Nothing without a linear model of the bench's own parts.
     """
     try:
-        loops = {slides: Loop(found, angles, slides) for slides in (True, False)}
+        loops = {slides: ElementResponses(found, angles, slides) for slides in (True, False)}
     except (LookupError, ValueError, StopIteration):
         return {}
     rows: list[list[Any]] = []
@@ -280,7 +280,7 @@ def _mean(x: Array, y: Array) -> float:
     return float(np.mean(np.sum(x * y, axis=0)))
 
 
-def _moved(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
+def _moved(loop: ElementResponses, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     """Return the parts of the base's motion (3, samples), rad, and the measured rms.
 
     A motion that does not close to whole periods is weighted by Hann's window, scaled to a mean square of 1.
@@ -300,7 +300,7 @@ def _moved(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     return loop.split(of_base, dt), size
 
 
-def _commanded(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
+def _commanded(loop: ElementResponses, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     """Return the parts of the angle about the two other axes (3, samples), rad, and the measured rms of it."""
     k = gate.axis - 1
     f = np.array([gate.f])

@@ -66,7 +66,11 @@ class Reduction(LoopTest):
 
     def summary(self) -> list[str]:
         found, text = self.found, "At rest it drifts by {drift x}, {drift y} and {drift z}."
-        return [*margins(found, *AXES), *bandwidth(found, self._lags()), *told(found.coefficients, *self.sentences, text)]
+        return [
+            *margins(found, *AXES),
+            *bandwidth(found, self._lags()),
+            *told(found.coefficients, *self.sentences, text),
+        ]
 
     def _by(self, motion: str, before: str) -> str:
         """Return the largest source of a motion and its share: "by viscous friction (99 %)"; "" without a budget."""

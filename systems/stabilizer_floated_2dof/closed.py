@@ -14,7 +14,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Loop:
+class LagLeadLoop:
     """J: kg.m2; K: K_m K_x K_G, torque per angle at rest, N.m/rad; time constants in s, T1 and T2 above 0."""
 
     J: float

@@ -19,7 +19,7 @@ from gyrobench.reduction.loops.toolkit import DRIFTS, Account, Gate, LoopTest, P
 from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
-from .closed import Loop
+from .closed import LagLeadLoop
 from .system import loop_of
 
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
@@ -182,13 +182,13 @@ class Reduction(LoopTest):
         return [f"After a blow of {size} the loop comes back to rest."]
 
 
-def _secant(loop: Loop, w: float) -> float:
+def _secant(loop: LagLeadLoop, w: float) -> float:
     """Return the slope of |L| between w/1.25 and 1.25 w, dB per decade: what is measured."""
     ends = [abs(loop.gain(1j * w * x)) for x in (1.0 / 1.25, 1.25)]
     return 20.0 * math.log10(ends[1] / ends[0]) / math.log10(1.25**2)
 
 
-def _forms(loop: Loop, values: Mapping[str, tuple[float, float]]) -> Table:
+def _forms(loop: LagLeadLoop, values: Mapping[str, tuple[float, float]]) -> Table:
     w, pm = loop.margin()
     at = loop.limit()
     rows: list[list[Any]] = [

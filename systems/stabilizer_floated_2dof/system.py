@@ -12,7 +12,7 @@ from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
-from .closed import Loop
+from .closed import LagLeadLoop
 
 RANGE = 0.1  # rad, of the pickoffs
 CAGE = 12.0  # A/V, from u_y to the torquer about x: the second channel follows the case with about 10 1/s
@@ -27,12 +27,12 @@ TIMES = ("tau1", "T1", "tau2", "T2")
 NAMES = ("platform.J", "platform.k_t", "platform.R", "gyro.K_sg_x", "stabilizer.K", *(f"stabilizer.{n}" for n in TIMES))
 
 
-def loop_of(parameters: Mapping[str, Any]) -> Loop | None:
+def loop_of(parameters: Mapping[str, Any]) -> LagLeadLoop | None:
     """The closed form of the parts with these parameters; None where they do not have them (another stabilizer)."""
     if any(n not in parameters for n in NAMES) or parameters.get("stabilizer.integral"):
         return None
     j, k_t, r, k_sg, gain, *times = (float(parameters[n]) for n in NAMES)
-    return Loop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
+    return LagLeadLoop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
 
 
 class StabilizerFloated2dof(OneAxisTest):
@@ -125,7 +125,7 @@ class StabilizerFloated2dof(OneAxisTest):
 
     def crossovers(self) -> dict[str, float]:
         """That of the closed form, where its loop is stable."""
-        loop = Loop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
+        loop = LagLeadLoop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
         return {"stabilizer": loop.margin()[0] / (2.0 * math.pi)} if loop.stable() else {}
 
     def check(self) -> list[str]:

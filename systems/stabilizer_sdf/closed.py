@@ -17,7 +17,7 @@ from gyrobench.arrays import Array
 
 
 @dataclass(frozen=True)
-class Axis:
+class StabilizedAxis:
     """J0 platform, J gyro about its output axis (kg.m2), H N.m.s, C N.m.s/rad, K N.m/rad, M N.m.  H stands for H c."""
 
     J0: float
@@ -56,18 +56,18 @@ class Axis:
         return np.column_stack([(0.5 * (slow[0] + slow[1])).real, ((slow[1] - slow[0]) / (2j * root)).real])
 
 
-def integrating(p: Axis, t: Array) -> tuple[Array, Array]:
+def integrating(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
     """a, b for C = K = 0  [5-29]: exact for held c."""
     n, lean = p.n, p.M / p.stiffness
     return lean * (1.0 - np.cos(n * t)), p.M * t / p.H - lean * math.sqrt(p.J0 / p.J) * np.sin(n * t)
 
 
-def line(p: Axis) -> tuple[float, float]:
+def line(p: StabilizedAxis) -> tuple[float, float]:
     """Offset and slope of the platform's limit line, rate-integrating: o (1 - 4 zeta2 J M / H2) and C M / H2."""
     return p.J * p.M / p.H**2 * (1.0 - 4.0 * p.zeta**2), p.C * p.M / p.H**2
 
 
-def rate_integrating(p: Axis, t: Array) -> tuple[Array, Array]:
+def rate_integrating(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
     """a, b for K = 0, C > 0, at any damping: the exact solution behind 5-34."""
     o, r = line(p)
     q = p.C / (2.0 * p.J)
@@ -78,7 +78,7 @@ def rate_integrating(p: Axis, t: Array) -> tuple[Array, Array]:
     return a, (p.M * t - p.J0 * rate) / p.H
 
 
-def light(p: Axis, t: Array) -> tuple[Array, Array]:
+def light(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
     """a, b by 5-34 for light damping (zeta < 0.3), with J0 for the printed J in the third term of b (EG9)."""
     q = p.C / (2.0 * p.J)
     n1 = math.sqrt(p.n**2 - q**2)
@@ -88,7 +88,7 @@ def light(p: Axis, t: Array) -> tuple[Array, Array]:
     return a, b - p.J0 * p.C * p.M / p.H**3 * (1.0 - fall * np.cos(n1 * t))
 
 
-def rate(p: Axis, t: Array) -> tuple[Array, Array]:
+def rate(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
     """a, b for K > 0: parabola, line and constant of 5-42 completed, and the transient that makes the start rest."""
     total = p.K * p.J0 + p.H**2
     acceleration, slope = p.M * p.K / total, p.C * p.H**2 * p.M / total**2

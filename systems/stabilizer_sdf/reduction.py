@@ -16,7 +16,7 @@ from gyrobench.result import Table
 from gyrobench.units import ARCMIN, DPH
 
 from . import closed
-from .closed import Axis
+from .closed import StabilizedAxis
 
 SHOWN = 500  # points of a drawn curve
 EQUATIONS = {
@@ -108,7 +108,7 @@ SAID = {
 }
 
 
-def plant(run: RunDocument, held: float = 1.0) -> Axis:
+def plant(run: RunDocument, held: float = 1.0) -> StabilizedAxis:
     """The axis as the parts had it, with H times the cos(b) that the closed forms hold."""
     q = run.parameters
     names = ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K")
@@ -116,15 +116,17 @@ def plant(run: RunDocument, held: float = 1.0) -> Axis:
     if missing:
         raise ReductionError([f"the record does not say {n}" for n in missing])
     j0, j, spin, c, k = (float(q[n]) for n in names)
-    return Axis(j0, j, spin * held, c, k, float(run.options["M"]))
+    return StabilizedAxis(j0, j, spin * held, c, k, float(run.options["M"]))
 
 
-def coupling(p: Axis, t: Array | float, step: float) -> Any:
+def coupling(p: StabilizedAxis, t: Array | float, step: float) -> Any:
     """What the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
     return p.M * step * np.asarray(t) / p.J0
 
 
-def _closed_forms(found: LoopFindings, p: Axis, kind: str, form: str, gate: Gate, t: Array, step: float) -> None:
+def _closed_forms(
+    found: LoopFindings, p: StabilizedAxis, kind: str, form: str, gate: Gate, t: Array, step: float
+) -> None:
     """Coefficients of the kind, the two curves, and how far they are apart."""
     a, b = gate["platform.attitude"] - gate["platform.attitude"][0], gate["gyro.b"] - gate["gyro.b"][0]
     wanted_a, wanted_b = closed.light(p, t) if form == "light" else closed.FORMS[kind](p, t)
@@ -165,7 +167,7 @@ def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
     return x / size, u / size
 
 
-def _integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+def _integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
     """a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
     from scipy.optimize import minimize_scalar
 
@@ -188,7 +190,7 @@ def _integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, ste
                   closed=math.degrees(p.M / p.H))  # fmt: skip
 
 
-def _rate_integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+def _rate_integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
     """a = o + r t and the transient, b = line and transient."""
     columns = np.column_stack([np.ones(t.size), t, p.transient(t)])
     x, u = least_squares(columns, a)
@@ -206,7 +208,7 @@ def _rate_integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array
                   scale=ARCMIN, closed=-p.J0 * p.C * p.M / p.H**3)  # fmt: skip
 
 
-def _rate(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
+def _rate(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
     """a = parabola and the transient."""
     x, u = least_squares(np.column_stack([0.5 * t**2, t, np.ones(t.size), p.transient(t)]), a)
     inertia = p.M / x[0]
@@ -218,13 +220,13 @@ def _rate(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: floa
                   math.hypot(u[1], slide), scale=ARCMIN, closed=p.C * p.H**2 * p.M / total**2)  # fmt: skip
 
 
-def _slope(p: Axis, t: Array, a: Array) -> tuple[float, float]:
+def _slope(p: StabilizedAxis, t: Array, a: Array) -> tuple[float, float]:
     """Rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
     x, u = least_squares(np.column_stack([t - t[0], np.ones(t.size), p.transient(t - t[0])]), a)
     return float(x[0]), float(u[0])
 
 
-def _drift(found: LoopFindings, p: Axis, kind: str) -> None:
+def _drift(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
     """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
     own = level_drift(found.run.parameters)
     for gate in found.of("hold") if kind != "rate" else ():
@@ -233,7 +235,7 @@ def _drift(found: LoopFindings, p: Axis, kind: str) -> None:
         found.measure("drift", "rate of the axis after the load", "°/h", r, u, scale=DPH, closed=turned)
 
 
-def _command(found: LoopFindings, p: Axis, kind: str) -> None:
+def _command(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
     """Change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c = cos(b).
 
     Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
@@ -253,7 +255,7 @@ def _command(found: LoopFindings, p: Axis, kind: str) -> None:
                       u_share, closed=wanted)  # fmt: skip
 
 
-def _derived(p: Axis, kind: str, held: float) -> Table:
+def _derived(p: StabilizedAxis, kind: str, held: float) -> Table:
     rows: list[list[Any]] = [
         ["cos(b) held by the closed forms, mean over the load", held, "1"],
         ["nutation without damping, √(H²/(J J0) + K/J)", p.n, "rad/s"],
