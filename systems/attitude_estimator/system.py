@@ -91,7 +91,7 @@ class AttitudeEstimatorTest(LoopTest):
         return [LoopPhase(p, dwell=lengths.get(p, 0.0)) for p in self.asked()]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        """Manoeuvres by phase; the compensation knows the errors, the filters the noise of the instruments."""
+        """Return manoeuvres by phase; the compensation knows the errors, the filters the noise of the instruments."""
         peak = math.pi / self["period"] * self["rocking"] if self["period"] else 0.0  # of the rate, for the angle's
         rows = {
             "acceleration": {"forward": self["acceleration"]},
@@ -119,7 +119,7 @@ class AttitudeEstimatorTest(LoopTest):
         return self.not_offered(PHASES) + self.not_positive("rest", "period", "time", "gate")
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """A base that flies no manoeuvres moves by itself: phases named after manoeuvres would say what is not so."""
+        """Refuse phases named after manoeuvres on a base that flies none, but moves by itself."""
         moving = [p for p in self.asked() if p in ("rocking", "turn", "acceleration")]
         if not moving or "motion.forward[1]" in parameters or "motion.forward" in parameters:
             return []

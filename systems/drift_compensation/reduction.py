@@ -31,7 +31,7 @@ class Reduction(MeasureTest):
     ranked_by = "angle"
 
     def measure(self) -> Account:
-        """Raises ReductionError where the record holds fewer than three whole records."""
+        """Measure the records.  Raises ReductionError for fewer than three whole ones."""
         run, c, found = self.run, self.record.channels, self.found
         rows = whole_records(c, float(run.options["length"]), float(run.options["Ts"]))
         self.parts = parts = {n: np.asarray(x, dtype=float)[rows] for n, x in c.items()}  # (records, readings)

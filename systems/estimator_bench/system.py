@@ -60,7 +60,7 @@ class EstimatorBench(System):
 
     @property
     def step(self) -> float:
-        """The sampling period of the benchmark: the source makes one reading a step, so no other step has a meaning."""
+        """Return the sampling period of the benchmark: the source makes one reading a step, no other has a meaning."""
         return self.benchmark.Ts
 
     @step.setter

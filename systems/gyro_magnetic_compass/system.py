@@ -119,7 +119,7 @@ class GyroMagneticCompass(LoopTest):
         return field_at(str(self["date"]), *site) if self["date"] else None
 
     def phases(self) -> list[LoopPhase]:
-        """Alignment, rest, sines about the cut-off k/2 pi, the turn and what it leaves, the disturbed field."""
+        """Return alignment, rest, sines about the cut-off k/2 pi, the turn and what it leaves, the disturbed field."""
         corner, wait = self["k"] / (2.0 * math.pi), 6.0 / self["k"]
         tones = [corner * x for x in (0.4, 0.7, 1.0, 1.5, 3.0)]
         aligned = abs(self["offset"]) / self["limit"] + 2.0 * wait

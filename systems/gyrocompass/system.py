@@ -117,18 +117,18 @@ class GyrocompassTest(LoopTest):
 
     @property
     def north(self) -> float:
-        """Horizontal Earth rate, rad/s."""
+        """Return the horizontal Earth rate, rad/s."""
         return float(self["earth_rate"]) * math.cos(self["latitude"])
 
     @property
     def omega(self) -> float:
-        """Frequency without damping, rad/s, as the compass is designed."""
+        """Return the frequency without damping, rad/s, as the compass is designed."""
         if self["period"] > 0.0:
             return 2.0 * math.pi / float(self["period"])
         return math.sqrt(G0 / RADIUS + self.north**2)
 
     def damped(self) -> float:
-        """s, length of a damped phase: eight times the slowest decay time."""
+        """Return the length (s) of a damped phase: eight times the slowest decay time."""
         if self["settle"] > 0.0:
             return float(self["settle"])
         ratio = float(self["damping_ratio"])
@@ -139,7 +139,7 @@ class GyrocompassTest(LoopTest):
         return ten(6.0 * math.pi / self.omega)
 
     def phases(self) -> list[LoopPhase]:
-        """The phases asked for, each with what has to come before and after it; the settling is always first."""
+        """Return the phases asked for, each with what has to come before and after it; the settling is always first."""
         wanted, wait = self.asked(), self.damped()
         free = ten(5.0 * math.pi / self.omega)
         cut: dict[str, Any] = {"kind": "test", "amplitude": 1.0} if self["cut"] else {}

@@ -37,7 +37,7 @@ class Reduction(MeasureTest):
     ranked_by = "ready time"
 
     def measure(self) -> Account:
-        """Raises ReductionError for a record without the columns of an alignment."""
+        """Measure heading, tilt and times.  Raises ReductionError for a record without the columns of an alignment."""
         found, self.a = self.found, Alignment(self.record)
         run, fine = self.a.run, self.a.fine
         channels = self.record.channels.items()

@@ -128,12 +128,12 @@ class PlatformAlignment(System):
 
     @property
     def stop(self) -> float:  # type: ignore[override]
-        """Past the end by ``time``, which the controller says, s."""
+        """Return a time past the end by ``time``, which the controller says, s."""
         return float(self["time"]) + 1.0
 
     @property
     def sensors(self) -> plans.Sensors:
-        """What the controller is told of its sensors: the grade, and the options of type B."""
+        """Return what the controller is told of its sensors: the grade, and the options of type B."""
         grade = plans.GRADES.get(self["grade"], plans.GRADES["navigation"])
         return replace(grade, latitude=self["u_latitude"], scale=self["u_scale"])
 
@@ -218,7 +218,7 @@ class PlatformAlignment(System):
 
 
 def _level_drift(parts: PartValues, gravity: float) -> list[float]:
-    """Static drift of each gyro on the level platform, from the coefficients that the parts have."""
+    """Return the static drift of each gyro on the level platform, from the coefficients that the parts have."""
     found = []
     for slot, mount in MOUNTS.items():
         values = {n: float(parts.get(f"{slot}.{n}", 0.0)) for n in drift.NAMES}

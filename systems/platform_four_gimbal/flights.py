@@ -24,7 +24,7 @@ class FlightPlan:
 
 
 def _leg(label: str, time: float, pitch: float = 0.0, roll: float = 0.0, yaw: float = 0.0, **more: float) -> Leg:
-    """Rates in deg/s."""
+    """Return a leg; rates in deg/s."""
     return Leg(label, time, pitch * DEG, roll * DEG, yaw * DEG, **more)
 
 

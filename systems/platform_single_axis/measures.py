@@ -30,14 +30,14 @@ PURPOSES = {
 
 
 def jitter(y: Array, n: int) -> Array:
-    """y less its running mean over n samples, without the ends: the wander of the gyro is no error of the loop."""
+    """Return y less its running mean over n samples, without the ends: the gyro's wander is no error of the loop."""
     slow = np.convolve(y, np.full(n, 1.0 / n), "valid")
     first = (n - 1) // 2
     return np.asarray(y[first : first + slow.size] - slow)
 
 
 def level(y: Array, stretches: int = 10) -> UncertainValue:
-    """Root mean square of a ride by a sine, with noise.  u from the scatter of the mean squares of ten stretches."""
+    """Return the rms of a ride by a sine, with noise; u from the scatter of the mean squares of ten stretches."""
     squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
     whole = math.sqrt(float(np.mean(y * y)))
     u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0

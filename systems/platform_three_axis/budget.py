@@ -160,7 +160,7 @@ def _stiffness(p: Mapping[str, Array]) -> Array:
 
 # --------------------------------------------------------------------------------------- torques of the base
 def _turn(axis: int, angle: Array) -> Array:
-    """Passive rotations (samples, 3, 3) about an axis 0, 1, 2."""
+    """Return passive rotations (samples, 3, 3) about an axis 0, 1, 2."""
     c, s = np.cos(angle), np.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out = np.zeros((angle.size, 3, 3))
@@ -171,7 +171,7 @@ def _turn(axis: int, angle: Array) -> Array:
 
 
 def joints(base: Array, start: Array) -> Array:
-    """Joint angles (3, samples; A order) of an element at rest in space.  base: pitch, roll, heading (3, samples)."""
+    """Return the joint angles (3, samples; A order) of an element at rest in space; base: pitch, roll, heading."""
     of_base = _turn(1, base[1]) @ _turn(0, base[0]) @ _turn(2, base[2])
     first = [np.array([x]) for x in start]
     element = (_turn(2, first[2]) @ _turn(0, first[0]) @ _turn(1, first[1]) @ of_base[:1])[0]
@@ -202,7 +202,7 @@ def torques(loop: ElementResponses, base: Array, theta: Array, dt: float) -> dic
 
 
 def _contact(theta: Array, friction: float, presliding: float) -> Array:
-    """Torque of an elastic contact that slides: twice round, so that it begins as it ends."""
+    """Return the torque of an elastic contact that slides: twice round, so that it begins as it ends."""
     out, anchor = np.zeros(theta.size), float(theta[0])
     if friction > 0.0:
         for k, x in enumerate([*theta, *theta]):
@@ -212,7 +212,7 @@ def _contact(theta: Array, friction: float, presliding: float) -> Array:
 
 
 def _reaction(p: Mapping[str, Array], base: Array, theta: Array, rate: Any) -> Array:
-    """Torque about the motor axes of the inertia of roll and pitch gimbal, which the base takes along."""
+    """Return the torque about the motor axes of the inertia of roll and pitch gimbal, which the base takes along."""
     (p_, r_, _), turn = base, rate(base)
     w_b = np.array([np.cos(r_) * turn[0] - np.sin(r_) * np.cos(p_) * turn[2], turn[1] + np.sin(p_) * turn[2],
                     np.sin(r_) * turn[0] + np.cos(r_) * np.cos(p_) * turn[2]])  # fmt: skip

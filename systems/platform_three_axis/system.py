@@ -82,7 +82,7 @@ class PlatformThreeAxis(ThreeAxisTest):
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:
-        """Load steps, commands, base sines at 0.5, 0.7, 0.9 Hz and a sweep about x, test sines of each axis, drift."""
+        """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift."""
         f, fc = self["frequency"], self["crossover"]
         rate = self["swing"] * 2.0 * math.pi * f
         phases = [

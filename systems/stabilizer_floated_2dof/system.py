@@ -28,7 +28,7 @@ NAMES = ("platform.J", "platform.k_t", "platform.R", "gyro.K_sg_x", "stabilizer.
 
 
 def loop_of(parameters: Mapping[str, Any]) -> LagLeadLoop | None:
-    """The closed form of the parts with these parameters; None where they do not have them (another stabilizer)."""
+    """Return the closed form of parts with these parameters; None of other ones (another stabilizer)."""
     if any(n not in parameters for n in NAMES) or parameters.get("stabilizer.integral"):
         return None
     j, k_t, r, k_sg, gain, *times = (float(parameters[n]) for n in NAMES)
@@ -124,12 +124,12 @@ class StabilizerFloated2dof(OneAxisTest):
         return MOTORS.get(self["motor"], MOTORS["ideal"])
 
     def crossovers(self) -> dict[str, float]:
-        """That of the closed form, where its loop is stable."""
+        """Return that of the closed form, where its loop is stable."""
         loop = LagLeadLoop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
         return {"stabilizer": loop.margin()[0] / (2.0 * math.pi)} if loop.stable() else {}
 
     def check(self) -> list[str]:
-        """Refusals of values; an unstable loop is let run, warned with its pole."""
+        """Return refusals of values; an unstable loop is let run, warned with its pole."""
         problems = self.not_positive("J_x", "stiffness", "K_G", "T1", "T2") + self.no_choice(motor=MOTORS)
         most = V_MAX * MOTORS["ideal"]["k_t"] / MOTORS["ideal"]["R"]
         if abs(self["load"]) >= most:
@@ -144,7 +144,7 @@ class StabilizerFloated2dof(OneAxisTest):
         return [] if falling else ["the network is not a lag and a lead: T1 > tau1 > tau2 > T2 does not hold"]
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """Nothing is refused here; what is known of the loop before the run is said."""
+        """Say what is known of the loop before the run; nothing is refused here."""
         loop = loop_of(parameters)
         at = loop.limit() if loop is not None and loop.stable() else None
         if at is not None and at[1] < 1.0 and abs(self["blow"]) > 0.0:

@@ -109,7 +109,7 @@ SAID = {
 
 
 def plant(run: RunDocument, held: float = 1.0) -> StabilizedAxis:
-    """The axis as the parts had it, with H times the cos(b) that the closed forms hold."""
+    """Return the axis as the parts had it, with H times the cos(b) that the closed forms hold."""
     q = run.parameters
     names = ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K")
     missing = [n for n in names if n not in q]
@@ -120,14 +120,14 @@ def plant(run: RunDocument, held: float = 1.0) -> StabilizedAxis:
 
 
 def coupling(p: StabilizedAxis, t: Array | float, step: float) -> Any:
-    """What the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
+    """Return what the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
     return p.M * step * np.asarray(t) / p.J0
 
 
 def _closed_forms(
     found: LoopFindings, p: StabilizedAxis, kind: str, form: str, gate: Gate, t: Array, step: float
 ) -> None:
-    """Coefficients of the kind, the two curves, and how far they are apart."""
+    """Measure the coefficients of the kind, and show the two curves and how far they are apart."""
     a, b = gate["platform.attitude"] - gate["platform.attitude"][0], gate["gyro.b"] - gate["gyro.b"][0]
     wanted_a, wanted_b = closed.light(p, t) if form == "light" else closed.FORMS[kind](p, t)
     end = float(coupling(p, t[-1], step))
@@ -158,7 +158,7 @@ def _closed_forms(
 
 
 def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Coefficients and their standard uncertainties by ordinary least squares."""
+    """Return coefficients and their standard uncertainties by ordinary least squares."""
     size = np.abs(columns).max(axis=0)
     x, *_ = np.linalg.lstsq(columns / size, y, rcond=None)
     rest = y - columns / size @ x
@@ -168,7 +168,7 @@ def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
+    """Fit a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
     from scipy.optimize import minimize_scalar
 
     def columns(n: float) -> Array:
@@ -191,7 +191,7 @@ def _integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: 
 
 
 def _rate_integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = o + r t and the transient, b = line and transient."""
+    """Fit a = o + r t and the transient, b = line and transient."""
     columns = np.column_stack([np.ones(t.size), t, p.transient(t)])
     x, u = least_squares(columns, a)
     o, r = closed.line(p)
@@ -209,7 +209,7 @@ def _rate_integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array
 
 
 def _rate(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = parabola and the transient."""
+    """Fit a = parabola and the transient."""
     x, u = least_squares(np.column_stack([0.5 * t**2, t, np.ones(t.size), p.transient(t)]), a)
     inertia = p.M / x[0]
     found.measure("J0 + H²/K", "apparent inertia of the axis", "kg.m2", inertia, inertia * u[0] / abs(x[0]),
@@ -221,13 +221,13 @@ def _rate(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, 
 
 
 def _slope(p: StabilizedAxis, t: Array, a: Array) -> tuple[float, float]:
-    """Rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
+    """Return the rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
     x, u = least_squares(np.column_stack([t - t[0], np.ones(t.size), p.transient(t - t[0])]), a)
     return float(x[0]), float(u[0])
 
 
 def _drift(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
-    """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
+    """Measure how the axis follows the drift of its gyro after the load; with a rate gyro it keeps its rate."""
     own = level_drift(found.run.parameters)
     for gate in found.of("hold") if kind != "rate" else ():
         r, u = _slope(p, gate.t, gate["platform.attitude"])
@@ -236,7 +236,8 @@ def _drift(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
 
 
 def _command(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
-    """Change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c = cos(b).
+    """Measure the change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c =
+    cos(b).
 
     Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
     da'/(k i) = H2 c / (H2 c2 + J0 (K + H a' sin b)).

@@ -61,14 +61,14 @@ class StabilizerSdf(OneAxisTest):
     channel_period = 1e-2
 
     def axis(self) -> StabilizedAxis:
-        """The plant of these options: C and K are those of the kind."""
+        """Return the plant of these options: C and K are those of the kind."""
         kind = self["kind"]
         c = 0.0 if kind == "integrating" else self["C"]
         k = self["K"] if kind == "rate" else 0.0
         return StabilizedAxis(self["J0"], self["J"], self["H"], c, k, self["M"])
 
     def phases(self) -> list[LoopPhase]:
-        """Torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
+        """Return torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
         phases = [
             LoopPhase("load", "torque", "step", amplitude=self["M"], settle=0.1, dwell=self["time"]),
             LoopPhase("drift", settle=0.05 * self["time"], dwell=0.15 * self["time"]),

@@ -83,7 +83,7 @@ class TableCapture(System):
 
     @property
     def stop(self) -> float:  # type: ignore[override]
-        """The run ends here where the fine loop is never closed, s."""
+        """Return where the run ends if the fine loop is never closed, s."""
         way = abs(self.turn())
         return float(2.0 * math.sqrt(way / MOVE) + way / MOVE + PAUSE + 2.0 * self["limit"])
 

@@ -74,7 +74,7 @@ class Reduction(LoopTest):
     linearized = False
 
     def measure(self) -> Account:
-        """Raises ReductionError for a record in which the table did not turn as planned."""
+        """Measure what the runs show.  Raises ReductionError where the table did not turn as planned."""
         found, o = self.found, self.run.options
         runs, self.steps = ([g for g in found.gates if g.label.startswith("step") is s] for s in (False, True))
         self.windows = windows = [w for g in runs for w in cut(g)]

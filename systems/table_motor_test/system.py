@@ -86,7 +86,7 @@ class TableMotorTest(LoopTest):
     shown = ("reader.angle_read", "voltmeter.reading", "ammeter.reading", "exciter.torque")
 
     def phases(self) -> list[LoopPhase]:
-        """At two torques: up, coast, brake through zero by the hung torque and back, down; then steps of torque."""
+        """Return, at two torques: up, coast, brake through zero by the hung torque and back, down; then steps."""
         J, rate = self["J"], self["rate"]
         phases = []
 

@@ -88,7 +88,7 @@ class TableServoLoop(LoopTest):
 
     @property
     def loops(self) -> dict[str, str]:  # type: ignore[override]
-        """The loop for the linear model; none about the null of a motor without gain there."""
+        """Return the loop for the linear model; none about the null of a motor without gain there."""
         return {"stabilizer": "table.u"} if self["shaper"] else {}
 
     @property
@@ -104,7 +104,7 @@ class TableServoLoop(LoopTest):
         return float(self["load"] or (1.0 if self.damped else 500.0 * GCM))
 
     def phases(self) -> list[LoopPhase]:
-        """Rest, hung torques, turning both ways, test sines through the torquer, sines of torque."""
+        """Return rest, hung torques, turning both ways, test sines through the torquer, sines of torque."""
         share = self.wanted() / 50.0
         slow = 1.0 / share  # s: the slowest pole, about w_c / 12 (network 2), leaves exp(-12) in half of it
         frequencies = [f * share for f in TESTS]
@@ -128,7 +128,7 @@ class TableServoLoop(LoopTest):
         ]  # fmt: skip
 
     def injected(self, f: float) -> float:
-        """Rate whose angle is `test`, and grows below the crossover, where the loop leaves less of it."""
+        """Return the rate whose angle is `test`, and grows below the crossover, where the loop leaves less of it."""
         size = self["test"] * (1.0 if self.damped else 10.0)
         return float(size * 2.0 * math.pi * f * max(1.0, 0.4 * self.wanted() / f) ** 1.5)
 

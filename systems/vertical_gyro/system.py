@@ -68,7 +68,7 @@ class VerticalGyroBench(LoopTest):
     channel_period = 0.1
 
     def phases(self) -> list[LoopPhase]:
-        """The phases asked for; before each manoeuvre the vehicle rests for as long (the erection needs no wait)."""
+        """Return the phases asked for; before each manoeuvre (not the erection) the vehicle rests for as long."""
         wait = self["time"]
         lengths = {"loop": 2.0 * math.pi / PITCH_RATE, "roll": 2.0 * math.pi / ROLL_RATE}
         return [

@@ -110,7 +110,7 @@ def measure(
 def _errors(
     found: MeasureFindings, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str
 ) -> None:
-    """Errors against the truth of the same instant and of one latency ago."""
+    """Add the errors against the truth of the same instant and of one latency ago."""
 
     def size(time: Array, x: Array) -> UncertainValue:
         return estimator_metrics.rms_of_sine(time, x, frequency) if frequency else estimator_metrics.rms(x)
@@ -132,7 +132,7 @@ def _times(v: UncertainValue, factor: float) -> UncertainValue:
 
 
 def _distortion(found: MeasureFindings, s: Signals, behind: Array, known: slice, frequency: float | None) -> None:
-    """Noise reduction and the gain (and phase) that goes with it."""
+    """Add the noise reduction and the gain (and phase) that goes with it."""
     if frequency:
         r = estimator_metrics.response_to_sine(s.time, s.estimate, s.truth, frequency)
         gain = f"gain at {frequency:g} Hz"

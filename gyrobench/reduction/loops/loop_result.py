@@ -197,7 +197,7 @@ class LoopFindings(MeasureFindings):
         self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
         unit: str = "1", plus: str | None = None,
     ) -> list[Point]:  # fmt: skip
-        """Gain of ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
+        """Measure ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
 
         reference: a channel of the exciter, or another one (then the linear curve is the ratio of two).  plus: a second
         channel added to the output (all "slot.variable").  scale, unit: SI of the ratio per printed unit.  Returns the
@@ -228,7 +228,7 @@ class LoopFindings(MeasureFindings):
     def excited(
         self, which: str, kind: str, axis: int, output: str, f: Array | Sequence[float], plus: str | None = None
     ) -> Any:
-        """Linear response ("discrete" or "continuous") of a channel to an excitation, SI; None where there is none."""
+        """Return the linear response ("discrete", "continuous") of a channel to an excitation, SI; None without one."""
         model = self.linear.closed.of(which)
         if model is None or output not in model.outputs:
             return None
@@ -280,7 +280,7 @@ class LoopFindings(MeasureFindings):
     def drift(
         self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
     ) -> Drift:
-        """Drift and random walk of an angle in a hold phase, °/h and °/√h, and the Allan deviation of the report.
+        """Measure drift and random walk of an angle in a hold phase, °/h and °/√h; show the Allan deviation.
 
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """

@@ -103,7 +103,7 @@ class LoopTest(System):
         return {}
 
     def plan(self) -> LoopPlan:
-        """The phases, or a ride by the recorded motion."""
+        """Return the phases, or a ride by the recorded motion."""
         return LoopPlan([LoopPhase("ride", dwell=self["hold"])] if self.values.get("profile") else self.phases())
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class LoopTest(System):
         return [f"phases: '{p}' is none of {', '.join(labels)}" for p in self.asked() if p not in labels]
 
     def crossovers(self) -> dict[str, float]:
-        """The option crossover, for all loops, where a system has one."""
+        """Return the option crossover, for all loops, where a system has one."""
         return dict.fromkeys(self.loops, self["crossover"]) if "crossover" in self.options else {}
 
     def not_positive(self, *names: str) -> list[str]:
@@ -209,7 +209,7 @@ class TwoGyroTest(ThreeAxisTest):
 
     @property
     def wait(self) -> float:
-        """s: 7 / feedback lets the loops settle, twice."""
+        """Return the time, s, of which 7 / feedback lets the loops settle, twice."""
         return 14.0 / float(self["feedback"])
 
     def steps(self) -> list[LoopPhase]:
@@ -228,7 +228,7 @@ class TwoGyroTest(ThreeAxisTest):
         return LoopPhase("drift", "hold", settle=2 * self.wait, dwell=self["hold"])
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        """Pickoffs for +-0.1 rad, a resolver whose secant grows to 10, and channels of ``feedback``."""
+        """Return pickoffs for +-0.1 rad, a resolver whose secant grows to 10, and channels of ``feedback``."""
         found: dict[str, Any] = {
             "motion.earth_rate?": 0.0,
             "platform.rate_max": self["rate_max"],
@@ -244,7 +244,7 @@ class TwoGyroTest(ThreeAxisTest):
         return found
 
     def crossovers(self) -> dict[str, float]:
-        """|L| = 1 at the feedback, the lag of the servos left out."""
+        """Return where |L| = 1, at the feedback, the lag of the servos left out."""
         return dict.fromkeys(AXES, self["feedback"] / (2.0 * math.pi))
 
     def check(self) -> list[str]:
