@@ -279,9 +279,9 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
         return float(t[k] + share * (t[k + 1] - t[k])) - t0
 
     overshoot = max(0.0, peak / abs(change) - 1.0) if change else 0.0
-    times = [settled(band) if change else None for band in (0.05, 0.02)]
+    settled_5, settled_2 = (settled(band) if change else None for band in (0.05, 0.02))
     return Step(
-        initial, final, u, overshoot, *times, float(t[1] - t[0]) / math.sqrt(12.0), float(slope),
+        initial, final, u, overshoot, settled_5, settled_2, float(t[1] - t[0]) / math.sqrt(12.0), float(slope),
         last=float(t[-1] - t[-last]), ahead=_ahead(float(slope), y[-2 * last : -last], t[-2 * last : -last]),
     ).with_noise(u)  # fmt: skip
 
