@@ -7,6 +7,7 @@ from typing import Any
 
 from gyrobench.system.connectors import Socket, inp, limit_flag, out
 from gyrobench.system.families.loop_test import FLOWN, LoopTest, by_phase
+from gyrobench.system.families.option_groups import MOVING
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -101,8 +102,7 @@ class GyroMagneticCompass(LoopTest):
         "field_time": Option(60.0, "s", "its time", 1.0),
         "random_drift": Option("0.1deg/sqrt(h)", "rad/s/sqrt(Hz)", "angle random walk", 0.0),
         "noise": Option("0.1deg/sqrt(Hz)", "rad/sqrt(Hz)", "noise of the magnetic heading", 0.0),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
+        **MOVING,
     }
     noises = ("gyro.white", "sensor.white")
     step = 0.1

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+GCM = 9.80665e-5  # N.m
 LEAD = {1: (4.0, 4.0), 2: (5.0, 5.0), 3: (28.0, 28.0), 4: (6.5, 6.5, 6.5)}  # ratio pole / zero of the leads
 LAGGING = (1, 2)  # networks with a lag-lead (1 + s / w_l) / (1 + 5 s / w_l), w_l = w_c / 12
 NAMES = ("table.J", "table.viscous", "table.lag", "table.torque_max", "gyro.H", "gyro.J", "gyro.C", "gyro.K_sg")

@@ -14,11 +14,10 @@ from gyrobench.reduction.loops.platform_measures import lower_limit
 from gyrobench.reduction.loops.toolkit import Account, Array, Drift, Gate, LoopTest, Point, Table, drift, margins, told
 from gyrobench.units import ARCSEC
 
-from .closed import ServoLoop, loop_of, sense_torque
+from .closed import GCM, ServoLoop, loop_of, sense_torque
 
 ANGLE, TORQUE, COMMAND, RATE = "table.angle", "exciter.torque[1]", "exciter.command[1]", "table.omega[1]"
 ERROR = "gyro.rate_error"  # rate that the float integrates: command less table rate
-GCM = 9.80665e-5  # N.m
 WIDE = 1e-4  # m: a gap above it is rather one given in another unit
 BLOCKS = 20  # of a phase, for the uncertainty of a mean
 NO_CLOSED = "No closed forms: they are those of the networks 1 to 4 of table_servo."

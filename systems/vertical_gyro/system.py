@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.system.families.loop_test import FLOWN, LoopTest, by_phase
+from gyrobench.system.families.option_groups import MOVING
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -53,8 +54,7 @@ class VerticalGyroBench(LoopTest):
         "turn": Option("3deg/s", "rad/s", "rate of the turn"),
         "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets="motion.speed"),
         "time": Option(60.0, "s", "length of erection, rest, acceleration and turn, and of the wait before each"),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
+        **MOVING,
     }
     noises = ("gyro.white", "gyro.white_y")
     step = 1e-2
