@@ -2,9 +2,6 @@
 
     x_k = c + s t_k + sum A_i sin(2 pi f_i t_k + psi_i) + noise,   t_k = k dt,   A = hypot(a, b), psi = atan2(b, a)
 
-    find_lines(x, dt)        all significant lines (Lines), largest first, and the series without them
-    fit_line(x, dt, f)       one line near a known frequency
-
 Detection compares each value of the periodogram with the level around it, so the noise need not be white: the level is
 the mean logarithm over up to 64 bins on either side (a straight line over log f below bin 128), which k degrees of
 gamma type describe, trigamma(k) = its variance.  The ratio R then exceeds r by chance with the probability
@@ -28,7 +25,6 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage, special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 LEVEL = 1e-3  # false-alarm probability of a whole record
@@ -48,10 +44,8 @@ class Line:
     u_frequency: float
     amplitude: float
     u_amplitude: float
-    phase: float  # rad, -pi..pi
-    u_phase: float
-    density: float  # one-sided, of the noise around it, unit^2/Hz
-    false_alarm: float  # probability that a record without lines shows one as clear as this; NaN: not tested
+    phase: float  # rad, -pi..pi; standard uncertainty 2 u_amplitude/amplitude
+    false_alarm: float  # probability that a record without lines shows one as clear as this
     steady: bool = True  # False: power around it that is no third line, so its frequency or amplitude changes
 
 
@@ -100,6 +94,7 @@ class _Model:
 class _Fitted:
     f: float
     density: float  # of the noise around it
+    false_alarm: float
     steady: bool = True
     c: complex = 0j  # b - i a, about the middle of the record
 
@@ -114,11 +109,6 @@ class _Removal:
         self.padded[:n] = x
         self.time = (np.arange(n) - (n - 1) / 2.0) / n  # of the record, -1/2..1/2
         self.lines: list[_Fitted] = []
-        self.tests: list[float] = []
-
-    def start(self, f: float, density: float, false_alarm: float) -> None:
-        self.lines.append(_Fitted(f, density))
-        self.tests.append(false_alarm)
 
     def fit(self) -> None:
         """Gauss-Newton steps, one line after the other, until no parameter moves by a thousandth of its u."""
@@ -203,7 +193,7 @@ def _one_bin(ratio: Array, k: Array) -> Array:
     return out
 
 
-def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lines:
+def find_lines(x: Any, dt: float, level: float = LEVEL) -> Lines:
     """Find the lines of a record (n,) sampled every ``dt`` s, with the false-alarm probability ``level`` of the record.
 
     Raises SeriesError for fewer than 64 samples and a level outside 0..0.5.
@@ -214,7 +204,7 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
     removal, n = _Removal(x, dt), x.size
     removal.fit()
     complete = False
-    for _ in range(most):
+    for _ in range(MOST):
         density = _periodogram(removal.padded[:n], dt)
         around, k = local_level(density)
         tested = np.flatnonzero(k > 0.0)
@@ -235,68 +225,43 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
             if len(beside) >= 2:
                 for line in beside:
                     line.steady = False
-            elif len(removal.lines) < most:
+            elif len(removal.lines) < MOST:
                 taken.append(bin_)
-                removal.start(_interpolated(removal.padded[:n], bin_, dt), float(around[bin_]), chance)
-        complete = not taken and len(removal.lines) < most
+                f = _interpolated(removal, bin_)
+                removal.lines.append(_Fitted(f, float(around[bin_]), chance))
+        complete = not taken and len(removal.lines) < MOST
         removal.fit()
-        if not taken or len(removal.lines) >= most:
+        if not taken or len(removal.lines) >= MOST:
             break
-    return _finished(x, dt, removal, level, complete)
+    return _finished(x, removal, level, complete)
 
 
-def _interpolated(r: Array, bin_: int, dt: float) -> float:
+def _interpolated(removal: _Removal, bin_: int) -> float:
     """Frequency between the bins: of three transforms about the peak, as of a single line."""
-    n = r.size
-    model = _Model(n, dt)
-    padded = np.zeros(model.rows * model.block)
-    padded[:n] = r
+    T = removal.n * removal.dt
+    sums = (removal.model.sums(removal.padded, (bin_ + d) / T)[0] for d in (-1, 0, 1))
     # shifted by half a record from bin to bin: the sums are about the middle, where neighbours have opposite signs
-    low, mid, high = (model.sums(padded, (bin_ + d) / (n * dt))[0] * s for d, s in ((-1, -1.0), (0, 1.0), (1, -1.0)))
+    low, mid, high = (s * sign for s, sign in zip(sums, (-1.0, 1.0, -1.0), strict=True))
     bottom = 2.0 * mid - low - high
     shift = float(np.real((low - high) / bottom)) if abs(bottom) > 0.0 else 0.0
-    return (bin_ + max(-0.6, min(0.6, shift))) / (n * dt)
+    return (bin_ + max(-0.6, min(0.6, shift))) / T
 
 
-def _finished(x: Array, dt: float, removal: _Removal, level: float, complete: bool) -> Lines:
-    n, T = x.size, x.size * dt
+def _finished(x: Array, removal: _Removal, level: float, complete: bool) -> Lines:
+    n, dt = removal.n, removal.dt
+    T = n * dt
     around, _ = local_level(_periodogram(removal.padded[:n], dt))
     lines, residual = [], np.zeros(removal.padded.size)
     residual[:n] = x
-    for fitted, chance in zip(removal.lines, removal.tests, strict=True):
-        removal.model.add(residual, fitted.f, -fitted.c)
-        S = float(around[min(max(round(fitted.f * T), 1), around.size - 2)])
-        A = abs(fitted.c)
+    for line in removal.lines:
+        removal.model.add(residual, line.f, -line.c)
+        S = float(around[min(max(round(line.f * T), 1), around.size - 2)])
+        A = abs(line.c)
         u = math.sqrt(S / T)
-        b, a = fitted.c.real, -fitted.c.imag
-        phase = math.atan2(b, a) - 2.0 * math.pi * fitted.f * dt * (n - 1) / 2.0
+        b, a = line.c.real, -line.c.imag
+        phase = math.atan2(b, a) - 2.0 * math.pi * line.f * dt * (n - 1) / 2.0
         phase = (phase + math.pi) % (2.0 * math.pi) - math.pi
-        lines.append(
-            Line(fitted.f, math.sqrt(3.0) * u / (math.pi * A * T), A, u, phase, 2.0 * u / A, S, chance, fitted.steady)
-        )
+        u_f = math.sqrt(3.0) * u / (math.pi * A * T)
+        lines.append(Line(line.f, u_f, A, u, phase, line.false_alarm, line.steady))
     lines.sort(key=lambda line: -line.amplitude)
     return Lines(tuple(lines), residual[:n].copy(), level, complete)
-
-
-def fit_line(x: Any, dt: float, frequency: float) -> Line:
-    """Fit one line near ``frequency`` (Hz), to within half a bin, by least squares; nothing is tested.
-
-    Raises SeriesError below two cycles in the record, at or beyond half the sampling rate, and where the fit leaves the
-    frequency or the amplitude does not exceed twice its interval.
-    """
-    x, dt = checked(x, 64), checked_step(dt)
-    T = x.size * dt
-    if not 2.0 / T <= frequency < 0.5 / dt:
-        raise SeriesError(
-            f"line at {frequency:.4g} Hz: a record of {T:.4g} s sampled every {dt:.4g} s shows "
-            f"{2.0 / T:.4g} to {0.5 / dt:.4g} Hz"
-        )
-    removal = _Removal(x, dt)
-    removal.fit()
-    around, _ = local_level(_periodogram(removal.padded[: x.size], dt))
-    removal.start(frequency, float(around[min(max(round(frequency * T), 1), around.size - 2)]), math.nan)
-    removal.fit()
-    line = _finished(x, dt, removal, math.nan, False).lines[0]
-    if abs(line.frequency - frequency) > 1.0 / T or line.amplitude < 2.0 * NORMAL * line.u_amplitude:
-        raise SeriesError(f"line at {frequency:.4g} Hz: none stands out of the noise within {1.0 / T:.3g} Hz of it")
-    return line

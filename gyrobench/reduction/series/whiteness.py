@@ -11,11 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from scipy import special
-
 from gyrobench.reduction.series.checks import SeriesError, checked
-from gyrobench.reduction.series.correlation import autocovariance
 
 
 @dataclass(frozen=True)
@@ -27,16 +23,16 @@ class LjungBox:
 
     @property
     def white(self) -> bool:
-        """Accepted at 5 %."""
+        """Return whether whiteness is accepted at 5 %."""
         return self.p >= 0.05
 
 
 def ljung_box(x: Any, lags: int, fitted: int = 0) -> LjungBox:
     """Test a series, or residuals of a model with ``fitted`` coefficients.  Raises SeriesError for lags <= fitted."""
+    from statsmodels.stats.diagnostic import acorr_ljungbox
+
     x = checked(x, 4)
     if lags <= fitted:
         raise SeriesError(f"Ljung-Box over {lags} lags of residuals with {fitted} fitted coefficients: take more lags")
-    r, n = autocovariance(x, lags), x.size
-    rho = r[1:] / r[0]
-    q = float(n * (n + 2.0) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    return LjungBox(lags, q, lags - fitted, float(special.chdtrc(lags - fitted, q)))
+    q, p = acorr_ljungbox(x, lags=[lags], model_df=fitted).iloc[0]
+    return LjungBox(lags, float(q), lags - fitted, float(p))
