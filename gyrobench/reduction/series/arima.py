@@ -38,12 +38,12 @@ class LocalLevel:
 
     @property
     def white_density(self) -> float:
-        """N of the white noise, unit sqrt(s) (two-sided density N^2)."""
+        """Return N of the white noise, unit sqrt(s) (two-sided density N^2)."""
         return math.sqrt(self.r * self.dt)
 
     @property
     def walk_density(self) -> float:
-        """K of the random walk, unit/sqrt(s)."""
+        """Return K of the random walk, unit/sqrt(s)."""
         return math.sqrt(self.q / self.dt)
 
 

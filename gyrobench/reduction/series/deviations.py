@@ -130,7 +130,7 @@ class _Stage:
                 self._add("modified", m, second[m:] - second[:-m], 2.0 * (m * m * self.stride) ** 2)
 
     def _with_gaps(self, cells: Array, old: int) -> None:
-        """The same where samples are missing: means of those present, if no more than MISSING of a mean is not."""
+        """Sum up where samples are missing: means of those present, if no more than MISSING of a mean is not."""
         rate, angle, present = cells
         area = np.concatenate([[0.0], np.cumsum(rate * present)])
         there = np.concatenate([[0.0], np.cumsum(present)])
@@ -160,7 +160,7 @@ def _second(x: Array, m: int) -> Array:
 
 
 def _pairs(cells: Array, stride: int) -> Array:
-    """Cells of twice the length (3, n/2)."""
+    """Return cells of twice the length (3, n/2)."""
     a, b = cells[:, ::2], cells[:, 1::2]
     present = 0.5 * (a[2] + b[2])
     share = np.where(present > 0.0, 0.5 * a[2] / np.where(present > 0.0, present, 1.0), 0.5)

@@ -59,37 +59,6 @@ class Lines:
     complete: bool  # False: the most lines were found, there may be more
 
 
-class _Model:
-    """Sine of one frequency on a record cut into blocks: its sums are products of two short tables."""
-
-    def __init__(self, n: int, dt: float) -> None:
-        self.n, self.dt = n, dt
-        self.block = max(1, math.isqrt(n))
-        self.rows = -(-n // self.block)
-        self.within = dt * np.arange(self.block)
-        self.starts = dt * self.block * np.arange(self.rows) - dt * (n - 1) / 2.0  # from the middle of the record
-
-    def tables(self, f: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        return np.exp(2j * math.pi * f * self.starts), np.exp(2j * math.pi * f * self.within)
-
-    def sums(self, padded: Array, f: float) -> tuple[complex, complex]:
-        """Sum of r exp(-i phi) and of t r exp(-i phi), t from the middle of the record."""
-        phase, inner = self.tables(f)
-        X = padded.reshape(self.rows, self.block)
-        weights = np.column_stack([inner.real, inner.imag, self.within * inner.real, self.within * inner.imag])
-        both = X @ weights
-        y0, y1 = both[:, 0] - 1j * both[:, 1], both[:, 2] - 1j * both[:, 3]
-        turned = np.conj(phase)
-        return complex(turned @ y0), complex(turned @ (self.starts * y0 + y1))
-
-    def add(self, padded: Array, f: float, c: complex) -> None:
-        """Add Re(c exp(i phi)) in place."""
-        phase, inner = self.tables(f)
-        X, turned = padded.reshape(self.rows, self.block), c * phase
-        X += np.column_stack([turned.real, -turned.imag]) @ np.stack([inner.real, inner.imag])
-        padded[self.n :] = 0.0
-
-
 @dataclass
 class _Fitted:
     f: float
@@ -100,34 +69,63 @@ class _Fitted:
 
 
 class _Removal:
-    """Least squares of lines, level and slope; ``padded`` holds the residual."""
+    """Least squares of lines, level and slope; ``padded`` holds the residual.
+
+    The record is cut into blocks: the sums of a sine over it are products of two short tables.
+    """
 
     def __init__(self, x: Array, dt: float) -> None:
-        n = x.size
-        self.model, self.n, self.dt = _Model(n, dt), n, dt
-        self.padded = np.zeros(self.model.rows * self.model.block)
-        self.padded[:n] = x
-        self.time = (np.arange(n) - (n - 1) / 2.0) / n  # of the record, -1/2..1/2
+        self.n, self.dt = x.size, dt
+        self.block = max(1, math.isqrt(self.n))
+        self.rows = -(-self.n // self.block)
+        self.within = dt * np.arange(self.block)
+        # from the middle of the record
+        self.starts = dt * self.block * np.arange(self.rows) - dt * (self.n - 1) / 2.0
+        self.padded = self.pad(x)
+        self.time = (np.arange(self.n) - (self.n - 1) / 2.0) / self.n  # of the record, -1/2..1/2
         self.lines: list[_Fitted] = []
 
+    def pad(self, x: Array) -> Array:
+        return np.pad(x, (0, self.rows * self.block - self.n))
+
+    def tables(self, f: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        return np.exp(2j * math.pi * f * self.starts), np.exp(2j * math.pi * f * self.within)
+
+    def sums(self, f: float) -> tuple[complex, complex]:
+        """Return the sums of r exp(-i phi) and of t r exp(-i phi), t from the middle of the record."""
+        phase, inner = self.tables(f)
+        weights = np.column_stack([inner.real, inner.imag, self.within * inner.real, self.within * inner.imag])
+        both = self.padded.reshape(self.rows, self.block) @ weights
+        y0, y1 = both[:, 0] - 1j * both[:, 1], both[:, 2] - 1j * both[:, 3]
+        turned = np.conj(phase)
+        return complex(turned @ y0), complex(turned @ (self.starts * y0 + y1))
+
+    def add(self, padded: Array, line: _Fitted, sign: float) -> None:
+        """Add sign Re(c exp(i phi)) in place."""
+        phase, inner = self.tables(line.f)
+        turned = sign * line.c * phase
+        X = padded.reshape(self.rows, self.block)
+        X += np.column_stack([turned.real, -turned.imag]) @ np.stack([inner.real, inner.imag])
+        padded[self.n :] = 0.0
+
     def fit(self) -> None:
-        """Gauss-Newton steps, one line after the other, until no parameter moves by a thousandth of its u."""
+        """Make Gauss-Newton steps, one line after the other, until no parameter moves by a thousandth of its u."""
         r, n, T = self.padded[: self.n], self.n, self.n * self.dt
         for sweep in range(SWEEPS):
             mean, slope = float(r.mean()), 12.0 * float(self.time @ r) / n
             r -= mean + slope * self.time
             moved = 0.0
             for line in self.lines:
-                s0, s1 = self.model.sums(self.padded, line.f)
+                s0, s1 = self.sums(line.f)
                 step = 2.0 * s0 / n
                 df = 0.0
                 if abs(line.c) > 0.0:
                     gradient = -2.0 * math.pi * (s1.conjugate() * line.c).imag
                     df = gradient / (n / 2.0 * (2.0 * math.pi * abs(line.c)) ** 2 * T * T / 12.0)
                     df = max(-0.3 / T, min(0.3 / T, df))
-                self.model.add(self.padded, line.f, line.c)
+                self.add(self.padded, line, 1.0)
                 line.f, line.c = line.f + df, line.c + step
-                self.model.add(self.padded, line.f, -line.c)
+                self.add(self.padded, line, -1.0)
                 variance = max(line.density / T, 1e-300)  # of its amplitude
                 moved = max(moved, abs(step) ** 2 / variance, (abs(line.c) * df * T) ** 2 / variance)
             if not self.lines or (sweep > 1 and moved < 1e-6):
@@ -135,7 +133,7 @@ class _Removal:
 
 
 def _periodogram(r: Array, dt: float) -> Array:
-    """One-sided density at j/(n dt), j = 0..n/2."""
+    """Return the one-sided density at j/(n dt), j = 0..n/2."""
     power = np.abs(fft.rfft(r)) ** 2
     power *= 2.0 * dt / r.size
     out: Array = power
@@ -164,7 +162,7 @@ def local_level(density: Array) -> tuple[Array, Array]:
 
 @functools.cache
 def _low_bins(n: int) -> tuple[tuple[int, NDArray[np.int_], Array, float], ...]:
-    """Bin, neighbours, weights of the straight line over log f at the bin, degrees; degrees 0: too few neighbours."""
+    """Return bin, neighbours, weights of the line over log f at the bin, degrees (0: too few neighbours)."""
     out = []
     for j in range(1, min(n, 2 * HALF) + 1):
         rows = np.arange(max(1, j // 2, j - HALF), min(n, 2 * j, j + HALF) + 1)
@@ -181,7 +179,7 @@ def _low_bins(n: int) -> tuple[tuple[int, NDArray[np.int_], Array, float], ...]:
 
 @functools.cache
 def _gamma_degrees(share: float) -> float:
-    """k with trigamma(k) = share pi^2/6."""
+    """Return k with trigamma(k) = share pi^2/6."""
     target, k = share * math.pi**2 / 6.0, 1.0 / (share * math.pi**2 / 6.0) + 0.5
     for _ in range(20):
         k -= (float(special.polygamma(1, k)) - target) / float(special.polygamma(2, k))
@@ -237,9 +235,9 @@ def find_lines(x: Any, dt: float, level: float = LEVEL) -> Lines:
 
 
 def _interpolated(removal: _Removal, bin_: int) -> float:
-    """Frequency between the bins: of three transforms about the peak, as of a single line."""
+    """Return the frequency between the bins: of three transforms about the peak, as of a single line."""
     T = removal.n * removal.dt
-    sums = (removal.model.sums(removal.padded, (bin_ + d) / T)[0] for d in (-1, 0, 1))
+    sums = (removal.sums((bin_ + d) / T)[0] for d in (-1, 0, 1))
     # shifted by half a record from bin to bin: the sums are about the middle, where neighbours have opposite signs
     low, mid, high = (s * sign for s, sign in zip(sums, (-1.0, 1.0, -1.0), strict=True))
     bottom = 2.0 * mid - low - high
@@ -251,10 +249,9 @@ def _finished(x: Array, removal: _Removal, level: float, complete: bool) -> Line
     n, dt = removal.n, removal.dt
     T = n * dt
     around, _ = local_level(_periodogram(removal.padded[:n], dt))
-    lines, residual = [], np.zeros(removal.padded.size)
-    residual[:n] = x
+    lines, residual = [], removal.pad(x)
     for line in removal.lines:
-        removal.model.add(residual, line.f, -line.c)
+        removal.add(residual, line, -1.0)
         S = float(around[min(max(round(line.f * T), 1), around.size - 2)])
         A = abs(line.c)
         u = math.sqrt(S / T)

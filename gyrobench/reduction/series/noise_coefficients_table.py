@@ -82,6 +82,6 @@ def on_grid(t: Array, x: Array, step: float) -> Array:
 
 
 def _next(t: Array, step: float) -> NDArray[np.bool_]:
-    """True where a time follows the one before by a step, within a hundredth of it."""
+    """Return where a time follows the one before by a step, within a hundredth of it."""
     found: NDArray[np.bool_] = np.abs(np.diff(t) - step) < 0.01 * step
     return found

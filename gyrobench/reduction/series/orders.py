@@ -38,12 +38,12 @@ class OrderTable:
 
     @property
     def chosen(self) -> dict[str, int]:
-        """Order of the least value of each criterion."""
+        """Return the order of the least value of each criterion."""
         return {name: int(np.argmin(getattr(self, name))) for name in ("aic", "sbc", "fpe")}
 
     @property
     def at_limit(self) -> bool:
-        """SBC is least at the highest order tried: no autoregression of these orders."""
+        """Return whether SBC is least at the highest order tried: no autoregression of these orders."""
         return self.chosen["sbc"] == self.order[-1]
 
 

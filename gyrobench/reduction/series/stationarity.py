@@ -111,7 +111,7 @@ class Trend:
 
     @property
     def significant(self) -> bool:
-        """At 5 %, with the interval of the estimated noise; never where the noise may be a random walk."""
+        """Return whether the slope differs from zero at 5 %; never where the noise may be a random walk."""
         return self.bounded and not self.low <= 0.0 <= self.high
 
 
