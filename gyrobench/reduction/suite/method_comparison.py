@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gyrobench import drift
@@ -22,6 +22,7 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
+from gyrobench.reduction.suite.ranking import adjusted
 from gyrobench.result import (
     Coefficient,
     DriftTestResult,
@@ -53,7 +54,7 @@ class Member:
 
 @dataclass(frozen=True)
 class MeasurandComparison:
-    """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
+    """Values of one quantity by all methods.  found: None where one alone sees it, or nothing can be weighed."""
 
     quantity: Measurand
     values: tuple[MethodValue, ...]
@@ -73,7 +74,7 @@ class MeasurandComparison:
         return low if high - low <= 1e-6 * max(abs(low), abs(high), 1e-3) else None
 
     def words(self) -> str:
-        """Which methods disagree, and by how much."""
+        """Return which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
         significant = [
@@ -93,7 +94,7 @@ class MeasurandComparison:
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[MeasurandComparison]:
-    """Every quantity that the results report, by every one that sees it."""
+    """Return every quantity that the results report, by every one that determines it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
     out = []
@@ -103,9 +104,8 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
         out.append(MeasurandComparison(q, values, consistency.combine_values(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
-    adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
-    for k, p in zip(tested, adjusted, strict=True):
-        out[k] = MeasurandComparison(out[k].quantity, out[k].values, out[k].found, p)
+    for k, p in zip(tested, adjusted([out[k].found.p for k in tested]), strict=True):  # type: ignore[union-attr]
+        out[k] = replace(out[k], p=p)
     return out
 
 
@@ -168,7 +168,7 @@ def combine_methods(
     conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Specification | None = None,
     failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
 ) -> SuiteResult:  # fmt: skip
-    """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
+    """Return one result of several tests.  shared: sources of type B that are one and the same error in all tests.
 
     failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
     """
