@@ -159,7 +159,7 @@ def _scatter(values: list[float]) -> float:
 
 
 @dataclass(frozen=True)
-class Response:
+class SignalResponse:
     """Response to a known signal: gain, phase (rad, negative: late), and what else the estimate holds."""
 
     gain: UncertainValue
@@ -215,7 +215,7 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
     return UncertainValue(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
 
 
-def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
+def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> SignalResponse:
     """Return the gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
 
     u from the scatter of ten stretches.  Raises ValueError below ten periods.
@@ -225,10 +225,10 @@ def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: floa
     parts = e.parts / x.parts / whole
     gain = UncertainValue(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
     phase = UncertainValue(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
-    return Response(gain, phase, e.rest)
+    return SignalResponse(gain, phase, e.rest)
 
 
-def response_to_truth(estimate: Array, truth: Array) -> Response:
+def response_to_truth(estimate: Array, truth: Array) -> SignalResponse:
     """Return gain of a random truth: regression of the estimate on it (align them first), both about their means."""
     e, x = estimate - estimate.mean(), truth - truth.mean()
 
@@ -241,7 +241,7 @@ def response_to_truth(estimate: Array, truth: Array) -> Response:
     weights = [float(x[s] @ x[s]) for s in stretches]
     share = np.array(weights) / sum(weights)
     u = math.sqrt(float(np.sum((share * (np.array(parts) - gain)) ** 2)) * STRETCHES / (STRETCHES - 1))
-    return Response(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
+    return SignalResponse(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
 
 
 # ------------------------------------------------------------------------------------- consistency

@@ -37,7 +37,7 @@ CLUSTER = 32  # bins: two lines may be as near as that, of more it is one that w
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """One line with standard uncertainties; phase of the sine at the first sample."""
 
     frequency: float  # Hz
@@ -53,7 +53,7 @@ class Line:
 class Lines:
     """Lines of a record and what is left of it."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     residual: Array  # (n,) the series without the lines; level and slope stay in
     level: float  # asked-for false-alarm probability
     complete: bool  # False: the most lines were found, there may be more
@@ -259,6 +259,6 @@ def _finished(x: Array, removal: _Removal, level: float, complete: bool) -> Line
         phase = math.atan2(b, a) - 2.0 * math.pi * line.f * dt * (n - 1) / 2.0
         phase = (phase + math.pi) % (2.0 * math.pi) - math.pi
         u_f = math.sqrt(3.0) * u / (math.pi * A * T)
-        lines.append(Line(line.f, u_f, A, u, phase, line.false_alarm, line.steady))
+        lines.append(SpectralLine(line.f, u_f, A, u, phase, line.false_alarm, line.steady))
     lines.sort(key=lambda line: -line.amplitude)
     return Lines(tuple(lines), residual[:n].copy(), level, complete)
