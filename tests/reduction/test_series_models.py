@@ -18,8 +18,7 @@ from gyrobench.reduction.series.correlation import autocovariance
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.gauss_markov import check_length, gauss_markov
 from gyrobench.reduction.series.moving_average import fit_arma
-from gyrobench.reduction.series.orders import criteria, order_table
-from gyrobench.reduction.series.whiteness import ljung_box
+from gyrobench.reduction.series.orders import criteria, ljung_box, order_table
 
 #: Xia 2008, table 3.4.2: variance, FPE by order; n of the record
 TABLE = {

@@ -10,9 +10,8 @@ from scipy import linalg, signal, stats
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.regression import least_squares
 from gyrobench.reduction.series.autoregression import yule_walker
+from gyrobench.reduction.series.column_regression import joint_test, orthonormal
 from gyrobench.reduction.series.correlation import autocovariance
-from gyrobench.reduction.series.orthogonal import orthonormal
-from gyrobench.reduction.series.stepwise import joint_test
 
 PHI = 0.95
 

@@ -30,6 +30,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.series import gauss_markov as markov
+from gyrobench.reduction.series import stationarity
 from gyrobench.reduction.series.arima import Arima310, arima310
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar, yule_walker
 from gyrobench.reduction.series.checks import block_means, checked, checked_step
@@ -38,18 +39,8 @@ from gyrobench.reduction.series.gauss_markov import GaussMarkov
 from gyrobench.reduction.series.lines import Lines, find_lines
 from gyrobench.reduction.series.moving_average import Arma, fit_arma
 from gyrobench.reduction.series.normality import Normality, normality
-from gyrobench.reduction.series.orders import OrderTable, order_table
+from gyrobench.reduction.series.orders import LjungBox, OrderTable, ljung_box, order_table
 from gyrobench.reduction.series.spectrum import Spectrum, spectrum
-from gyrobench.reduction.series.stationarity import (
-    RunsTest,
-    Trend,
-    UnitRoot,
-    block_runs,
-    trend,
-    unit_root,
-    up_down_runs,
-)
-from gyrobench.reduction.series.whiteness import LjungBox, ljung_box
 
 T = TypeVar("T")
 MODEL_SAMPLES = 10_000  # values the models are fitted to
@@ -71,10 +62,10 @@ class DriftModel:
     spectrum: Spectrum
     correlation: Correlation
     normality: Normality | None = None
-    runs: tuple[RunsTest, RunsTest] | None = None  # block means, block variances
-    up_down: RunsTest | None = None
-    trend: Trend | None = None
-    unit_root: UnitRoot | None = None
+    runs: tuple[stationarity.RunsTest, stationarity.RunsTest] | None = None  # block means, block variances
+    up_down: stationarity.RunsTest | None = None
+    trend: stationarity.Trend | None = None
+    unit_root: stationarity.UnitRoot | None = None
     detrended: bool = False  # a significant slope was taken off before the models
     orders: OrderTable | None = None
     burg: Autoregression | None = None  # of the order SBC chose, at least 1
@@ -127,10 +118,10 @@ def describe(x: Array, dt: float) -> DriftModel:
 
 def _stationarity(m: DriftModel, y: Array) -> None:
     block = max(2, y.size // RUN_BLOCKS)
-    m.runs = m.part("runs", lambda: block_runs(y, block))
-    m.up_down = m.part("up_down", lambda: up_down_runs(block_means(y, block)))
-    m.trend = m.part("trend", lambda: trend(y, m.model_dt))
-    m.unit_root = m.part("unit_root", lambda: unit_root(y))
+    m.runs = m.part("runs", lambda: stationarity.block_runs(y, block))
+    m.up_down = m.part("up_down", lambda: stationarity.up_down_runs(block_means(y, block)))
+    m.trend = m.part("trend", lambda: stationarity.trend(y, m.model_dt))
+    m.unit_root = m.part("unit_root", lambda: stationarity.unit_root(y))
 
 
 def _models(m: DriftModel, y: Array) -> None:

@@ -1,11 +1,15 @@
-"""Order of an autoregressive model by three criteria together.
+"""Order of an autoregressive model by three criteria together, and whiteness of what a model leaves.
 
     AIC = n ln s_p^2 + 2 (p + 1)     SBC = n ln s_p^2 + (p + 1) ln n     FPE = s_p^2 (n + p + 1)/(n - p - 1)
 
 (FPE with estimated mean.)  AIC and FPE pick too high an order now and then, whatever the length; SBC finds the true
 one of a long record.  A minimum at the highest order tried is no minimum: then the series is no short autoregression,
-and ARMA(1,1), ARIMA(0,1,1) or a local level is to be tried.   [DRIFT-ORDER; Xia 2008, eq. 3.4.15..3.4.17, table
-3.4.2]
+and ARMA(1,1), ARIMA(0,1,1) or a local level is to be tried.
+
+    LB = n(n + 2) sum_{k<=m} r_k^2/(n - k),   chi-squared of m - f, f coefficients fitted to the series (p + q of an
+    ARMA)
+
+[DRIFT-ORDER, DRIFT-WHITENESS-LB; Xia 2008, eq. 3.4.13..3.4.17, table 3.4.2 with EX15, EX16]
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.checks import checked, checked_order
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_order
 
 
 def criteria(variance: float, n: int, p: int) -> tuple[float, float, float]:
@@ -56,3 +60,27 @@ def order_table(x: Any, highest: int = 12) -> OrderTable:
     variance = np.asarray(pacf_burg(x, nlags=highest, demean=True)[1])
     table = np.array([criteria(float(v), x.size, p) for p, v in enumerate(variance)])
     return OrderTable(tuple(range(highest + 1)), variance, *table.T)
+
+
+@dataclass(frozen=True)
+class LjungBox:
+    lags: int
+    q: float
+    dof: int
+    p: float
+
+    @property
+    def white(self) -> bool:
+        """Return whether whiteness is accepted at 5 %."""
+        return self.p >= 0.05
+
+
+def ljung_box(x: Any, lags: int, fitted: int = 0) -> LjungBox:
+    """Test a series, or residuals of a model with ``fitted`` coefficients.  Raises SeriesError for lags <= fitted."""
+    from statsmodels.stats.diagnostic import acorr_ljungbox
+
+    x = checked(x, 4)
+    if lags <= fitted:
+        raise SeriesError(f"Ljung-Box over {lags} lags of residuals with {fitted} fitted coefficients: take more lags")
+    q, p = acorr_ljungbox(x, lags=[lags], model_df=fitted).iloc[0]
+    return LjungBox(lags, float(q), lags - fitted, float(p))
