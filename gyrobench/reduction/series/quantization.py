@@ -31,7 +31,7 @@ ANGLE_DITHER = 0.4  # of the change of an angle within a sample
 
 
 @dataclass(frozen=True)
-class Quantization:
+class Rounding:
     step: float  # unit; 0: none found
     noise: float  # rms of a sample without the rounding, from successive differences, unit
     dither: float = DITHER  # noise over step from which on rounding is a white error
@@ -42,16 +42,16 @@ class Quantization:
         return self.step == 0.0 or self.noise >= self.dither * self.step
 
 
-def quantization(x: Any) -> Quantization:
+def quantization(x: Any) -> Rounding:
     """Return what rounding did to a record (n,)."""
     x = checked(x, 16)
     step = _step(x)
     # two levels in turn at a boundary, whatever makes them, have a variance of q^2/4: q^2/6 without that of rounding
     variance = float(np.mean(np.diff(x[:LOOKED_AT]) ** 2)) / 2.0 - step * step / 12.0
-    return Quantization(step, math.sqrt(max(variance, 0.0)))
+    return Rounding(step, math.sqrt(max(variance, 0.0)))
 
 
-def angle_quantization(d: Any, step: float = 0.0) -> Quantization:
+def angle_quantization(d: Any, step: float = 0.0) -> Rounding:
     """Return what rounding did to an angle of these increments (n,), gaps left out; step: of the angle, 0: is found.
 
     The difference of two increments has three errors of q^2/12: six times that in all.
@@ -59,7 +59,7 @@ def angle_quantization(d: Any, step: float = 0.0) -> Quantization:
     d = checked(d, 16)
     step = step or _step(d)
     variance = float(np.mean(np.diff(d[:LOOKED_AT]) ** 2)) / 2.0 - step * step / 4.0
-    return Quantization(step, math.sqrt(max(variance, 0.0)), dither=ANGLE_DITHER)
+    return Rounding(step, math.sqrt(max(variance, 0.0)), dither=ANGLE_DITHER)
 
 
 def _step(x: Array) -> float:
