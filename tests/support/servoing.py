@@ -57,7 +57,9 @@ def held(record: Any) -> tuple[servo_regression.HeldWindows, Array]:
     w = record.windows
     rows = np.isin(w["phase"], list(labels))
     axes = np.array([on_servo_table(labels[p], record.run.options["latitude"]) for p in w["phase"][rows].tolist()])
-    return servo_regression.HeldWindows(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
+    return servo_regression.HeldWindows(
+        *(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes
+    ), rows
 
 
 def expected_rate(record: Any) -> Array:

@@ -43,9 +43,7 @@ def test_exact_without_noise() -> None:
     found = reduce(windows(voltages(rng, D, 0.0)), setup())
     assert np.array([c.estimate for c in found.coefficients[:20]]).reshape(4, 5) == pytest.approx(TRUE, abs=1e-7)
     table = next(t for t in found.tables if t.title.startswith("Angle errors"))
-    back = sum(
-        a * ARCSEC * (np.cos(k * ALPHA) if kind == "cos" else np.sin(k * ALPHA)) for k, kind, a, _ in table.rows
-    )
+    back = sum(a * ARCSEC * (np.cos(k * ALPHA) if kind == "cos" else np.sin(k * ALPHA)) for k, kind, a, _ in table.rows)
     assert back == pytest.approx(D, abs=2e-9)
 
 
