@@ -8,13 +8,14 @@ rate of a driven table inside a window.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from gyrobench import drift
+from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.frames import G0, pole
 from gyrobench.reduction.setup.run_metadata import Site
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 NODES, _WEIGHTS = leggauss(12)
 _WEIGHTS = _WEIGHTS / 2.0
+SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
 @dataclass(frozen=True)
@@ -73,13 +75,33 @@ def held_nodes(angle_start: Array, angle_end: Array, t_start: Array, t_end: Arra
     return out
 
 
-def misread(turning: Turning, n: int, size: float) -> list[Turning]:
-    """Return the windows of an encoder that reads too much by ``size`` (rad) times sin n theta, and cos n theta."""
-    cases = []
-    for wave in (np.sin, np.cos):
-        start, end = (a + size * wave(n * a) for a in (turning.angle_start, turning.angle_end))
-        cases.append(replace(turning, angle_start=start, angle_end=end))
-    return cases
+@dataclass(frozen=True)
+class BelievedGeometry:
+    """Errors of the data (n,), per rad, of windows whose geometry is not what the reduction believes.
+
+    base: table axes at angle 0 in (E, N, U).  error: of the data where turning and base are these instead.
+    """
+
+    turning: Turning
+    base: Array
+    error: Callable[[Turning, Array], Array]
+
+    def axis(self, k: int) -> Array:
+        """Return the error of a table axis that is turned about the k-th axis of the table."""
+        return -self.error(self.turning, self.base @ frames.rotation(self.base[k], SMALL).T) / SMALL
+
+    def mount(self, k: int, sense: float = 1.0) -> Array:
+        """Return the error of a gyro that is turned about its k-th axis, in a sense of 1 or -1."""
+        turn = frames.rotation(sense * np.eye(3)[k], SMALL)
+        return self.error(replace(self.turning, face=turn @ self.turning.face), self.base) / SMALL
+
+    def angles(self, n: int) -> Array:
+        """Return the errors (2, n) of an encoder that reads too much by sin n theta, and by cos n theta."""
+        errors = []
+        for wave in (np.sin, np.cos):
+            start, end = (a + SMALL * wave(n * a) for a in (self.turning.angle_start, self.turning.angle_end))
+            errors.append(self.error(replace(self.turning, angle_start=start, angle_end=end), self.base) / SMALL)
+        return np.array(errors)
 
 
 def average(values: Array) -> Array:
@@ -118,9 +140,7 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     return out
 
 
-def wobbles(
-    turning: Turning, base: Array, site: Site, names: tuple[str, ...], size: float
-) -> list[tuple[Array, Array]]:  # fmt: skip
+def wobbles(turning: Turning, base: Array, site: Site, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
     """Return what a table axis that goes round a cone twice a turn does, per rad, at the phases 0 and 90 degrees.
 
     Rates (n, 3) along the gyro axes that are there beside those of a true axis, and means (n, p) of the regressors of a
@@ -138,6 +158,6 @@ def wobbles(
         q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
         going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
         rate = average(_in_face(going - np.cross(q, earth), turning))
-        dX = average(still - drift.regressors(_in_face(up - size * np.cross(q, up), turning), names)) / size
+        dX = average(still - drift.regressors(_in_face(up - SMALL * np.cross(q, up), turning), names)) / SMALL
         found.append((rate, dX))
     return found
