@@ -43,7 +43,7 @@ class ErrorLine:
 
 @dataclass(frozen=True)
 class Total:
-    """each: effects of the sizes, one by one.  rss: root of their squares.  worst: their sum.  spread: standard deviation
+    """each: effects of the sizes.  rss: root of their squares.  worst: their sum.  spread: standard deviation
     of the draws.  within: bound of 95 % of them, from zero.
     """
 
