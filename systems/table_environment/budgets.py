@@ -22,7 +22,7 @@ from gyrobench.arrays import Array
 ERU = units.EARTH_RATE
 KINDS = ("normal", "uniform", "fixed")
 DRAWS = 20_000
-SMALL = math.radians(1.0)
+SMALL = math.radians(1.0)  # largest misalignment
 #: Hu 1981, section 5.8: misalignments at ten times Earth rate
 ALIGN = (
     "table pointing 5arcsec; sensor mount 2arcsec; clamping 5arcsec; plate squareness 1arcsec; axis wobble 1arcsec; "
@@ -111,28 +111,15 @@ def combine(
     return Total(scale.tolist(), float(np.sqrt(np.sum(scale**2))), float(np.sum(scale)), float(np.std(found)), within)
 
 
-def misalignment_rate(angle: Array | float, n: float, sense: int) -> Array:
-    """Return (n +- 1) W sin(angle): the rate on an input axis that leans towards the axis of a table on the pole.
+def misalignment_rate(angles: Array, n: float, sense: int) -> Array:
+    """Return (n +- 1) W sin(sum of the angles): the rates (draws,) on an input axis that leans towards the axis of a
+    table on the pole, by parts on one another (draws, lines).
 
-    n: table rate over Earth rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the
-    larger, n + 1.  Raises ValueError for an angle that is not small.  [ALIGN-ERRORS; Hu 1981, eq. 5-59]
+    All lean about the same axis, the worst that a stack of parts can do: their rotations add.  n: table rate over Earth
+    rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the larger, n + 1.
+    [ALIGN-ERRORS; Hu 1981, eq. 5-59]
     """
-    if np.any(np.abs(angle) > SMALL):
-        raise ValueError(f"an angle of {math.degrees(float(np.max(np.abs(angle)))):.3g}° is not small: 1° at most")
-    return np.asarray((n + (sense or 1)) * ERU * np.sin(angle))
-
-
-def rotated_rate(angles: Array, n: float, sense: int) -> Array:
-    """Return the rate (draws,) on an input axis that each line leans on towards the table axis, by rotations.
-
-    angles (draws, lines).  All lean about the same axis, the worst that a stack of parts can do.
-    """
-    axis = np.tile([1.0, 0.0, 0.0], (len(angles), 1))
-    for j in range(angles.shape[1]):
-        turn = angles[:, j]
-        c, s = np.cos(turn), np.sin(turn)
-        axis = np.column_stack([c * axis[:, 0] - s * axis[:, 2], axis[:, 1], s * axis[:, 0] + c * axis[:, 2]])
-    return np.asarray((n + (sense or 1)) * ERU * axis[:, 2])
+    return np.asarray((n + (sense or 1)) * ERU * np.sin(np.sum(angles, axis=1)))
 
 
 def latitude_problems(latitude: float) -> list[str]:

@@ -164,7 +164,7 @@ class Reduction(DriftTest[EnvironmentSetup]):
         options = self.setup.options
         n, sense = float(options["turning"]), int(options["sense"])
         lines = budgets.parse(str(options["align"]), "rad")
-        self.align = budgets.combine(lines, self.setup.seed, lambda e: budgets.rotated_rate(e, n, sense))
+        self.align = budgets.combine(lines, self.setup.seed, lambda e: budgets.misalignment_rate(e, n, sense))
         of_each = zip(lines, self.align.each, strict=True)
         rows: list[list[Any]] = [[a.name, a.size / ARCSEC, a.kind, rate / DPH] for a, rate in of_each]
         rows += [[name, None, None, x / DPH] for name, x in self.align.named()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -140,10 +141,9 @@ class TableEnvironment(RebalanceTest):
         problems = super().check() + budgets.latitude_problems(self["latitude"])
         for name in ("align", "rate_mode"):
             try:
-                lines = budgets.parse(self[name], "rad")
-                if name == "align":
-                    for line in lines:
-                        budgets.misalignment_rate(line.size, self["turning"], self["sense"])
+                sizes = [line.size for line in budgets.parse(self[name], "rad")]
+                if name == "align" and max(sizes) > budgets.SMALL:
+                    problems.append(f"align: an angle of {math.degrees(max(sizes)):.3g}° is not small: 1° at most")
             except ValueError as error:
                 problems.append(f"{name}: {error}")
         if not self["averaging"] > 0.0:
