@@ -47,7 +47,7 @@ def test_harmonics_come_back_in_spite_of_the_polygon(found: Any) -> None:
 
 
 def test_faces_of_the_polygon(found: Any) -> None:
-    rows = found.tables[0]["rows"]
+    rows = found.tables[0].rows
     assert rows[1][3] == pytest.approx(1.5 - (1.5 - 0.8) / 12)
     for _, value, u, truth in rows:
         assert abs(value - truth) < 4 * u
