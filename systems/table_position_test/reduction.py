@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,50 +33,48 @@ HEADS = ("reader", "reader_2")
 NEEDED = ("level_x", "level_y", "tracking", "second")
 
 
-@dataclass(frozen=True)
+def within_turn(x: Array) -> Array:
+    """Return angles less the nearest whole number of turns."""
+    return np.asarray(x - 2 * math.pi * np.round(x / (2 * math.pi)))
+
+
 class Readings:
-    """One row a position; angles in rad."""
+    """One row a position; angles in rad.
 
-    theta: Array  # commanded
-    azimuth: Array  # of the reference
-    mount: NDArray[np.int64]
-    sense: Array  # +1 on the way up, -1 back
-    deviation: Array
-    level: NDArray[np.complex128]
-    tracking: Array
-    second: Array  # reading of the second head less theta
-    true: Array | None  # true position less theta
-    faces: int
-    head: float
-    orders: int
-    rounding: float  # variance of the difference of two counted readings, rad2
+    theta: commanded.  azimuth, mount: of polygon and level, and which of them.  sense: +1 on the way up, -1 back.
+    second, true: reading of the second head, and true position, less theta.  place, face: numbers of the position and
+    of the face that is seen, from 0; seen: faces seen at all.  rounding: variance of the difference of two counted
+    readings, rad2.
+    """
 
-    @property
-    def face(self) -> NDArray[np.int64]:
-        """Return the number of the polygon's face that is seen."""
-        out: NDArray[np.int64] = np.round(self.faces * (self.theta + self.azimuth) / (2 * math.pi)).astype(np.int64)
-        return out % self.faces
-
-    @property
-    def mounts(self) -> int:
-        """Return the number of mounts."""
-        return int(self.mount.max()) + 1
-
-    @property
-    def seen(self) -> NDArray[np.int64]:
-        """Return the faces that are seen at all, rising."""
-        return np.unique(self.face)
+    def __init__(self, w: Mapping[str, Array], run: RunDocument) -> None:
+        o = run.options
+        self.faces, self.head, self.orders = int(o["positions"]), float(o["head"]), int(o["orders"])
+        quanta = (float(run.parameters.get(f"{n}.quantum", 0.0)) for n in HEADS)
+        self.rounding = sum(q**2 for q in quanta) * JITTER / 12.0
+        plan = {row.phase: row for row in run.plan}
+        rows = [plan[int(p)] for p in w["phase"]]
+        names = list(dict.fromkeys(row.face for row in run.plan))
+        azimuths = np.radians([*dict.fromkeys(map(float, str(o["mounts"]).split()))])
+        self.theta = np.array([row.target for row in rows])
+        self.mount = np.array([names.index(row.face) for row in rows])
+        self.azimuth = azimuths[self.mount]
+        self.mounts = int(self.mount.max()) + 1
+        self.sense = np.ones(self.theta.size)  # of the last move, by the cumulative reading
+        for k, moved in enumerate(np.diff(w["angle_start"]), 1):
+            self.sense[k] = np.sign(moved) if abs(moved) > 1e-3 else self.sense[k - 1]
+        self.deviation, self.tracking, self.level = w["mean"], w["tracking"], w["level_x"] + 1j * w["level_y"]
+        self.second = within_turn(w["second"] - self.theta)
+        self.true = within_turn(w["true"] - self.theta) if "true" in w else None
+        pitch = 2 * math.pi / self.faces
+        self.place = np.round(self.theta / pitch).astype(np.int64) % self.faces
+        self.face = np.round((self.theta + self.azimuth) / pitch).astype(np.int64) % self.faces
+        self.seen = np.unique(self.face)
 
     @property
     def both_senses(self) -> bool:
         """Return whether a place was reached from both sides: lost motion looks like a face's error otherwise."""
         return any(np.ptp(self.sense[self.place == x]) > 0.0 for x in np.unique(self.place))
-
-    @property
-    def place(self) -> NDArray[np.int64]:
-        """Return the number of the position, 0 .. faces - 1."""
-        out: NDArray[np.int64] = np.round(self.faces * self.theta / (2 * math.pi)).astype(np.int64)
-        return out % self.faces
 
     def separated(self, n: int) -> bool:
         """Return whether an order is told from the errors of the polygon."""
@@ -95,34 +93,6 @@ class PlacesFit:
     residual: Array
     gain: Array  # value = gain y
     V: Array  # covariance of y
-
-
-def within_turn(x: Array) -> Array:
-    """Return angles less the nearest whole number of turns."""
-    return np.asarray(x - 2 * math.pi * np.round(x / (2 * math.pi)))
-
-
-def readings(w: Mapping[str, Array], run: RunDocument) -> Readings:
-    """Return the rows of a record.  Raises ReductionError."""
-    o = run.options
-    mounts = [math.radians(float(x)) for x in str(o["mounts"]).split()]
-    plan = {row.phase: row for row in run.plan}
-    names = list(dict.fromkeys(row.face for row in run.plan))
-    phase = np.asarray(w["phase"], dtype=int)
-    rows = [plan[int(p)] for p in phase]
-    theta = np.array([row.target for row in rows])
-    mount = np.array([names.index(row.face) for row in rows])
-    sense = np.ones(phase.size)  # of the last move, by the cumulative reading
-    moved = np.diff(w["angle_start"])
-    for k in range(1, phase.size):
-        sense[k] = np.sign(moved[k - 1]) if abs(moved[k - 1]) > 1e-3 else sense[k - 1]
-    true = within_turn(w["true"] - theta) if "true" in w else None
-    return Readings(
-        theta, np.array(mounts)[mount], mount, sense, w["mean"], w["level_x"] + 1j * w["level_y"], w["tracking"],
-        within_turn(w["second"] - theta), true, int(o["positions"]), float(o["head"]),
-        int(o["orders"]), sum(float(run.parameters.get(f"{n}.quantum", 0.0)) ** 2 for n in HEADS)
-        * JITTER / 12.0,
-    )  # fmt: skip
 
 
 def least_squares(
@@ -239,7 +209,7 @@ class Reduction(MeasureTest):
         w = self.record.windows
         if problems := window_problems(w) or [f"column {n} is missing" for n in NEEDED if n not in w]:
             raise ReductionError(problems)
-        self.r = r = readings(w, self.run)
+        self.r = r = Readings(w, self.run)
         self.fit, self.orders = fit, _ = position_fit(r)
         self._accuracy()
         self._harmonics()
@@ -352,8 +322,8 @@ class Reduction(MeasureTest):
         theta, dense, error = self.r.theta[of], np.linspace(0.0, 2 * math.pi, 181), self.error[of] / ARCSEC
         harmonics = self.fit.value[: 2 * len(self.orders)] / ARCSEC
         model, curve = (waves(self.orders, x) @ harmonics for x in (theta, dense))
-        return Series(
+        points = Series(
             f"mount {math.degrees(self.r.azimuth[of][0]):g}°", np.degrees(theta).tolist(), "table angle", "°",
             error.tolist(), model.tolist(), (error - model).tolist(), "position error", "arcsec",
-            shown_fit_x=np.degrees(dense).tolist(), shown_fit_y=curve.tolist(),
         )  # fmt: skip
+        return replace(points, shown_fit_x=np.degrees(dense).tolist(), shown_fit_y=curve.tolist())
