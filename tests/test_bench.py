@@ -316,7 +316,6 @@ NAMED_TWICE = {
     "Estimate",
     "Estimates",
     "Expected",
-    "Fit",
     "GaussMarkov",
     "Linear",
     "Loop",
