@@ -16,7 +16,7 @@ STEEP = math.radians(85.0)
 
 
 @dataclass(frozen=True)
-class Place:
+class LocalEarth:
     """Horizontal and vertical Earth rate (rad/s), gravity (m/s2); rough: rough heading, rad."""
 
     north: float
@@ -68,7 +68,7 @@ def attitude(x: float, y: float, gravity: float) -> tuple[float, float]:
     return theta, math.asin(right)
 
 
-def tilted_heading(rates: tuple[float, float], x: float, y: float, place: Place) -> tuple[float, float]:
+def tilted_heading(rates: tuple[float, float], x: float, y: float, place: LocalEarth) -> tuple[float, float]:
     """Return heading and horizontal rate from the rates and forces along x and y, at any tilt.  [NORTH-STRAPDOWN]"""
     theta, gamma = attitude(x, y, place.gravity)
     st, ct, sg, cg = math.sin(theta), math.cos(theta), math.sin(gamma), math.cos(gamma)
@@ -86,7 +86,7 @@ def _read(columns: Array, values: Array) -> tuple[Array, Array]:
     return found, u
 
 
-def of_windows(method: str, w: Mapping[str, Array], place: Place) -> Problem:
+def of_windows(method: str, w: Mapping[str, Array], place: LocalEarth) -> Problem:
     """Return the problem of a method.  Raises ReductionError for windows that do not carry it."""
     missing = [n for n in NEEDED.get(method, ()) if n not in w]
     if missing:
@@ -127,7 +127,7 @@ def of_windows(method: str, w: Mapping[str, Array], place: Place) -> Problem:
     return _tilted(problem, Force(-float(f[1]), float(f[0]), float(u[1]), float(u[0])), lambda a: (-a[1], a[0]), place)
 
 
-def _tilted(p: Problem, force: Force, rates: Callable[[Array], tuple[float, float]], place: Place) -> Problem:
+def _tilted(p: Problem, force: Force, rates: Callable[[Array], tuple[float, float]], place: LocalEarth) -> Problem:
     def heading(a: Array) -> tuple[float, float]:
         return tilted_heading(rates(a), force.x, force.y, place)
 
@@ -143,7 +143,7 @@ def _rotated(a: Array) -> tuple[float, float]:
 
 
 def _strapdown(
-    method: str, w: Mapping[str, Array], place: Place, X: Array, rate: Array, t0: Array, t1: Array
+    method: str, w: Mapping[str, Array], place: LocalEarth, X: Array, rate: Array, t0: Array, t1: Array
 ) -> Problem:
     """Two channels, one after the other; with two positions each has its bias."""
     sign = np.sign(X[:, 0])
