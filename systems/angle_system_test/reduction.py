@@ -34,7 +34,7 @@ from gyrobench.reduction.toolkit import (
     Table,
     told,
     window_problems,
-)  # fmt: skip
+)
 from gyrobench.units import ARCSEC
 
 from . import harmonics

@@ -43,11 +43,11 @@ from gyrobench.reduction.toolkit import (
     Table,
     told,
     window_problems,
-)  # fmt: skip
+)
 from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import plans
-from .model import LocalEarth, attitude, of_windows, tilted_heading
+from .model import LocalEarth, attitude, of_windows
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
@@ -200,14 +200,14 @@ class Reduction(DriftTest[NorthFinderSetup]):
 
     def _moved(self, found: Findings, force: tuple[float, float] = (0.0, 0.0), latitude: float = 0.0) -> Array:
         """Return the change (q,) of the values for a unit of the force along x and y as read, or of the latitude."""
-        p, earth, step = self.model, self.setup.earth, 1e-6
-        assert p.force is not None and p.rates is not None
-        rates, read = p.rates(self.unknowns(found)), (p.force.x, p.force.y)
+        p, step = self.model, 1e-6
+        a, earth, read = self.unknowns(found), p.earth, p.force
+        assert read is not None
 
         def at(sign: float) -> Array:
-            place = replace(earth, up=earth.up + sign * step * latitude * earth.north)
-            x, y = (f + sign * step * d for f, d in zip(read, force, strict=True))
-            return np.array(tilted_heading(rates, x, y, place))
+            x, y = (f + sign * step * d for f, d in zip((read.x, read.y), force, strict=True))
+            up = earth.up + sign * step * latitude * earth.north
+            return np.array(replace(p, earth=replace(earth, up=up), force=replace(read, x=x, y=y)).heading(a))
 
         change = at(1.0) - at(-1.0)
         change[0] = math.remainder(change[0], 2.0 * math.pi)
