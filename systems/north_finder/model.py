@@ -37,7 +37,7 @@ class Force:
 
 
 @dataclass(frozen=True)
-class Problem:
+class HeadingProblem:
     """y = X a + noise over rows of t_start, t_end.  bias: its index in a, -1 without.  along: (n,) angle of y from the
     reference, clockwise; axis: 1 of rows of y, 0 of x.  force: where the tilt is read.  Raises ReductionError for an
     attitude that is not one.
@@ -100,7 +100,7 @@ def _read(columns: Array, values: Array) -> tuple[Array, Array]:
     return found, u
 
 
-def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Problem:
+def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
     """Return the problem of a method.  Raises ReductionError for windows that do not carry it."""
     missing = [n for n in NEEDED.get(method, ()) if n not in w]
     if missing:
@@ -119,14 +119,14 @@ def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Proble
     if method == "two":
         if float(np.max(np.abs(s))) > 0.01:
             raise ReductionError("method two: positions at the angles 0 and 180° are needed")
-        return Problem(("c", "bias"), np.column_stack([c, one]), rate, t0, t1, 1, -middle, one, earth)
+        return HeadingProblem(("c", "bias"), np.column_stack([c, one]), rate, t0, t1, 1, -middle, one, earth)
     X = np.column_stack([c, s, one])
     if np.linalg.cond(X) > 1e3:
         raise ReductionError(
             f"method {method}: the angles do not determine the heading; at least three positions over more than half a "
             "turn, or half a turn of rotation are needed"
         )
-    problem = Problem(("C", "B", "bias"), X, rate, t0, t1, 2, -middle, one, earth)
+    problem = HeadingProblem(("C", "B", "bias"), X, rate, t0, t1, 2, -middle, one, earth)
     if method != "tilt":
         return problem
     # of the force as of the rate; a bias of the accelerometer is a constant
@@ -134,7 +134,7 @@ def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Proble
     return replace(problem, force=Force(-float(f[1]), float(f[0]), float(u[1]), float(u[0])))
 
 
-def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s: Array) -> Problem:
+def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s: Array) -> HeadingProblem:
     """Return the problem of two channels, one after the other; with two positions each has its bias."""
     sign = np.sign(c)
     if float(np.max(np.abs(s))) > 0.01 or (np.all(sign == sign[0]) if two else np.any(sign < 0.0)):
@@ -145,7 +145,7 @@ def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s
     X = np.kron(np.eye(2), columns)[:, [0, 2, 1, 3] if two else [0, 1]]
     t0, t1, x, y = (np.asarray(w[n], dtype=float) for n in ("t_start", "t_end", "mean_x", "mean"))
     after = t1[-1] - t0[0]  # the channels one after the other in time: their noises have nothing to do with each other
-    return Problem(
+    return HeadingProblem(
         ("w_x", "w_y", "bias_x", "bias_y")[: X.shape[1]], X, np.concatenate([x, y]),
         np.concatenate([t0, t0 + after]), np.concatenate([t1, t1 + after]), 3 if two else -1,
         np.tile(np.where(sign > 0.0, 0.0, math.pi), 2), np.repeat([0.0, 1.0], sign.size), earth,
