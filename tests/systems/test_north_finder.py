@@ -309,16 +309,16 @@ def test_error_of_the_finder_of_a_tilted_head(sessions: Callable[[str], Session]
 @pytest.mark.parametrize(
     ("method", "source", "option", "size", "change"),
     [
-        ("four", "tilt of the head about east", "u_level", 1e-4, {"pitch": ("tilt", 0.0)}),
-        ("four", "tilt of the head about north", "u_level", 1e-4, {"roll": ("tilt", 1.0)}),
+        ("four", "head.tilt.east", "u_level", 1e-4, {"pitch": ("tilt", 0.0)}),
+        ("four", "head.tilt.north", "u_level", 1e-4, {"roll": ("tilt", 1.0)}),
         ("two", "latitude", "u_latitude", 1e-5, {}),
         ("strapdown", "latitude", "u_latitude", 1e-5, {}),
         ("tilt", "latitude", "u_latitude", 1e-5, {}),
         ("strapdown two", "latitude", "u_latitude", 1e-5, {}),
-        ("strapdown", "bias of the gyro along x", "u_bias", 1e-8, {"mean_x": ("add", 1e-8)}),
-        ("strapdown", "bias of the gyro along y", "u_bias", 1e-8, {"mean": ("add", 1e-8)}),
-        ("strapdown", "bias of the accelerometer along x", "u_accelerometer", 1e-4, {"f_x": ("add", 1e-4)}),
-        ("strapdown", "bias of the accelerometer along y", "u_accelerometer", 1e-4, {"f_y": ("add", 1e-4)}),
+        ("strapdown", "gyro.bias.x", "u_bias", 1e-8, {"mean_x": ("add", 1e-8)}),
+        ("strapdown", "gyro.bias.y", "u_bias", 1e-8, {"mean": ("add", 1e-8)}),
+        ("strapdown", "accelerometers.bias.x", "u_accelerometer", 1e-4, {"f_x": ("add", 1e-4)}),
+        ("strapdown", "accelerometers.bias.y", "u_accelerometer", 1e-4, {"f_y": ("add", 1e-4)}),
     ],
 )  # fmt: skip
 def test_budget_is_what_an_error_does(
@@ -329,11 +329,11 @@ def test_budget_is_what_an_error_does(
     tilts = (0.2, -0.15) if method in ("tilt", "strapdown", "strapdown two") else (0.0, 0.0)
     w = windows(method, heading, latitude, *tilts, noise=noise)
     base = heading_of(method, w, latitude, **{option: size})
-    line = next(b for b in base.budget if b.source == source and b.coefficient == "ψ")
+    line = next(b for b in base.budget if b.id == source and b.coefficient == "ψ")
     stated = latitude
     if source == "latitude":
         stated += size
-    elif "tilt of the head" in source:  # right-handed about east or north, by its matrix on the axes of the head
+    elif source.startswith("head.tilt"):  # right-handed about east or north, by its matrix on the axes of the head
         axis = [1.0, 0.0, 0.0] if "east" in source else [0.0, 1.0, 0.0]
         C = Rotation.from_euler("ZXY", [-heading, 0.0, 0.0]).as_matrix().T
         C = C @ Rotation.from_rotvec(size * np.array(axis)).as_matrix().T
