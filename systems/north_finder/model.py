@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.regression import least_squares
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = {"two": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
@@ -91,15 +92,6 @@ def tilted_heading(rates: tuple[float, float], force: Force, place: LocalEarth) 
     return math.atan2(east, north), math.hypot(east, north) / (ct * cg)
 
 
-def _read(columns: Array, values: Array) -> tuple[Array, Array]:
-    """Return the constants (p,) of readings and their standard uncertainties, by least squares."""
-    found: Array = np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0], dtype=float)
-    dof = max(values.size - columns.shape[1], 1)
-    sigma = float(np.linalg.norm(values - columns @ found)) / math.sqrt(dof)
-    u: Array = np.asarray(sigma * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns))))
-    return found, u
-
-
 def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
     """Return the problem of a method.  Raises ReductionError for windows that do not carry it."""
     missing = [n for n in NEEDED.get(method, ()) if n not in w]
@@ -130,8 +122,8 @@ def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Headin
     if method != "tilt":
         return problem
     # of the force as of the rate; a bias of the accelerometer is a constant
-    f, u = _read(X, np.asarray(w["f_y"], dtype=float))
-    return replace(problem, force=Force(-float(f[1]), float(f[0]), float(u[1]), float(u[0])))
+    f = least_squares(X, np.asarray(w["f_y"], dtype=float), problem.names)
+    return replace(problem, force=Force(-float(f.beta[1]), float(f.beta[0]), float(f.u[1]), float(f.u[0])))
 
 
 def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s: Array) -> HeadingProblem:
@@ -141,7 +133,8 @@ def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s
         at = " two: windows at the angles 0 and 180°" if two else ": windows at the angle 0"
         raise ReductionError(f"method strapdown{at} are needed")
     columns = np.column_stack([sign, np.ones_like(sign)] if two else [sign])
-    (f_x, u_x), (f_y, u_y) = (_read(columns, np.asarray(w[n], dtype=float)) for n in ("f_x", "f_y"))
+    names = ("force", "bias")[: columns.shape[1]]
+    f_x, f_y = (least_squares(columns, np.asarray(w[n], dtype=float), names) for n in ("f_x", "f_y"))
     X = np.kron(np.eye(2), columns)[:, [0, 2, 1, 3] if two else [0, 1]]
     t0, t1, x, y = (np.asarray(w[n], dtype=float) for n in ("t_start", "t_end", "mean_x", "mean"))
     after = t1[-1] - t0[0]  # the channels one after the other in time: their noises have nothing to do with each other
@@ -149,5 +142,5 @@ def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s
         ("w_x", "w_y", "bias_x", "bias_y")[: X.shape[1]], X, np.concatenate([x, y]),
         np.concatenate([t0, t0 + after]), np.concatenate([t1, t1 + after]), 3 if two else -1,
         np.tile(np.where(sign > 0.0, 0.0, math.pi), 2), np.repeat([0.0, 1.0], sign.size), earth,
-        Force(float(f_x[0]), float(f_y[0]), float(u_x[0]), float(u_y[0])),
+        Force(*(float(v[0]) for v in (f_x.beta, f_y.beta, f_x.u, f_y.u))),
     )  # fmt: skip
