@@ -21,7 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, Reason, Test
+from gyrobench.result import Autocorrelation, Coefficient, Reason, Test
 
 RANKED = "error"  # the coefficient that ranks estimators, smallest first
 LOOP = 5.0  # degrees of phase that an estimator may cost in a loop
@@ -77,7 +77,7 @@ class Measures:
 
     coefficients: list[Coefficient] = field(default_factory=list)
     tests: list[Test] = field(default_factory=list)
-    acf: dict[str, list[float]] = field(default_factory=dict)
+    acf: Autocorrelation | None = None
     reasons: list[Reason] = field(default_factory=list)
     error: Array = field(default_factory=lambda: np.zeros(0))
 

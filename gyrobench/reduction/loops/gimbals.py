@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Response, Table
+from gyrobench.result import Curve, Response, Table
 
 DEG = math.pi / 180.0
 SHOWN = 700  # points of a drawn line
@@ -155,15 +155,15 @@ def over_time(
     drawn = []
     for label, y in lines.items():
         x, thin = _envelope(t, y)
-        drawn.append({"label": label, "x": x.tolist(), "y": thin.tolist(), "phase": []})
+        drawn.append(Curve(label, x.tolist(), thin.tolist()))
     return Response(
         name=name,
         kind="time",
         caption=caption or f"{name[:1].upper()}{name[1:]} over time.",
-        x=drawn[0]["x"],
+        x=drawn[0].x,
         x_name="time",
         x_unit="s",
-        y=drawn[0]["y"],
+        y=drawn[0].y,
         y_name=y_name or name,
         y_unit=unit,
         curves=drawn,

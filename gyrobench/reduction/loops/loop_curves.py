@@ -11,26 +11,21 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Gate, Point
-from gyrobench.result import Response
+from gyrobench.result import Curve, Response
 
 CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
 
 
-def curve(label: str, f: Array, values: Any) -> dict[str, Any]:
+def curve(label: str, f: Array, values: Any) -> Curve:
     """Return a model's curve, thinned for drawing; phase unwrapped, degrees."""
     phase = np.degrees(np.unwrap(np.angle(values)))
     pick = np.unique(np.linspace(0, len(f) - 1, CURVE).astype(int))
-    return {
-        "label": label,
-        "x": np.asarray(f)[pick].tolist(),
-        "y": np.abs(values)[pick].tolist(),
-        "phase": phase[pick].tolist(),
-    }
+    return Curve(label, np.asarray(f)[pick].tolist(), np.abs(values)[pick].tolist(), phase[pick].tolist())
 
 
 def bode(
-    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[dict[str, Any]], y_name: str, unit: str
+    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[Curve], y_name: str, unit: str
 ) -> Response:
     """Return the Bode plot of measured points with the curves of models."""
     return Response(
@@ -57,7 +52,7 @@ def step_figure(
     t = gate.t - gate.t[0]
     pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
     curves = [] if line is None else [
-        {"label": label, "x": t[pick].tolist(), "phase": [], "y": (line[pick] / scale).tolist()}
+        Curve(label, t[pick].tolist(), (line[pick] / scale).tolist())
     ]  # fmt: skip
     size = f"{gate.amplitude:g}".replace("-", "−")
     cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"

@@ -46,7 +46,7 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
-from gyrobench.result import NO_VERDICT, Coefficient, LoopResult, Reason, Response, Table
+from gyrobench.result import AllanDeviation, Coefficient, LoopResult, NO_VERDICT, Reason, Response, Table
 from gyrobench.units import DPH
 
 EVERY = ("pass", "fail", "inconclusive", NO_VERDICT)
@@ -73,7 +73,7 @@ class LoopFindings:
         self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
         self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
         self.reasons: list[Reason] = []
-        self.allan: dict[str, Any] = {}
+        self.allan: AllanDeviation | None = None
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
         if self.linear.missing:
@@ -337,10 +337,9 @@ class LoopFindings:
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """
         measures = drift(gate.t, gate[output])
-        scaled: dict[str, Any] = {
-            k: [x / DPH for x in measures.allan[k]] for k in ("dev", "lo", "hi") if k in measures.allan
-        }
-        self.allan = {**measures.allan, **scaled, "unit": "°/h"} if measures.allan else {}
+        if (a := measures.allan) is not None:
+            dev, lo, hi = ([x / DPH for x in values] for values in (a.dev, a.lo, a.hi))
+            self.allan = replace(a, dev=dev, lo=lo, hi=hi, unit="°/h")
         true = None if truth is None else truth / DPH
         self.measure(
             f"drift{key}",
