@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.notebook import Displayed, data_frame
-from gyrobench.result_content import absent, content, typed
+from gyrobench.result_content import EMPTY, content, typed
 from gyrobench.result_entries import (
     NO_VERDICT,
     AllanDeviation,
@@ -110,7 +110,7 @@ class Result(Displayed):
     coefficients: list[Coefficient]
     tests: list[Test] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)  # the method's own
-    step_check: StepCheck | None = absent()
+    step_check: StepCheck | None = field(default=None, metadata=EMPTY)
     reasons: list[Reason] = field(default_factory=list)  # warnings, and why verdicts are withheld
     summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
     decision_rule: str = ""
@@ -242,9 +242,9 @@ class DriftTestResult(Result):
     noise: dict[str, Any]  # {"model": "white" | "ar1" ..., "sigma": .., "tau": .., units in the names}
     residual_std: float
     residual_unit: str
-    acf: Autocorrelation | None = absent()
-    allan: AllanDeviation | None = absent()
-    psd: PowerSpectrum | None = absent()
+    acf: Autocorrelation | None = field(default=None, metadata=EMPTY)
+    allan: AllanDeviation | None = field(default=None, metadata=EMPTY)
+    psd: PowerSpectrum | None = field(default=None, metadata=EMPTY)
     harmonics: list[Harmonic] = field(default_factory=list)
     budget: list[BudgetLine] = field(default_factory=list)
     type_b: list[TypeB] = field(default_factory=list)
@@ -260,10 +260,10 @@ class LoopResult(Result):
 
     responses: list[Response]
     budget: list[BudgetLine] = field(default_factory=list)
-    allan: AllanDeviation | None = absent()
+    allan: AllanDeviation | None = field(default=None, metadata=EMPTY)
     # of an estimator: its readings and their errors
     series: list[Series] = field(default_factory=list)
-    acf: Autocorrelation | None = absent()
+    acf: Autocorrelation | None = field(default=None, metadata=EMPTY)
     dof: float = 0.0
     residual_std: float = 0.0
     residual_unit: str = "1"

@@ -12,17 +12,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, field, fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 #: texts that files of version 0.1.0 do not have, or need not have
 OLDER = {"id": "", "title": "", "caption": ""}
-
-
-def absent() -> Any:
-    """Return the declaration of an entry that may be missing: None in Python, {} in the file."""
-    return field(default=None, metadata={"empty": True})
+#: of an entry that may be missing: None in Python, {} in the file
+EMPTY = {"empty": True}
 
 
 def content(value: Any) -> Any:

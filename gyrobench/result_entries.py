@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from gyrobench.result_content import absent
+from gyrobench.result_content import EMPTY
 
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
@@ -268,7 +268,7 @@ class RateBand:
 class RateRecord(RateBand):
     """The rate by intervals: smallest, mean and largest value; smoothed: its drift with the 95 % band."""
 
-    smoothed: RateBand | None = absent()
+    smoothed: RateBand | None = field(default=None, metadata=EMPTY)
 
 
 @dataclass(frozen=True)
@@ -324,8 +324,8 @@ class DriftColumn:
     unit: str  # of the rate
     record: RateRecord
     deviations: list[DeviationCurve]
-    model: NoiseModelCurves | None = absent()
-    spectrum: SpectrumBand | None = absent()
-    correlation: SampleCorrelation | None = absent()
+    model: NoiseModelCurves | None = field(default=None, metadata=EMPTY)
+    spectrum: SpectrumBand | None = field(default=None, metadata=EMPTY)
+    correlation: SampleCorrelation | None = field(default=None, metadata=EMPTY)
     tables: dict[str, list[Table]] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
