@@ -129,7 +129,7 @@ def _lines(summary: dict[str, Any]) -> list[str]:
     for state, reasons in summary["reasons"].items():
         lines += [f"{state}, {n:,}: {reason}" for reason, n in reasons.items()]
     if summary["quantities"]:
-        rows = [["", "unit", "runs", "mean", "std of estimates", "mean u", "interval holds the truth"]]
+        rows = [["", "unit", "runs", "mean", "std of estimates", "mean u", "interval contains the true value"]]
         for q in summary["quantities"]:
             spread = f"{q['std']:.3g}" if q["std"] is not None else ""
             held = f"{q['held'] / q['with_truth']:.3f} of {q['with_truth']:,}" if "held" in q else ""

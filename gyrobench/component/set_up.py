@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Errors = dict[str, float | dict[str, float]]
 Simulated = Callable[[Mapping[str, Any]], Errors]
 GYRO_MOUNT = ("mount.1", "mount.2", "mount.3")  # about input, output and spin reference axis; x, y and z
+#: turned about its output axis, a gyro leans its input axis away from the spin axis
+LEANS = {"mount.input_to_spin": ("mount.2", -1.0)}
 SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
 
 
@@ -47,7 +49,8 @@ def turned(parameter: str, ids: Sequence[str]) -> Simulated:
         m = np.reshape(p[parameter], (3, 3))
         # rows are the axes of the instrument: the transpose turns them
         angles = 0.5 * np.array([m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]])
-        return dict(zip(ids, angles.tolist(), strict=True))
+        found = dict(zip(ids, angles.tolist(), strict=True))
+        return found | {lean: sign * found[i] for lean, (i, sign) in LEANS.items() if i in found}
 
     return errors
 

@@ -302,9 +302,10 @@ class System(Configurable):
         if empty := [slot for slot, s in self.slots.items() if not s.part]:
             parts = ", ".join(f'{slot}="..."' for slot in empty)
             lacks.append(f"slot {', '.join(empty)}: no part; name it by with_parts({parts})")
-        if self.reduction and self.folder and not (self.folder / f"{self.reduction}.py").is_file():
-            missing = f'reduction = "{self.reduction}": no file {self.reduction}.py in {self.folder}'
-            lacks.append(f"{missing}; write from_record(record, specification) there")
+        named = self.reduction if isinstance(self.reduction, str) else ""
+        if named and self.folder and not (self.folder / f"{named}.py").is_file():
+            missing = f'reduction = "{named}": no file {named}.py in {self.folder}'
+            lacks.append(f"{missing}; write a class Reduction with from_record(record) there")
         return lacks
 
     def refuse(self) -> None:

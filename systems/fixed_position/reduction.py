@@ -18,11 +18,12 @@ import numpy as np
 
 from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, TURNED
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -47,11 +48,10 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 LEAST = 8  # readings
-EARTH_ONLY = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class FixedPositionSetup(SiteSetup):
     """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A.  quantum: resolution of the current
     reading.
     """
@@ -76,14 +76,14 @@ class Setup(SiteSetup):
         return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
-class Reduction(DriftTest[Setup]):
+class Reduction(DriftTest[FixedPositionSetup]):
     """Composite drift of one attitude, of one day or of several."""
 
     handling = staticmethod(handling_candidates.at_rest)
 
     @classmethod
-    def setup_of(cls, run: RunDocument) -> Setup:
-        return Setup.of(
+    def setup_of(cls, run: RunDocument) -> FixedPositionSetup:
+        return FixedPositionSetup.of(
             run,
             attitude=attitude_of(run),
             k=number(run, "k", "gyro.k", "torquer scale factor"),
@@ -120,14 +120,9 @@ class Reduction(DriftTest[Setup]):
         by_latitude = s.earth_rate * float(
             s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
         )
-        turned = []
-        for axis, name in ((1, "output"), (2, "spin")):
-            R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
-            rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
-            turned.append(replace(TURNED[name], option="u_attitude", note=EARTH_ONLY).effect(s, found.error(-rate)))
         offset = found.error(-s.k)
         return [
-            *turned,
+            *attitude_effects(s, found, EARTH_ONLY),
             LATITUDE.effect(s, found.error(by_latitude)),
             TORQUER_SCALE.effect(s, found.error(-s.k * self.current)),
             CURRENT_OFFSET.effect(s, offset),
@@ -191,7 +186,7 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
     return None if tested is None else (float(tested[0][0]), float(tested[1][0]))
 
 
-def _conventions(s: Setup) -> list[str]:
+def _conventions(s: FixedPositionSetup) -> list[str]:
     axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
     return [
         "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
@@ -201,7 +196,7 @@ def _conventions(s: Setup) -> list[str]:
     ]
 
 
-def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> Table:
+def _table(s: FixedPositionSetup, i: Array, t0: Array, t1: Array, book: float) -> Table:
     X, Y, Z = s.xyz.tolist()
     return Table(
         "from_current_to_drift",

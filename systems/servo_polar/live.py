@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +38,10 @@ ON_REQUEST = OnRequest(
 )
 
 
-def tables(windows: Mapping[str, Array], labels: Mapping[int, str], parameters: Mapping[str, Any]) -> list[Table]:
+def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: Sequence[float]) -> list[Table]:
     """Return the tables of the live estimate; none for a record without it.
 
-    windows: columns of the record.  labels: phase -> attitude.  parameters: of the run.
+    windows: columns of the record.  labels: phase -> attitude.  wanted: standard deviations, rad/s; 0: not stated.
     """
     if MAY_STOP not in windows:
         return []
@@ -64,25 +63,20 @@ def tables(windows: Mapping[str, Array], labels: Mapping[int, str], parameters: 
                 for k in (stop, end)
             )
             values.append([label, name, *then, *last])
-    wanted = list(dict.fromkeys(f"{x / DPH:.3g}" for x in parameters.get(f"{SLOT}.wanted", ()) if x > 0.0))
-    asked = f"Standard deviation wanted of mean and harmonics: {', '.join(wanted) or 'none stated'} °/h."
-    model = "Type A only, for the noise that the estimator is told; NIS is 1 on average where that is right."
+    sizes = ", ".join(dict.fromkeys(f"{x / DPH:.3g}" for x in wanted if x > 0.0)) or "none stated"
+    asked = (
+        f"Standard deviation wanted of mean and harmonics: {sizes} °/h. Type A only, for the noise that the estimator "
+        "is told; NIS is 1 on average where that is right."
+    )
+    over = (
+        "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, and at the end "
+        "(generalized least squares over all windows)"
+    )
+    head = ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"]
+    terms = ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"]
     return [
-        Table(
-            "live_estimate_time_to_the",
-            "Live estimate: time to the wanted uncertainty",
-            f"{asked} {model}",
-            ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"],
-            stops,
-        ),
-        Table(
-            "live_estimate_drift_over_the",
-            "Live estimate: drift over the angle",
-            "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, "
-            "and at the end (generalized least squares over all windows)",
-            ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
-            values,
-        ),
+        Table("live.time", "Live estimate: time to the wanted uncertainty", asked, head, stops),
+        Table("live.drift", "Live estimate: drift over the angle", over, terms, values),
     ]
 
 
@@ -107,22 +101,18 @@ def had_it_stopped(record: Record, result: DriftTestResult, reduce: Callable[[Re
         then = {c.name: c for c in reduce(shorter).coefficients}
     except ReductionError as error:
         why = "; ".join(error.problems)
-        return [Table("left", LEFT, "Not estimable from these windows", ["reason"], [[why]])]
+        return [Table("live.left", LEFT, "Not estimable from these windows", ["reason"], [[why]])]
     both = [
         [c.name, c.unit, c.estimate, c.u, then[c.name].estimate, then[c.name].u]
         for c in result.coefficients
         if c.name in then
     ]
-    return [
-        Table(
-            "left",
-            LEFT,
-            "Reduction of this report over all windows, and over those until each mount could have been "
-            "left; here the noise is estimated from the windows used, there it is told",
-            ["coefficient", "unit", "whole plan", "u", "left then", "u then"],
-            both,
-        )
-    ]
+    caption = (
+        "Reduction of this report over all windows, and over those until each mount could have been left; here the "
+        "noise is estimated from the windows used, there it is told"
+    )
+    head = ["coefficient", "unit", "whole plan", "u", "left then", "u then"]
+    return [Table("live.left", LEFT, caption, head, both)]
 
 
 def stopped(windows: Mapping[str, Array], rows: NDArray[np.int_]) -> int | None:
@@ -131,11 +121,11 @@ def stopped(windows: Mapping[str, Array], rows: NDArray[np.int_]) -> int | None:
     return int(ready[0]) if ready.size else None
 
 
-def sentence(tables: list[dict[str, Any]]) -> list[str]:
+def sentence(tables: Sequence[Table]) -> list[str]:
     """Return what the summary says of it: hours saved of those planned, or that the uncertainty was not reached."""
     if not tables:
         return []
-    rows = tables[0]["rows"]
+    rows = tables[0].rows
     late = [row[0] for row in rows if row[4] is None]
     saved, planned = sum(row[4] or 0.0 for row in rows), sum(row[2] for row in rows)
     words = f"The live estimate would have saved {saved:.1f} h of {planned:.1f} h"

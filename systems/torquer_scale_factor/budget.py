@@ -21,6 +21,7 @@ from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.sources import (
     ANGLE_ONCE,
     ANGLE_TWICE,
@@ -31,13 +32,17 @@ from gyrobench.reduction.setup.sources import (
     Source,
 )
 
-AMMETER, ZERO = "ammeter", "zero of the ammeter"
+AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")
+ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Standard uncertainties of type B, SI, the options of the same names; u_current, u_time: relative."""
+@dataclass(frozen=True, kw_only=True)
+class TorquerSetup(Setup):
+    """u_current, u_time: relative; of a table of rates these two count alone.  truth: printed name -> value in the
+    printed unit.
+    """
 
+    earth_rate: float = frames.EARTH_RATE
     u_current: float = 0.0
     u_zero: float = 0.0
     u_angle1: float = 0.0
@@ -47,9 +52,7 @@ class Sizes:
     u_time: float = 0.0
 
 
-def effects(
-    found: Findings, currents: int, start: Array, end: Array, sizes: Sizes, earth_rate: float = frames.EARTH_RATE
-) -> Sequence[Effect]:
+def effects(found: Findings, currents: int, start: Array, end: Array, setup: TorquerSetup) -> Sequence[Effect]:
     """Return all sources of a fit to windows; start, end (n,): table angle, rad.
 
     currents: their number; the first columns of the fit are the current of each, then the constant of each.
@@ -70,12 +73,12 @@ def effects(
     K, constant = slice(0, currents), slice(currents, 2 * currents)
     along_o, along_s = mean(np.sin(end) - np.sin(start)), mean(np.cos(start) - np.cos(end))
     return [
-        Source("?", AMMETER, "1", "u_current").effect(sizes, design(K, K), note="relative"),
-        Source("?", ZERO, "A", "u_zero").effect(sizes, design(K, constant)),
-        ANGLE_ONCE.effect(sizes, read(1)),
-        ANGLE_TWICE.effect(sizes, read(2)),
-        AXIS_LEVEL_POLE.effect(sizes, found.error(-earth_rate)),
-        INPUT_TO_OUTPUT.effect(sizes, found.error(-earth_rate * along_o)),
-        INPUT_TO_SPIN.effect(sizes, found.error(earth_rate * along_s)),
-        TIME_BASE.effect(sizes, found.error(-found.y), note="relative, seconds read too long"),
+        AMMETER.effect(setup, design(K, K)),
+        ZERO.effect(setup, design(K, constant)),
+        ANGLE_ONCE.effect(setup, read(1)),
+        ANGLE_TWICE.effect(setup, read(2)),
+        AXIS_LEVEL_POLE.effect(setup, found.error(-setup.earth_rate)),
+        INPUT_TO_OUTPUT.effect(setup, found.error(-setup.earth_rate * along_o)),
+        INPUT_TO_SPIN.effect(setup, found.error(setup.earth_rate * along_s)),
+        TIME_BASE.effect(setup, found.error(-found.y), note="relative, seconds read too long"),
     ]

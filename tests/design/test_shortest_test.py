@@ -67,7 +67,7 @@ def test_six_positions_a_mount_are_best_for_the_accelerometer() -> None:
     angle = np.tile(np.arange(24) * np.pi / 12, 2)
     v = model.Visits(np.repeat(["a", "b"], 24), angle, angle, angle, 0.0 * angle, 0.0)
     k, zeros = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), {"a": 0.0, "b": 0.0}
-    m = model.Model(["a", "b"], False)
+    m = model.Polynomial(["a", "b"], False)
     X = np.column_stack([m.columns(v, zeros, 1.0), m.slopes(v, zeros, 1.0, k)])
     M = np.einsum("mi,mj->mij", X, X)
     shares = np.zeros(48)
@@ -90,7 +90,7 @@ def test_windows_of_a_tumble_are_those_of_its_reduction() -> None:
     assert isinstance(protocol, OptionProtocol) and protocol.noise is not None
     length = 2.0 * np.pi / float(system["rate"])
     module = importlib.import_module(".design", type(system).__module__)
-    setup = importlib.import_module(".setup", type(system).__module__).setup_of(record.run)
+    setup = importlib.import_module(".reduction", type(system).__module__).Reduction.setup_of(record.run)
     X, t0, t1 = module._windows(system, setup, 1, 100.0 / length, length)
     fit = fits[0][0]
     assert pytest.approx(fit.X, abs=5e-4) == X

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gyrobench.engine.session import Session
-from gyrobench.result import Result
+from gyrobench.result import Result, Table
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.system import load_system
 
@@ -38,5 +38,5 @@ def measures(result: Result) -> dict[str, float]:
     return {c.name: c.estimate for c in result.coefficients}
 
 
-def table(result: Result, title: str) -> dict[str, Any]:
-    return next(t for t in result.tables if t["title"] == title)
+def table(result: Result, kind: str) -> Table:
+    return next(t for t in result.tables if t.kind == kind)

@@ -92,7 +92,7 @@ def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
             ends = solve_ivp(turn, (0, at[-1]), [0.0], "DOP853", at, rtol=1e-13, atol=1e-14).y[0]
         else:
             axes = on_servo_table(name, phi)[None]
-            still = servo_regression.Held(np.zeros(1), np.zeros(1), np.zeros(1), np.ones(1), axes)
+            still = servo_regression.HeldWindows(np.zeros(1), np.zeros(1), np.zeros(1), np.ones(1), axes)
             omega_d = servo_regression.design(still, site, tuple(true)) @ np.array(list(true.values()))
             at = np.arange(4) * 1e-3
             ends = float(omega_d[0] - W * (axes[0, 0] @ frames.pole(phi))) * at

@@ -51,13 +51,15 @@ def latitude(rng: np.random.Generator) -> float:
     return float(math.radians(rng.uniform(12.0, 78.0)) * rng.choice([-1.0, 1.0]))
 
 
-def held(record: Any) -> tuple[servo_regression.Held, Array]:
+def held(record: Any) -> tuple[servo_regression.HeldWindows, Array]:
     """Windows of the held phases and which rows of the record they are."""
     labels = {r.phase: r.label for r in record.run.plan if r.mode == "servo"}
     w = record.windows
     rows = np.isin(w["phase"], list(labels))
     axes = np.array([on_servo_table(labels[p], record.run.options["latitude"]) for p in w["phase"][rows].tolist()])
-    return servo_regression.Held(*(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes), rows
+    return servo_regression.HeldWindows(
+        *(w[c][rows] for c in ("angle_start", "angle_end", "t_start", "t_end")), axes
+    ), rows
 
 
 def expected_rate(record: Any) -> Array:

@@ -14,6 +14,7 @@ from gyrobench.system.system import load_system
 system = load_system("tumble_single_axis")
 reduction: Any = importlib.import_module(".reduction", type(system).__module__)
 closed: Any = importlib.import_module(".closed", type(system).__module__)
+refusals: Any = importlib.import_module(".refusals", type(system).__module__)
 
 DPH = math.pi / 180.0 / 3600.0
 K = 17.2 * DPH / 1e-3

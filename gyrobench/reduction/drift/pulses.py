@@ -34,6 +34,7 @@ LATE = Source("pulse.late", "switching time of the pulses", "s", "u_switching", 
 GROWING = Source("pulse.growing", "switching time, proportional to the current", "s", "u_switching", "at full current")
 CURVED = Source("pulse.curved", "switching time, by the square of the current", "s", "u_switching", "at full current")
 RESOLUTION = Source("pulse.resolution", "resolution of the counts", "1")
+SOURCES = (ASYMMETRY, MEAN, LATE, GROWING, CURVED, RESOLUTION)
 
 
 def of_loop(source: Source, loop: str = "") -> Source:
@@ -42,7 +43,7 @@ def of_loop(source: Source, loop: str = "") -> Source:
 
 
 @dataclass(frozen=True)
-class Windows:
+class CurrentWindows:
     """Readings (n,): mean and standard deviation of the current of each step (A), length of the window (s)."""
 
     mean: Array
@@ -78,7 +79,7 @@ class Pulses:
             return PulsesOnDemand(current, f_q, 0.0, plus, minus, (0.0, late[0], 0.0), clocks=1.0)
         return cls(current, f_q, float(p[f"{slot}.f_s"]), plus, minus, (late[0], late[1], late[2]))
 
-    def effects(self, fit: Findings, k: float, read: Windows, sizes: Any, loop: str = "") -> list[Effect]:
+    def effects(self, fit: Findings, k: float, read: CurrentWindows, sizes: Any, loop: str = "") -> list[Effect]:
         """Return the sources with their sensitivities.
 
         k: torquer scale factor, rad/s/A.  sizes: with u_pulse (A), u_switching (s), see the options.  loop: name of the
@@ -98,7 +99,7 @@ class Pulses:
             of_loop(RESOLUTION, loop).effect(12.0**-0.5, values=self._counts(fit, k, read), note=note),
         ]
 
-    def _counts(self, fit: Findings, k: float, read: Windows) -> Array:
+    def _counts(self, fit: Findings, k: float, read: CurrentWindows) -> Array:
         """Return what the resolution, in every window anew, makes of each value."""
         each = self.clocks * k * self.current / self.f_q / read.length
         return np.asarray(np.sqrt(np.sum((fit.gain * each) ** 2, axis=1)))
@@ -107,7 +108,7 @@ class Pulses:
 class PulsesOnDemand(Pulses):
     """Rebalance by pulses on demand: one clock long each, late[1] by how much longer (s)."""
 
-    def effects(self, fit: Findings, k: float, read: Windows, sizes: Any, loop: str = "") -> list[Effect]:
+    def effects(self, fit: Findings, k: float, read: CurrentWindows, sizes: Any, loop: str = "") -> list[Effect]:
         """Return the sources with their sensitivities, as those of pulse widths; a window has pulses of one sign."""
         d = read.mean / self.current
         longer = 1.0 + self.f_q * self.late[1]

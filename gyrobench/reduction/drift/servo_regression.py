@@ -61,7 +61,7 @@ BOOK: dict[str, tuple[str, int]] = {
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldWindows:
     """Windows of a held table: angles (n,) rad, times (n,) s, and the gyro axes x, y, z (rows, in ENU) at angle 0 of
     each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.
     """
@@ -84,8 +84,8 @@ class Held:
         """Angles (n, 12) at which the windows are averaged."""
         return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
 
-    def turned(self, **axes_or_body: Array) -> Held:
-        """The same windows on other axes or of another gyro."""
+    def turned(self, **axes_or_body: Array) -> HeldWindows:
+        """Return the same windows on other axes or of another gyro."""
         other = replace(self, **axes_or_body)
         other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
         return other
@@ -102,14 +102,14 @@ class Held:
 
 def held_windows(
     windows: Mapping[str, Array], labels: Mapping[int, str], known: Collection[str], latitude: float
-) -> tuple[Held, NDArray[np.int_], NDArray[np.bool_]]:
+) -> tuple[HeldWindows, NDArray[np.int_], NDArray[np.bool_]]:
     """Return the windows of the phases in ``labels`` (phase -> attitude), their phase numbers, and their rows.
 
     Raises ReductionError for an attitude that is not one of ``known``, and for windows that cannot be read.
     """
     there = "; ".join(known)
     wrong = [f"phase {p}: attitude '{n}' unknown; there are {there}" for p, n in labels.items() if n not in known]
-    if wrong := wrong or window_problems(windows, {p: {"label": n} for p, n in labels.items()}):
+    if wrong := wrong or window_problems(windows, labels):
         raise ReductionError(wrong)
     every = np.asarray(windows["phase"]).astype(int)
     rows = np.isin(every, list(labels))
@@ -118,10 +118,10 @@ def held_windows(
     axes = np.array([of_phase[p] for p in phase.tolist()])
     columns = (np.asarray(windows[c], dtype=float)[rows] for c in ("angle_start", "angle_end", "t_start", "t_end"))
     start, end, t0, t1 = columns
-    return Held(start, end, t0, t1, axes), phase, rows
+    return HeldWindows(start, end, t0, t1, axes), phase, rows
 
 
-def drift_rate(held: Held, site: Site) -> Array:
+def drift_rate(held: HeldWindows, site: Site) -> Array:
     """Return the data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
@@ -129,32 +129,29 @@ def drift_rate(held: Held, site: Site) -> Array:
     return out
 
 
-def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
+def design(held: HeldWindows, site: Site, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names``."""
     return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
 
 def window_problems(
-    windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
+    windows: Mapping[str, Array], labels: Mapping[int, str], required: Sequence[str] = REQUIRED
 ) -> list[str]:
-    """Return what is wrong with the rows of the held phases, as sentences."""
+    """Return what is wrong with the rows of the phases in ``labels`` (phase -> attitude), as sentences."""
     for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
-        windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
+        windows = {**windows, c: np.where(np.isin(windows["phase"], list(labels)), windows[c], 0)}
     problems = window_checks.window_problems(windows, required)
     if problems:
         return problems
     present = set(np.asarray(windows["phase"]).astype(int).tolist())
-    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in present]
-    return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
+    missing = [f"phase {p} ({label}) has no windows" for p, label in labels.items() if p not in present]
+    return missing or ([] if labels else ["the record holds no phase in which the gyro holds the table"])
 
 
-def tracking_problems(
-    windows: Mapping[str, Array], rows: NDArray[np.bool_], parameters: Mapping[str, Any], limit: float
-) -> list[str]:
-    """Where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and std) and
-    the gain of the gyro, as far as both are known.
+def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gain: float, limit: float) -> list[str]:
+    """Return where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and
+    std) and its gain, V/rad of the case, as far as both are known.
     """
-    gain = parameters.get("gyro.K_sg", 0.0) * parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or 1.0)
     if not gain or "mean" not in windows or not limit > 0.0:
         return []
     size = (np.abs(windows["mean"]) + np.nan_to_num(windows["std"])) / gain
@@ -170,18 +167,18 @@ def tracking_problems(
 
 
 def effects(
-    held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
-    sizes: Mapping[str, float],
+    held: HeldWindows, site: Site, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
+    sizes: Any,
 ) -> list[Effect]:  # fmt: skip
-    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Return axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
 
-    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
-    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
-    columns: what is fitted.
+    sizes: a setup with u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time
+    (relative).  The axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the
+    angle errors.  columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
 
-    def moved(other: Held) -> Array:
+    def moved(other: HeldWindows) -> Array:
         return fit.error(drift_rate(other, site) - y, columns(other) - X) / SMALL
 
     def axis(k: int) -> Array:
@@ -230,13 +227,17 @@ def effects(
     ]
 
 
-def _mounted(held: Held, k: int) -> Held:
-    """The windows with the gyro turned by SMALL about its axis k on the table."""
+def _mounted(held: HeldWindows, k: int) -> HeldWindows:
+    """Return the windows with the gyro turned by SMALL about its axis k on the table."""
     return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
 
 
 def candidates(
-    held: Held, site: Site, columns: Callable[[Held], Array], phase: NDArray[np.int_], windows: Mapping[str, Array]
+    held: HeldWindows,
+    site: Site,
+    columns: Callable[[HeldWindows], Array],
+    phase: NDArray[np.int_],
+    windows: Mapping[str, Array],
 ) -> list[Candidate]:
     """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
     differ from phase to phase, each of which is set up by itself.
@@ -261,7 +262,9 @@ def candidates(
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
-    """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
+    """Return the estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those
+    names.
+    """
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
@@ -284,18 +287,3 @@ CONVENTIONS = (
     "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
     "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
 )
-
-
-def equation(names: Sequence[str]) -> str:
-    """Typst math of the measurement equation with the terms ``names``."""
-    axis = {"I": "X", "O": "Y", "S": "Z"}
-    parts = []
-    for n in names:
-        index = n[2:]
-        if n == "D_F":
-            parts.append("D_F")
-        elif len(index) == 2 and index[0] == index[1]:
-            parts.append(f'D_"{index}" {axis[index[0]]}^2')
-        else:
-            parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(axis[a] for a in index))
-    return 'dot(theta) + omega_"E,x" = omega_d, quad omega_d = ' + " + ".join(parts)

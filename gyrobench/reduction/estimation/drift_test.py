@@ -41,6 +41,9 @@ class DriftTest(Generic[S]):
 
     #: record -> mistakes in taking or labelling it that make sense in this test (diagnosis.handling_candidates)
     handling: ClassVar[Any] = None
+    #: names and ids of sources of another channel of the same record, whose corrections are left to it
+    elsewhere: Sequence[str] = ()
+    found: Findings  # the fit that is reported
 
     def __init__(self, windows: Mapping[str, Array], setup: S) -> None:
         self.windows, self.setup = windows, setup
@@ -59,6 +62,10 @@ class DriftTest(Generic[S]):
         """Return the data with their linear model.  May raise ReductionError."""
         raise NotImplementedError
 
+    def fitted(self) -> Findings:
+        """Return the fit of :meth:`regression`.  May raise ReductionError."""
+        return self.regression().fit()
+
     def derived(self, found: Findings) -> Findings:
         """Return the fit reported as functions of its unknowns (:meth:`Findings.derive`)."""
         return found
@@ -73,6 +80,10 @@ class DriftTest(Generic[S]):
     def account(self, found: Findings) -> Account:
         """Return what the test says of itself, beside its figures."""
         raise NotImplementedError
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Return the result with what is not of the fit."""
+        return result
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         """Return the numbers that matter, as sentences: the first coefficient, the largest drift per g, the noise."""
@@ -95,15 +106,16 @@ class DriftTest(Generic[S]):
     def result(self) -> DriftTestResult:
         """Return what the data say, without the checks of :meth:`problems`."""
         setup = self.setup
-        found = self.regression().fit()
-        found = with_set_up(self.derived(found), self.effects, setup.corrections, remount=setup.remount)
+        found = self.fitted()
+        found = with_set_up(self.derived(found), self.effects, setup.corrections, self.elsewhere, setup.remount)
         self.test(found)
         effects = [*self.effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
         return self.finished(found, effects)
 
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:
         """Return the result of a fit with its sources of error."""
-        result = fit_result(found, self.account(found), effects, self.setup)
+        self.found = found
+        result = self.completed(fit_result(found, self.account(found), effects, self.setup))
         return replace(result, summary=self.summary(found, result.coefficients))
 
     @classmethod

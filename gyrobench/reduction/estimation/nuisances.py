@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
@@ -94,11 +95,14 @@ def temperature(windows: Mapping[str, Array]) -> list[Candidate]:
     return found
 
 
-def scatter(kind: str, groups: Sequence[object]) -> Candidate:
-    """Return constants that scatter from group to group: groups (n,) names each row's mount, or turn-on."""
+def scatter(kind: str, groups: Sequence[object], channel: str = "") -> Candidate:
+    """Return constants that scatter from group to group: groups (n,) names each row's mount, or turn-on.
+
+    channel: as of :func:`common`.
+    """
     keys = list(dict.fromkeys(groups))
     columns = np.array([[g == k for k in keys] for g in groups], dtype=float)
-    return Candidate(f"σ_{kind}", SCATTERS[kind], "°/h", DPH, columns, scatter=True, kind=kind)
+    return Candidate(f"σ_{kind}{channel}", SCATTERS[kind], "°/h", DPH, columns, scatter=True, kind=kind)
 
 
 def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
@@ -138,7 +142,7 @@ def fitted(rate: Array, X: Array, y: Array) -> Array:
     return np.asarray(rate - X @ np.linalg.lstsq(X, y, rcond=None)[0])
 
 
-def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:
+def mounts(phase: Array | NDArray[np.int_], faces: Mapping[int, Array]) -> list[int]:
     """Return the number of the mount of each row: phases one after the other on the same face are one mount."""
     order = list(dict.fromkeys(np.asarray(phase).astype(int).tolist()))
     number = {order[0]: 0}

@@ -33,6 +33,18 @@ class Design:
     lost: tuple[str, ...]  # combinations the data do not see, in words
     weakest: str  # the direction the data see least, in words
 
+    @property
+    def short(self) -> bool:
+        """True where some combination leaves every datum as it is."""
+        return self.rank < len(self.names)
+
+    @property
+    def weakness(self) -> str:
+        """What is not estimable, or else least determined, in words."""
+        if self.short:
+            return f"rank {self.rank} of {len(self.names)}, not estimable: {'; '.join(self.lost)}"
+        return f"condition {self.condition:.3g}, least determined: {self.weakest}"
+
 
 def _words(names: Sequence[str], vector: Array, floor: float = 0.05) -> str:
     vector = vector / vector[np.argmax(np.abs(vector))]
@@ -94,6 +106,11 @@ class Fit:
     fitted: Array
     residual: Array
     gain: Array  # (p, n): beta = gain y
+
+    @property
+    def named(self) -> dict[str, float]:
+        """Return beta by name."""
+        return dict(zip(self.names, self.beta.tolist(), strict=True))
 
     @property
     def u(self) -> Array:

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from gyrobench.result import Coefficient, Result
 
+ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
 FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 
 
@@ -24,9 +25,12 @@ def p_text(p: float) -> str:
 
 
 def plus_minus(c: Coefficient) -> str:
-    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits."""
+    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits.
+
+    Six digits of an estimate whose uncertainty is rounding.
+    """
     U = c.k * c.u
-    if not U > 0.0 or not math.isfinite(U):
+    if not ROUNDING * abs(c.estimate) < U or not math.isfinite(U):
         return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
     digits = 1 - math.floor(math.log10(U))
     shown = max(0, digits)

@@ -117,7 +117,8 @@ def _warning(result: Result, rows: Sequence[StepChange], step: float) -> str:
         return ""
     over.sort(key=lambda row: -row[0])
     shown = [
-        f"{r.name} by {_short(change)} {r.unit} (u without it {_short(u)} {r.unit})" for _, change, u, r in over[:LISTED]
+        f"{r.name} by {_short(change)} {r.unit} (u without it {_short(u)} {r.unit})"
+        for _, change, u, r in over[:LISTED]
     ]
     more = f" and {len(over) - LISTED} more" if len(over) > LISTED else ""
     finer = step / min(FINEST, 2 ** math.ceil(math.log2(over[0][0])))

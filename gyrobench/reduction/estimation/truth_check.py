@@ -25,7 +25,7 @@ def missed_truth(result: Result, causes: Sequence[str]) -> list[Reason]:
         if causes
         else "No value was set: the model or its u is wrong."
     )
-    shifts = {row[0]: row[t.columns.index("sum")] for t in result.tables if t.id == PREDICTED for row in t.rows}
+    shifts = {row[0]: row[t.columns.index("sum")] for t in result.tables if t.kind == PREDICTED for row in t.rows}
     left = [abs(c.estimate - (c.truth or 0.0) - shifts.get(c.name, 0.0)) / c.u for c in deviating]
     if shifts and max(left) <= LIMIT:
         why = "The simulated errors of the set-up account for it, see the table of predicted shifts."

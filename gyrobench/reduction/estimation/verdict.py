@@ -4,7 +4,8 @@
     result = conclude(found, record, limits, step)       # what is stated of them
 
 1. A coefficient passes where its coverage interval lies within the limits, and fails where it lies entirely outside;
-   else it is inconclusive.  One without a value is void, one without limits has no verdict.
+   else it is inconclusive.  One without a value is void, one without limits has no verdict.  Where the specification
+   has none, those of the test itself hold (a time that the capture of a table is allowed).
 2. Each :class:`gyrobench.result.Reason` takes away what it blocks: of the coefficients it names, or of all.  One with
    intervals does so where the verdict would not hold for them.
 3. The verdict of the result is the worst of its coefficients: void, fail, inconclusive, pass.
@@ -95,7 +96,7 @@ def _judged(
     """Return the coefficients with their verdicts, and the reasons with what they have taken away, worst first."""
     judged = []
     for c in coefficients:
-        limit = limits.get(c.name, limits.get(c.stands_for))
+        limit = limits.get(c.name, limits.get(c.stands_for, c.limit))
         judged.append(replace(c, limit=limit, verdict=assess_conformity(c.interval, limit)))
     taken: list[Reason] = []
     for reason in reasons:
@@ -108,7 +109,7 @@ def _judged(
         if reason.becomes == INCONCLUSIVE:
             text = f"Inconclusive instead of {words}: {which}. {reason.text}"
             taken.append(Reason(f"{WITHHELD}:{reason.id}", text, severity="error"))
-    ordered = sorted([*taken, *dict.fromkeys(reasons)], key=lambda r: SEVERITIES.index(r.severity))
+    ordered = sorted([*dict.fromkeys(reasons), *taken], key=lambda r: SEVERITIES.index(r.severity))
     return judged, ordered
 
 

@@ -43,8 +43,13 @@ class UncertainValue:
 
     @property
     def k(self) -> float:
-        """Coverage factor of the 95 % interval."""
+        """Return the coverage factor of the 95 % interval."""
         return float(special.stdtrit(self.dof, 0.975)) if math.isfinite(self.dof) else NORMAL
+
+    @property
+    def pair(self) -> tuple[float, float]:
+        """Return value and u, for an interval of normal size."""
+        return self.value, self.u
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -114,7 +119,7 @@ def rms(x: Array) -> UncertainValue:
 
 
 def decibels(a: UncertainValue, b: UncertainValue) -> UncertainValue:
-    """20 log10 of a over b; u as if the two were independent (too large for an error and the noise behind it)."""
+    """Return 20 log10 of a over b; u as of independent ones (too large for an error and the noise behind it)."""
     if a.value == 0.0 or b.value == 0.0:
         return UncertainValue(-math.inf if b.value > 0.0 else math.nan, math.nan)
     return UncertainValue(DECIBEL * math.log(a.value / b.value), DECIBEL * math.hypot(a.u / a.value, b.u / b.value))
@@ -122,12 +127,12 @@ def decibels(a: UncertainValue, b: UncertainValue) -> UncertainValue:
 
 # --------------------------------------------------------------------------------- delay and distortion
 def delay_signal(time: Array, x: Array, delay: float) -> Array:
-    """x of ``delay`` s ago, linear between samples; before the record its first value."""
+    """Return x of ``delay`` s ago, linear between samples; before the record its first value."""
     return np.interp(time - delay, time, x)
 
 
 def delay(time: Array, estimate: Array, truth: Array, most: float) -> UncertainValue:
-    """Delay at which the truth fits the estimate best (least mean square difference), 0 to ``most`` s.
+    """Return the delay at which the truth fits the estimate best (least mean square difference), 0 to ``most`` s.
 
     Whole samples first, then the parabola through the three least; u from ten stretches.  Both about their means.
     Raises ValueError when a stretch is not longer than twice ``most``.
@@ -152,12 +157,12 @@ def _delay(estimate: Array, truth: Array, lags: int) -> float:
 
 
 def _scatter(values: list[float]) -> float:
-    """Standard error of the mean of the stretches."""
+    """Return the standard error of the mean of the stretches."""
     return float(np.std(values, ddof=1) / math.sqrt(len(values)))
 
 
 @dataclass(frozen=True)
-class Response:
+class SignalResponse:
     """How a known signal comes through: gain, phase (rad, negative: late), and what else the estimate holds."""
 
     gain: UncertainValue
@@ -182,7 +187,7 @@ class Sine:
 
 
 def sine(time: Array, x: Array, frequency: float) -> Sine:
-    """Fits a sine of ``frequency`` Hz.  Raises ValueError below ten periods."""
+    """Fit a sine of ``frequency`` Hz.  Raises ValueError below ten periods."""
     step = float(time[1] - time[0])
     periods = math.floor((time.size * step) * frequency + 1e-9)
     if periods < STRETCHES:
@@ -213,7 +218,7 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
     return UncertainValue(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
 
 
-def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
+def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> SignalResponse:
     """Return the gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
 
     u from the scatter of ten stretches.  Raises ValueError below ten periods.
@@ -223,10 +228,10 @@ def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: floa
     parts = e.parts / x.parts / whole
     gain = UncertainValue(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
     phase = UncertainValue(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
-    return Response(gain, phase, e.rest)
+    return SignalResponse(gain, phase, e.rest)
 
 
-def response_to_truth(estimate: Array, truth: Array) -> Response:
+def response_to_truth(estimate: Array, truth: Array) -> SignalResponse:
     """Return gain of a random truth: regression of the estimate on it (align them first), both about their means."""
     e, x = estimate - estimate.mean(), truth - truth.mean()
 
@@ -239,7 +244,7 @@ def response_to_truth(estimate: Array, truth: Array) -> Response:
     weights = [float(x[s] @ x[s]) for s in stretches]
     share = np.array(weights) / sum(weights)
     u = math.sqrt(float(np.sum((share * (np.array(parts) - gain)) ** 2)) * STRETCHES / (STRETCHES - 1))
-    return Response(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
+    return SignalResponse(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
 
 
 # ------------------------------------------------------------------------------------- consistency
@@ -251,7 +256,7 @@ def _consistency(mean: float, dof: float, level: float) -> Consistency:
 
 
 def nees(error: Array, variance: Array, level: float = 0.999) -> Consistency:
-    """Normalized estimation error squared of one state: mean of error2/variance against chi-square.
+    """Return the normalized estimation error squared of one state: mean of error2/variance against chi-square.
 
     Errors follow one another slowly, so the degrees of freedom are the independent squares among them.
     """
@@ -260,7 +265,7 @@ def nees(error: Array, variance: Array, level: float = 0.999) -> Consistency:
 
 
 def nis(values: Array, level: float = 0.999) -> Consistency:
-    """Normalized innovation squared, scalar readings; innovations are white if the filter is right: dof = n."""
+    """Return the normalized innovation squared, scalar readings; they are white if the filter is right: dof = n."""
     return _consistency(float(np.mean(values)), float(values.size), level)
 
 

@@ -1,11 +1,10 @@
-"""From the measures of a loop to the Result that its report shows.
+"""What was found of a loop in one record.
 
-builder = LoopFindings(record)
-loop = builder.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
-builder.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
-builder.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
-builder.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
-return builder.result(Account(method=..., sources=[...], equation=..., conventions=[...]), summary)
+found = LoopFindings(record)
+loop = found.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
+found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
+found.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
+found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
 """
 
 from __future__ import annotations
@@ -36,6 +35,7 @@ from gyrobench.reduction.loops.loop_measures import (
     step,
     step_noise_std,
 )
+from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.reduction.loops.open_loop import (
     Twin,
     disagreement,
@@ -46,43 +46,36 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
-from gyrobench.result import AllanDeviation, Coefficient, LoopResult, NO_VERDICT, Reason, Response, Table
+from gyrobench.result import AllanDeviation, LoopResult, Reason, Table
 from gyrobench.units import DPH
 
-EVERY = ("pass", "fail", "inconclusive", NO_VERDICT)
 AGREEMENT = "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
 AGREEMENT_COLUMNS = ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"]
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 
-class LoopFindings:
+class LoopFindings(MeasureFindings):
     """Collects what was found in one record; see the module.
 
-    record: gyrobench.record.record.Record.  slot: the exciter's.  by_neighbours: u of sines from the lines beside them,
-    for noise that is larger at other frequencies (loop_measures.neighbour_noise).  Raises ReductionError, as
-    :func:`loops.gates`.
+    slot: the exciter's.  by_neighbours: u of sines from the lines beside them, for noise that is larger at other
+    frequencies (loop_measures.neighbour_noise).  linearized: False where there is no loop to be linearized.  Raises
+    ReductionError, as :func:`loops.gates`.
     """
 
-    def __init__(self, record: Record, slot: str = "exciter", by_neighbours: bool = False) -> None:
-        self.record, self.slot, self.by_neighbours = record, slot, by_neighbours
+    def __init__(
+        self, record: Record, slot: str = "exciter", by_neighbours: bool = False, linearized: bool = True
+    ) -> None:
+        super().__init__(record)
+        self.slot, self.by_neighbours = slot, by_neighbours
         self.gates = gates(record, slot)
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
-        self.coefficients: list[Coefficient] = []
-        self.responses: list[Response] = []
-        self.tables: list[Table] = []
         self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
         self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
-        self.reasons: list[Reason] = []
         self.allan: AllanDeviation | None = None
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
-        if self.linear.missing:
+        if self.linear.missing and linearized:
             self.warn("linear.missing", f"No linear model for comparison: {self.linear.missing}")
-
-    def warn(self, id: str, text: str, severity: str = "warning") -> None:
-        """Add what a reader must know, once; nothing for ""."""
-        reason = Reason(id, text, severity=severity)
-        self.reasons += [reason] if text and reason not in self.reasons else []
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
         """Return the phases of a kind, in their order."""
@@ -90,62 +83,10 @@ class LoopFindings:
             g for g in self.gates if g.kind == kind and axis in (None, g.axis) and (shape is None or g.shape == shape)
         ]
 
-    def measure(
-        self,
-        name: str,
-        meaning: str,
-        unit: str,
-        estimate: float | None,
-        u: float | None = None,
-        *,
-        closed: float | None = None,
-        truth: float | None = None,
-        no_value: str = "",
-        unsettled: str = "",
-    ) -> None:
-        """One row of the table of coefficients, in printed units; nothing for an estimate of None without a reason.
-
-        u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.  no_value: why there is
-        no estimate; without a limit such a row says no more than that.  unsettled: the same, with the verdict void.
-        """
-        no_value = unsettled or no_value
-        if no_value:
-            estimate = u = math.nan
-        elif estimate is None or not math.isfinite(estimate):
-            return
-        size = u if u is not None and (no_value or math.isfinite(u)) else 0.0
-        half = uncertainty.NORMAL * size
-        if unsettled:
-            self.reasons.append(Reason("unsettled", unsettled, EVERY, (name,), "void", "condition"))
-        self.coefficients.append(
-            Coefficient(
-                name=name,
-                meaning=meaning,
-                unit=unit,
-                estimate=estimate,
-                u=size,
-                k=uncertainty.NORMAL,
-                interval=(estimate - half, estimate + half),
-                u_a=size,
-                closed=closed,
-                truth=truth,
-                z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
-                no_value=no_value,
-            )
-        )
-
-    def void(self, names: Sequence[str], reason: str) -> None:
-        """Take the values of coefficients away: their phase was unstable or unsettled."""
-        nothing: dict[str, Any] = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
-        for k, c in enumerate(self.coefficients):
-            if c.name in names:
-                self.coefficients[k] = replace(c, **nothing, u_a=None, z=None, no_value=reason)
-        self.reasons.append(Reason("unstable", reason, EVERY, tuple(names), "void", "condition"))
-
     @property
-    def estimates(self) -> dict[str, float]:
-        """Return what was measured, in printed units."""
-        return {c.name: c.estimate for c in self.coefficients if not c.no_value}
+    def at_rest(self) -> Gate | None:
+        """Return the drift hold, in which nothing is excited; None where it is not whole in the record."""
+        return next((g for g in self.of("hold") if g.label == "drift"), None)
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
@@ -256,7 +197,7 @@ class LoopFindings:
         self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
         unit: str = "1", plus: str | None = None,
     ) -> list[Point]:  # fmt: skip
-        """Gain of ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
+        """Measure ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
 
         reference: a channel of the exciter, or another one (then the linear curve is the ratio of two).  plus: a second
         channel added to the output (all "slot.variable").  scale, unit: SI of the ratio per printed unit.  Returns the
@@ -287,7 +228,7 @@ class LoopFindings:
     def excited(
         self, which: str, kind: str, axis: int, output: str, f: Array | Sequence[float], plus: str | None = None
     ) -> Any:
-        """Linear response ("discrete" or "continuous") of a channel to an excitation, SI; None where there is none."""
+        """Return the linear response ("discrete", "continuous") of a channel to an excitation, SI; None without one."""
         model = self.linear.closed.of(which)
         if model is None or output not in model.outputs:
             return None
@@ -328,60 +269,45 @@ class LoopFindings:
         self.responses.append(step_figure(gate, y, line, NAMES["discrete"], scale, y_name or output, unit))
         return measures
 
+    def loaded(self, gate: Gate, output: str, own: Drift | None, **figure: Any) -> Step:
+        """Return :meth:`step` less the output's own drift, whose uncertainty is in that of the change."""
+        if own is None:
+            return self.step(gate, output, **figure)
+        found = self.step(gate, output, drift=own.rate, **figure)
+        return replace(found, u_change=math.hypot(found.u_change, own.u * float(gate.t[-1] - gate.t[0])))
+
     # ------------------------------------------------------------------ drift
     def drift(
         self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
     ) -> Drift:
-        """Drift and random walk of an angle in a hold phase, °/h and °/√h, and the Allan deviation of the report.
+        """Measure drift and random walk of an angle in a hold phase, °/h and °/√h; show the Allan deviation.
 
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """
         measures = drift(gate.t, gate[output])
-        if (a := measures.allan) is not None:
-            dev, lo, hi = ([x / DPH for x in values] for values in (a.dev, a.lo, a.hi))
-            self.allan = replace(a, dev=dev, lo=lo, hi=hi, unit="°/h")
-        true = None if truth is None else truth / DPH
-        self.measure(
-            f"drift{key}",
-            "mean drift rate of the platform at rest",
-            "°/h",
-            measures.rate / DPH,
-            measures.u / DPH,
-            truth=true,
-        )
+        self.show_allan(measures)
+        meaning = "mean drift rate of the platform at rest"
+        self.measure(f"drift{key}", meaning, "°/h", measures.rate, measures.u, scale=DPH, truth=truth)
         if measures.walk is not None:
             size, u = (math.degrees(w) * 60.0 for w in measures.walk)
             true = math.degrees(walk) * 60.0 if walk else None
             self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
         return measures
 
+    def show_allan(self, measures: Drift) -> None:
+        """Take the Allan deviation of a drift, °/h, for the report."""
+        if (a := measures.allan) is not None:
+            dev, lo, hi = ([x / DPH for x in values] for values in (a.dev, a.lo, a.hi))
+            self.allan = replace(a, dev=dev, lo=lo, hi=hi, unit="°/h")
+
     def result(self, account: Account, summary: Sequence[str] = (), ranked_by: str = "") -> LoopResult:
         """Return what was found, with what the test says of itself."""
-        run = self.record.run
-        if self.unstable:
-            self.void([c.name for c in self.coefficients], self.unstable)
-            text = f"The run has no value: {self.unstable}. Its figures show what it did, no measure."
-            self.warn("unstable", text, "error")
-            summary = [f"No value: {self.unstable}."]
-        agreement = Table(
-            "margins.agreement", "Linear models and measured loop", AGREEMENT, AGREEMENT_COLUMNS, self.agreement
-        )
-        return LoopResult(
-            title=account.title,
-            method=account.method,
-            sources=list(account.sources),
-            equation=account.equation,
-            conventions=list(account.conventions),
-            coefficients=self.coefficients,
-            allan=self.allan,
-            tables=[*self.tables, *([agreement] if self.agreement else []), *account.tables],
-            reasons=[*self.reasons, *account.reasons, *(Reason("linear", w) for w in self.linear.warnings)],
-            summary=list(summary),
-            instrument=run.instrument,
-            simulated=not run.measured,
-            ranked_by=ranked_by,
-            responses=self.responses,
-        )
+        self.reasons += [*account.reasons, *(Reason("linear", w) for w in self.linear.warnings)]
+        if self.agreement:
+            title = "Linear models and measured loop"
+            self.tables.append(Table("margins.agreement", title, AGREEMENT, AGREEMENT_COLUMNS, self.agreement))
+        self.facts["allan"] = self.allan
+        return super().result(replace(account, reasons=()), summary, ranked_by)
 
 
 def _margin_note(run: RunDocument) -> str:

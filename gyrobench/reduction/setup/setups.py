@@ -133,7 +133,7 @@ class RebalanceSetup(SiteSetup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TumbleSetup(RebalanceSetup):
+class TurningSetup(RebalanceSetup):
     """A tumble on a table whose axis lies along the pole; matrices with rows = axes.
 
     base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate" or
@@ -217,7 +217,7 @@ class TumbleSetup(RebalanceSetup):
         return problems
 
 
-#: option tilt -> TumbleSetup.tilt
+#: option tilt -> TurningSetup.tilt
 TILTS = {"auto": None, "yes": True, "no": False, "true": True, "false": False}
 
 

@@ -6,7 +6,7 @@ the budget, by how much each estimate is off (gyrobench.reduction.estimation.eff
 
 from __future__ import annotations
 
-from gyrobench.bench import UsageError
+from gyrobench.bench import Bench, UsageError
 from gyrobench.component.set_up import Errors, set_up_errors
 from gyrobench.errors import GyrobenchError
 from gyrobench.packaging.loading import load_part
@@ -21,10 +21,11 @@ def simulated_errors(run: RunDocument) -> Errors:
     Of a source in several parts: part -> error.  Parts that the bench does not have say nothing.
     """
     found: Errors = {}
+    folder = {name.replace("_", ""): name for name in Bench.find().parts()}  # a run names the class of a part
     for slot, info in {} if run.measured else run.parts.items():
         values = {n.removeprefix(f"{slot}."): v for n, v in run.parameters.items() if n.startswith(f"{slot}.")}
         try:
-            errors = set_up_errors(load_part(info.name), values)
+            errors = set_up_errors(load_part(folder[info.name.lower()]), values)
         except (GyrobenchError, UsageError, KeyError):
             continue  # a third-party FMU, or a part of another bench
         prefix = f"{slot}." if slot in AXES else ""

@@ -120,4 +120,15 @@ TORQUER_NONLINEARITY = Source(
 )  # fmt: skip
 CURRENT_OFFSET = Source("current.offset", "offset of the current reading", "A", "u_current", large=("current_sign",))
 CURRENT_RESOLUTION = Source("current.resolution", "resolution of the current reading", "A", note="as if never dithered")
+#: of a gyro with two channels: the torquer about an axis, and the meter of its current
+TORQUER_SCALE_OF = replace(
+    TORQUER_SCALE, id="torquer.{axis}.scale_factor", name="scale factor of the torquer about {axis}"
+)
+TORQUER_NONLINEARITY_OF = replace(
+    TORQUER_NONLINEARITY, id="torquer.{axis}.nonlinearity", name="nonlinearity of the torquer about {axis}"
+)
+CURRENT_OFFSET_OF = replace(CURRENT_OFFSET, id="current.{axis}.offset", name="zero of the {axis} current meter")
+CURRENT_RESOLUTION_OF = replace(
+    CURRENT_RESOLUTION, id="current.{axis}.resolution", name="resolution of the {axis} current meter"
+)
 VOLTMETER = Source("voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative")
