@@ -101,7 +101,7 @@ def spectrum(column: DriftColumn, key: str) -> str:
         ax.plot(x, y, "--", color=VERMILION, linewidth=1.2, label="fitted model")
     ax.set_ylim(0.3 * min(density), 4.0 * max(density))
     ax.set_xlabel(axis_label("frequency", "Hz"))
-    ax.set_ylabel(axis_label("density", f"({column['unit']})²/Hz"))
+    ax.set_ylabel(axis_label("density", f"({column.unit})²/Hz"))
     plain_log(ax, max(density) / min(density))
     fig.legend(loc="outside upper left", ncols=2)
     return svg(fig, key)

@@ -121,13 +121,7 @@ def _values(report: Report[DriftRecordResult], k: int) -> Any:
         for n, at in enumerate(index, 1):
             cells.append(number_cell(doc, ("columns", k, "deviations", n, "dev", at.get(tau, -1))))
         rows.append(Row(cells))
-    heads = [
-        ("averaging time", "s"),
-        (first.kind, c.unit),
-        "95 % from",
-        "to",
-        "edf",
-        *((d.kind, c.unit) for d in others),
-    ]
+    heads = columns(("averaging time", "s"), (first.kind, c.unit), "95 % from", "to", "edf")
+    heads += columns(*((d.kind, c.unit) for d in others))
     caption = "Deviations. edf: equivalent degrees of freedom of the Allan deviation."
-    return CollapsedBlocks("Values of the deviations", [Table(columns(*heads), rows, caption, small=True)])
+    return CollapsedBlocks("Values of the deviations", [Table(heads, rows, caption, small=True)])

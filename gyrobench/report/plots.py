@@ -50,6 +50,15 @@ def is_curve(series: Series) -> bool:
     return len(x) >= 3 and max(x) > min(x)
 
 
+def by_axis(series: Sequence[Series]) -> list[list[Series]]:
+    """Return the series that can be drawn, together where they have one axis, the axis with most points first."""
+    groups: dict[tuple[str, str], list[Series]] = {}
+    for s in series:
+        if is_curve(s):
+            groups.setdefault((s.x_name, s.x_unit), []).append(s)
+    return sorted(groups.values(), key=lambda alike: -sum(len(s.x) for s in alike))
+
+
 def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | None:
     low, high = (min(values), max(values)) if values else (0.0, 0.0)
     if not values or low == high:
@@ -144,7 +153,7 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
     import numpy as np
     from scipy.special import betaincinv, ndtri
 
-    values = np.sort(np.asarray(*finite(residuals), float))
+    values = np.sort(np.asarray(finite(residuals)[0], float))
     n = len(values)
     spread = float(values.std(ddof=1)) if n > 2 else 0.0
     if n < 5 or spread == 0.0:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gyrobench.report.provenance import Provenance
 
 R = TypeVar("R", bound=Result, covariant=True)
+S = TypeVar("S", bound=Result)
 SCHEMA = "gyrobench-result-1"
 DEGREE = 180.0 / math.pi
 
@@ -103,12 +104,12 @@ class Report(Generic[R]):
     derived: Derived
     document: Mapping[str, Any]
 
-    @classmethod
-    def of(cls, result: R) -> Report[R]:
+    @staticmethod
+    def of(result: S) -> Report[S]:
         """Return the report of a result.  Raises ResultError where its provenance is no run.json."""
         derived = _derived(result)
         found = plain({**result.as_dict(), "derived": content(derived)})
-        return cls(result, derived, {"schema": SCHEMA, "report_id": content_hash(found), **found})
+        return Report(result, derived, {"schema": SCHEMA, "report_id": content_hash(found), **found})
 
     @property
     def report_id(self) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -244,20 +243,19 @@ def _measured(report: Report[RunResult], record: Mapping[str, Any]) -> list[Any]
 
 def _fits(series: Sequence[Series]) -> list[Any]:
     """Return the figures of the series with their fits, two in each, the richest record first."""
-    curves = [s for s in series if plots.is_curve(s)]
-    axes = Counter(axis for s in curves for axis in [(s.x_name, s.x_unit)] * len(s.x))
+    groups = plots.by_axis(series)
+    curves = [s for alike in groups for s in alike]
     blocks: list[Any] = []
     number = 0
-    for axis, _ in axes.most_common():
-        alike = [s for s in curves if (s.x_name, s.x_unit) == axis]
+    for alike in groups:
         for k in range(0, len(alike), 2):
             pair = alike[k : k + 2]
             number += 1
             key = f"fit-{number}"
             both = " and ".join(f"“{s.label}”" for s in pair)
             caption = (
-                f"{_capital(pair[0].y_name)} against {axis[0]}, {both}. Points: window means; line: fitted model; "
-                f"lower panel: residuals. A pattern in the residuals is evidence against the model."
+                f"{_capital(pair[0].y_name)} against {pair[0].x_name}, {both}. Points: window means; line: fitted "
+                "model; lower panel: residuals. A pattern in the residuals is evidence against the model."
             )
             alt = f"Points and fitted curve with residuals: {both}"
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
