@@ -6,26 +6,36 @@ Numbers are in surface units (the unit stands beside them); nothing here compute
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.notebook import Displayed, data_frame
+from gyrobench.result_content import EMPTY, content, typed
 from gyrobench.result_entries import (
     NO_VERDICT,
+    AllanDeviation,
+    AllanSlope,
+    Autocorrelation,
     BudgetLine,
     Coefficient,
+    Curve,
+    DriftColumn,
+    Harmonic,
     Limit,
+    PowerSpectrum,
     Reason,
     Response,
     Series,
     Specification,
+    StepChange,
+    StepCheck,
     Table,
     Test,
     TypeB,
 )
+from gyrobench.result_suite import SuiteComparison
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,17 +43,27 @@ if TYPE_CHECKING:
 
 __all__ = [
     "NO_VERDICT",
+    "AllanDeviation",
+    "AllanSlope",
+    "Autocorrelation",
     "BudgetLine",
     "Coefficient",
+    "Curve",
+    "DriftColumn",
     "DriftRecordResult",
     "DriftTestResult",
+    "Harmonic",
     "Limit",
     "LoopResult",
+    "PowerSpectrum",
     "Reason",
     "Response",
     "Result",
     "Series",
     "Specification",
+    "StepChange",
+    "StepCheck",
+    "SuiteComparison",
     "SuiteResult",
     "Table",
     "Test",
@@ -90,7 +110,7 @@ class Result(Displayed):
     coefficients: list[Coefficient]
     tests: list[Test] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)  # the method's own
-    step_check: dict[str, Any] = field(default_factory=dict)  # see reduction.step_effect; "worst": largest change/u
+    step_check: StepCheck | None = field(default=None, metadata=EMPTY)
     reasons: list[Reason] = field(default_factory=list)  # warnings, and why verdicts are withheld
     summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
     decision_rule: str = ""
@@ -186,34 +206,26 @@ class Result(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of result.json, with the kind."""
-        return {"kind": self.kind, **ABSENT, **asdict(self), "warnings": self.warnings, "withheld": self.withheld}
+        return {"kind": self.kind, **ABSENT, **content(self), "warnings": self.warnings, "withheld": self.withheld}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> DriftTestResult | LoopResult | DriftRecordResult | SuiteResult:
         """Return the result of the right kind, the inverse of :meth:`as_dict`.
 
-        Without ``kind``, as in older files, its content tells it.  Raises TypeError for an unknown key.
+        Without ``kind``, as in older files, its content tells it.  Raises TypeError for an unknown or a missing key,
+        KeyError for an unknown kind.
         """
         older = "suite" if data.get("suite") else "drift_test" if data.get("correlation") else "loop"
         cls = KINDS[data.get("kind", older)]
         own = {f.name for f in fields(cls)}
-        values = {key: value for key, value in data.items() if key not in SAID and (key in own or key not in ABSENT)}
-        if "reasons" not in data:  # of version 0.1.0, as are entries without an id
+        values = {k: v for k, v in data.items() if k not in ("kind", *SAID) and (k in own or k not in ABSENT)}
+        if "reasons" not in data:  # of version 0.1.0
             values["reasons"] = [
                 *({"id": "", "text": text} for text in data.get("warnings", [])),
                 *({"id": "", "text": text, "severity": "doubt"} for text in data.get("withheld", [])),
             ]
-        for key, entry in ENTRIES.items():
-            if key in own:
-                first = {"id": ""} if "id" in entry.__dataclass_fields__ else {}
-                values[key] = [entry(**{**first, **e}) for e in values.get(key, [])]
-        for column in values.get("columns", []):
-            for section, tables in column.tables.items():
-                column.tables[section] = [Table(**{"id": "", **t}) for t in tables]
-        if cls is SuiteResult:
-            values["suite"] = SuiteComparison(**data["suite"])
-        values["coefficients"] = [Coefficient(**numbers(c)) for c in data["coefficients"]]
-        return cls(**values)
+        found: DriftTestResult | LoopResult | DriftRecordResult | SuiteResult = typed(cls, values)
+        return found
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -230,10 +242,10 @@ class DriftTestResult(Result):
     noise: dict[str, Any]  # {"model": "white" | "ar1" ..., "sigma": .., "tau": .., units in the names}
     residual_std: float
     residual_unit: str
-    acf: dict[str, list[float]] = field(default_factory=dict)  # lag, rho, bound
-    allan: dict[str, Any] = field(default_factory=dict)  # tau, dev, lo, hi, slopes; unit
-    psd: dict[str, Any] = field(default_factory=dict)  # f, S; unit
-    harmonics: list[dict[str, Any]] = field(default_factory=list)  # {"series", "n", "a", "b", "u"}
+    acf: Autocorrelation | None = field(default=None, metadata=EMPTY)
+    allan: AllanDeviation | None = field(default=None, metadata=EMPTY)
+    psd: PowerSpectrum | None = field(default=None, metadata=EMPTY)
+    harmonics: list[Harmonic] = field(default_factory=list)
     budget: list[BudgetLine] = field(default_factory=list)
     type_b: list[TypeB] = field(default_factory=list)
     repeatability: dict[str, Any] = field(default_factory=dict)
@@ -248,35 +260,13 @@ class LoopResult(Result):
 
     responses: list[Response]
     budget: list[BudgetLine] = field(default_factory=list)
-    allan: dict[str, Any] = field(default_factory=dict)  # as of a drift test
+    allan: AllanDeviation | None = field(default=None, metadata=EMPTY)
     # of an estimator: its readings and their errors
     series: list[Series] = field(default_factory=list)
-    acf: dict[str, list[float]] = field(default_factory=dict)
+    acf: Autocorrelation | None = field(default=None, metadata=EMPTY)
     dof: float = 0.0
     residual_std: float = 0.0
     residual_unit: str = "1"
-
-
-@dataclass(frozen=True)
-class DriftColumn:
-    """One column of a drift record: what its report draws and tabulates, in printed units.
-
-    record: {"t", "low", "mean", "high"} of the rate, "smoothed": the same of its drift.
-    deviations: {"kind", "tau", "dev", "low", "high"}.
-    model: {"tau", "dev", "f", "S"} of the noise coefficients.  spectrum: {"f", "S", "low", "high"}, one-sided.
-    correlation: {"lag", "rho", "partial", "bound"}.  tables, texts: section of the report -> tables as of a Result,
-    sentences.
-    """
-
-    name: str
-    unit: str  # of the rate
-    record: dict[str, Any]
-    deviations: list[dict[str, Any]]
-    model: dict[str, Any] = field(default_factory=dict)
-    spectrum: dict[str, Any] = field(default_factory=dict)
-    correlation: dict[str, Any] = field(default_factory=dict)
-    tables: dict[str, list[Table]] = field(default_factory=dict)
-    texts: dict[str, list[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -286,23 +276,6 @@ class DriftRecordResult(Result):
     kind: ClassVar[str] = "noise_model"
 
     columns: list[DriftColumn]
-
-
-@dataclass(frozen=True)
-class SuiteComparison:
-    """Comparison of the methods of a suite, see gyrobench.reduction.suite.method_comparison."""
-
-    rule: str
-    shared: list[str]  # sources of type B that are one and the same error in all tests
-    members: list[dict[str, Any]]
-    failed: list[dict[str, str]]  # {"label", "reason"}
-    quantities: list[dict[str, Any]]
-    pairs: list[dict[str, Any]]  # {"quantity", "unit", "a", "b", "difference", "U", "E_n"}
-    consistency: str  # consistent | inconsistent | not tested
-    p: float | None  # the smallest, adjusted
-    tested: int  # quantities
-    disagreeing: list[str]
-    pairs_apart: int  # E_n > 1
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -317,26 +290,7 @@ class SuiteResult(Result):
 KINDS: dict[str, type[DriftTestResult | LoopResult | DriftRecordResult | SuiteResult]] = {
     cls.kind: cls for cls in (DriftTestResult, LoopResult, DriftRecordResult, SuiteResult)
 }
-#: key -> class of its entries
-ENTRIES: dict[str, Any] = {
-    "tests": Test,
-    "tables": Table,
-    "type_b": TypeB,
-    "reasons": Reason,
-    "series": Series,
-    "budget": BudgetLine,
-    "responses": Response,
-    "columns": DriftColumn,
-}
-SAID = ("kind", "warnings", "withheld")  # keys that follow from others
-
-
-def numbers(c: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a coefficient of result.json with NaN where it has null."""
-    nan = [math.nan if x is None else x for x in (c["estimate"], c["u"], *c["interval"])]
-    limit = None if c.get("limit") is None else tuple(c["limit"])
-    return {**c, "estimate": nan[0], "u": nan[1], "interval": (nan[2], nan[3]), "limit": limit}
-
+SAID = ("warnings", "withheld")  # keys that follow from others
 
 #: what result.json holds under the keys that a kind does not have
 ABSENT: dict[str, Any] = {

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from gyrobench.result_content import EMPTY
+
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
 Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
@@ -137,6 +139,94 @@ class TypeB:
 
 
 @dataclass(frozen=True)
+class Autocorrelation:
+    """Autocorrelation of residuals or innovations at lags in windows, with the 95 % bound of white noise."""
+
+    lag: list[float]
+    rho: list[float]
+    bound: list[float]
+
+
+@dataclass(frozen=True)
+class AllanSlope:
+    """Slope of the Allan deviation on logarithmic axes between two averaging times, s."""
+
+    begin: float = field(metadata={"key": "from"})
+    to: float
+    slope: float
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Allan deviation with its 95 % interval over averaging times in s."""
+
+    tau: list[float]
+    dev: list[float]
+    lo: list[float]
+    hi: list[float]
+    slopes: list[AllanSlope] = field(default_factory=list)
+    tau_unit: str = "s"
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class PowerSpectrum:
+    """One-sided power spectral density over frequencies in Hz."""
+
+    f: list[float]
+    S: list[float]
+    f_unit: str = "Hz"
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """a cos(n θ) + b sin(n θ) of a series, both with u; b: None of n = 0."""
+
+    series: str
+    n: int
+    a: float
+    b: float | None
+    u: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class StepChange:
+    """What the communication step does to a measure; u: without it, ratio: of the change to u."""
+
+    name: str
+    unit: str
+    change: float
+    u: float | None = None
+    ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class StepCheck:
+    """Effect of the communication step, s, from quiet runs at it and at another one.
+
+    seconds: of wall time.  worst: largest ratio.
+    """
+
+    step: float
+    rows: list[StepChange]
+    other: float | None = None
+    seconds: float | None = None
+    worst: float | None = None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line of a figure: of a linear model (phase in degrees), or of a quantity against time (without phase)."""
+
+    label: str
+    x: list[float]
+    y: list[float]
+    phase: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class Response:
     """A measured response of a loop, with the curves of its linear models laid over it.
 
@@ -144,7 +234,7 @@ class Response:
     "time" (several quantities against time: all of them in curves, y is the one that runs are compared by).
     x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
     of a gain (u rad of its phase too), in y_unit of a step; None: not known.  counts: false for a point too noisy to be
-    used, []: all count.  curves: {"label", "x", "y", "phase"}.
+    used, []: all count.
     """
 
     name: str
@@ -160,4 +250,82 @@ class Response:
     u: list[float | None] = field(default_factory=list)
     coherence: list[float] = field(default_factory=list)
     counts: list[bool] = field(default_factory=list)
-    curves: list[dict[str, Any]] = field(default_factory=list)
+    curves: list[Curve] = field(default_factory=list)
+
+
+# ------------------------------------------------------------------------------------------- of a drift record
+@dataclass(frozen=True)
+class RateBand:
+    """Mean of a rate over time, s, between a lower and an upper line."""
+
+    t: list[float]
+    low: list[float]
+    mean: list[float]
+    high: list[float]
+
+
+@dataclass(frozen=True)
+class RateRecord(RateBand):
+    """The rate by intervals: smallest, mean and largest value; smoothed: its drift with the 95 % band."""
+
+    smoothed: RateBand | None = field(default=None, metadata=EMPTY)
+
+
+@dataclass(frozen=True)
+class DeviationCurve:
+    """A deviation over averaging times with its 95 % interval; edf: equivalent degrees of freedom."""
+
+    kind: str  # "Allan", "modified Allan", "Hadamard"
+    tau: list[float]
+    dev: list[float]
+    low: list[float]
+    high: list[float]
+    edf: list[float]
+
+
+@dataclass(frozen=True)
+class NoiseModelCurves:
+    """Allan deviation and one-sided density of the noise coefficients."""
+
+    tau: list[float]
+    dev: list[float]
+    f: list[float]
+    S: list[float]
+
+
+@dataclass(frozen=True)
+class SpectrumBand:
+    """One-sided density over frequencies in Hz with its 95 % interval."""
+
+    f: list[float]
+    S: list[float]
+    low: list[float]
+    high: list[float]
+
+
+@dataclass(frozen=True)
+class SampleCorrelation:
+    """Autocorrelation and partial autocorrelation of samples, with the 95 % bound of white noise."""
+
+    lag: list[float]
+    rho: list[float]
+    partial: list[float]
+    bound: float
+
+
+@dataclass(frozen=True)
+class DriftColumn:
+    """One column of a drift record: what its report draws and tabulates, in printed units.
+
+    tables, texts: section of the report -> tables, sentences.
+    """
+
+    name: str
+    unit: str  # of the rate
+    record: RateRecord
+    deviations: list[DeviationCurve]
+    model: NoiseModelCurves | None = field(default=None, metadata=EMPTY)
+    spectrum: SpectrumBand | None = field(default=None, metadata=EMPTY)
+    correlation: SampleCorrelation | None = field(default=None, metadata=EMPTY)
+    tables: dict[str, list[Table]] = field(default_factory=dict)
+    texts: dict[str, list[str]] = field(default_factory=dict)

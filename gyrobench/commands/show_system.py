@@ -36,7 +36,8 @@ def show_system(
     if picture is not None:
         from gyrobench.report import wiring_figure
 
-        picture.write_text(wiring_figure.draw(description["order"], description, "system"), encoding="utf-8")
+        wires = [w["wire"] for w in description["wires"] if w["connected"]]
+        picture.write_text(wiring_figure.draw(description["order"], wires, "system"), encoding="utf-8")
         console.print_note(str(picture)) if as_json else print(picture)
     if as_json:
         print(json.dumps(description, indent=1, ensure_ascii=False))

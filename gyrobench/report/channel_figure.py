@@ -11,6 +11,7 @@ import numpy as np
 
 from gyrobench import units as printed
 from gyrobench.arrays import Array
+from gyrobench.record.run_document import PlanRow
 from gyrobench.report.numbers import superscript
 from gyrobench.report.style import CYCLE, SHADE, WIDE, axis_label, envelope, figure, span_labels, svg, time_axis
 
@@ -77,11 +78,11 @@ def scaled(values: Sequence[float] | Array, unit: str) -> tuple[float, str]:
 
 def draw(
     record: Mapping[str, Any], shown: Sequence[Sequence[str]], units: Mapping[str, str], key: str,
-    plan: Sequence[Mapping[str, Any]] = (),
+    plan: Sequence[PlanRow] = (),
 ) -> str:  # fmt: skip
     """Channels against time, panels one above the other, decimated by their min-max envelope; "" where there are none.
 
-    plan: rows of run.json; where the exciter recorded its phase, they are shaded by what was excited.
+    plan: of run.json; where the exciter recorded its phase, they are shaded by what was excited.
     """
     time = np.asarray(record["time"], dtype=float)
     if time.size < 3 or not shown:
@@ -98,12 +99,9 @@ def draw(
         factor, unit = scaled(np.concatenate([y for _, y in columns]), units.get(names[0], "SI"))
         for k, (name, (t, y)) in enumerate(zip(names, columns, strict=True)):
             ax.plot(
-                *envelope(t / divisor, y * factor),
-                linestyle=DASHES[k % 4],
-                color=CYCLE[k % len(CYCLE)],
-                linewidth=0.8,
+                *envelope(t / divisor, y * factor), linestyle=DASHES[k % 4], color=CYCLE[k % len(CYCLE)], linewidth=0.8,
                 label=name,
-            )
+            )  # fmt: skip
         common = names[0] if len(names) == 1 else _common(names)
         ax.set_title(axis_label(common.rstrip("."), unit) if common else f"in {unit}", pad=3)
         if len(names) > 1:
@@ -138,10 +136,10 @@ def _common(names: Sequence[str]) -> str:
     return ""
 
 
-def _phases(record: Mapping[str, Any], plan: Sequence[Mapping[str, Any]]) -> list[tuple[float, float, str]]:
+def _phases(record: Mapping[str, Any], plan: Sequence[PlanRow]) -> list[tuple[float, float, str]]:
     """Return begin and end, s, and name of what the exciter did; phases alike that follow one another are one."""
     numbers = next((record[n] for n in record if n.endswith(".phase")), None)
-    words = {row.get("phase"): _MODES.get(str(row.get("mode")), str(row.get("label"))) for row in plan}
+    words = {row.phase: _MODES.get(row.mode, row.label) for row in plan}
     spans: list[tuple[float, float, str]] = []
     if numbers is None:
         return []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,10 +24,12 @@ from gyrobench.report.page_model import (
     number_cell,
     text_cell,
 )
-from gyrobench.report.result_json import content_hash, document
+from gyrobench.report.replicates import ComparedRun, Draws
+from gyrobench.report.result_json import content_hash, plain
 from gyrobench.report.style import HALF, figure, styled, svg
 from gyrobench.report.tables import compact
-from gyrobench.result import Result
+from gyrobench.result import Coefficient, DriftTestResult, LoopResult, Response, Result
+from gyrobench.result_content import content, typed
 
 Json = dict[str, Any]
 SCHEMA = "gyrobench-comparison-1"
@@ -50,65 +53,71 @@ def comparison(results: Sequence[tuple[str, Result]], baseline: int = 0) -> Json
         raise ValueError(f"names of results must differ: {', '.join(names)}")
     if not 0 <= baseline < len(results):
         raise ValueError(f"baseline {baseline} is not one of the {len(results)} results (0 to {len(results) - 1})")
-    names, docs = replicates.pool(names, [document(result) for _, result in results])
-    if baseline >= len(docs):
-        raise ValueError(f"baseline {baseline} is not one of the {len(docs)} candidates that the runs make up")
-    facts = [_facts(doc) for doc in docs]
+    runs = replicates.pool(results)
+    if baseline >= len(runs):
+        raise ValueError(f"baseline {baseline} is not one of the {len(runs)} candidates that the runs make up")
+    facts = [_facts(run.result) for run in runs]
     keys = list(dict.fromkeys(k for f in facts for k in f))
     rows = [row for key in keys for row in _spread(key, [f.get(key) for f in facts])]
-    content: Json = {
+    drawn = [{r.name: r for r in reversed(_responses(run.result))} for run in runs]
+    found: Json = {
         "baseline": baseline,
         "runs": [
-            {k: doc[k] for k in ("report_id", "system", "title", "instrument", "verdict", "simulated")}
-            | {"name": name, "seeds": doc.get("seeds", [])}
-            for name, doc in zip(names, docs, strict=True)
+            {"report_id": run.report_id}
+            | {k: getattr(run.result, k) for k in ("system", "title", "instrument", "verdict", "simulated")}
+            | {"name": run.name, "seeds": run.seeds}
+            for run in runs
         ],
-        "ranking": ranking_section.ranking(docs),
-        "purposes": ranking_section.by_purpose(docs),
+        "ranking": ranking_section.ranking(runs),
+        "purposes": ranking_section.by_purpose(runs),
         "differing": [r for r in rows if any(v != r["values"][0] for v in r["values"])],
         "equal": [
             {"what": r["what"], "value": r["values"][0]} for r in rows if all(v == r["values"][0] for v in r["values"])
         ],
         "measures": [
-            _measure(docs, key, baseline) for key in dict.fromkeys(_key(c) for d in docs for c in d["coefficients"])
+            _measure(runs, *key, baseline)
+            for key in dict.fromkeys((c.name, c.unit) for run in runs for c in run.result.coefficients)
         ],
         "responses": [
-            {"name": name, "runs": [next((r for r in doc["responses"] if r["name"] == name), None) for doc in docs]}
-            for name in dict.fromkeys(r["name"] for doc in docs for r in doc["responses"])
+            {"name": name, "runs": [content(own.get(name)) for own in drawn]}
+            for name in dict.fromkeys(r.name for run in runs for r in _responses(run.result))
         ],
     }
-    comparison_summary.mark_beyond_chance(content["measures"])
-    content["summary"] = comparison_summary.sentences(content, letters(len(docs)))
-    return {"schema": SCHEMA, "report_id": content_hash(content), **content}
+    comparison_summary.mark_beyond_chance(found["measures"])
+    found["summary"] = comparison_summary.sentences(found, letters(len(runs)))
+    found = plain(found)
+    return {"schema": SCHEMA, "report_id": content_hash(found), **found}
 
 
-def _key(coefficient: Json) -> tuple[str, str]:
-    return coefficient["name"], coefficient["unit"]
+def _responses(result: Result) -> list[Response]:
+    return result.responses if isinstance(result, LoopResult) else []
 
 
-def _measure(docs: Sequence[Json], key: tuple[str, str], baseline: int) -> Json:
-    coefficients = [next((c for c in doc["coefficients"] if _key(c) == key), None) for doc in docs]
-    kept = ("estimate", "u", "k", "interval", "truth", "draws")
-    runs = [None if c is None else {k: c[k] for k in kept if k in c} for c in coefficients]
-    meaning = next(c["meaning"] for c in coefficients if c is not None)
-    differences = [None if k == baseline else _difference(runs[k], runs[baseline]) for k in range(len(runs))]
-    return {"name": key[0], "unit": key[1], "meaning": meaning, "runs": runs, "differences": differences}
+def _measure(runs: Sequence[ComparedRun], name: str, unit: str, baseline: int) -> Json:
+    found = [run.find(name, unit) for run in runs]
+    kept = ("estimate", "u", "k", "interval", "truth")
+    values = [
+        None if f is None else {k: getattr(f[0], k) for k in kept} | ({"draws": f[1]} if f[1] else {}) for f in found
+    ]
+    meaning = next(f[0].meaning for f in found if f is not None)
+    differences = [None if k == baseline else _difference(found[k], found[baseline]) for k in range(len(found))]
+    return {"name": name, "unit": unit, "meaning": meaning, "runs": values, "differences": differences}
 
 
-def _difference(run: Json | None, base: Json | None) -> Json | None:
-    if run is None or base is None or run["estimate"] is None or base["estimate"] is None:
+def _difference(run: tuple[Coefficient, Draws] | None, base: tuple[Coefficient, Draws] | None) -> Json | None:
+    if run is None or base is None or not math.isfinite(run[0].estimate) or not math.isfinite(base[0].estimate):
         return None
-    d = difference(ranking_section.candidate(base), ranking_section.candidate(run))
+    d = difference(ranking_section.candidate(*base), ranking_section.candidate(*run))
     if d.u is None or d.k is None:
         return {"value": d.value, "u": None, "U": None, "significant": None}
     return {"value": d.value, "u": d.u, "U": d.k * d.u, "significant": abs(d.value) > d.k * d.u}
 
 
-def _facts(doc: Json) -> dict[str, Any]:
-    """Return everything about a run that may explain a difference, by name."""
-    run = doc["provenance"]
-    facts: dict[str, Any] = {"system": doc["system"], "instrument": doc["instrument"], "method": doc["method"]}
-    facts |= {f"site {k}": v for k, v in doc["site"].items()}
+def _facts(result: Result) -> dict[str, Any]:
+    """Return everything about a run that may explain a difference, by name; of run.json every key that it has."""
+    run = plain(result.provenance)
+    facts: dict[str, Any] = {"system": result.system, "instrument": result.instrument, "method": result.method}
+    facts |= {f"site {k}": plain(v) for k, v in result.site.items()}
     facts |= {k: run.get(k) for k in ("seed", "step", "engine", "order", "operator", "date") if run.get(k) is not None}
     for slot, part in (run.get("parts") or {}).items():
         items = part.items() if isinstance(part, dict) else [("name", part)]
@@ -117,7 +126,7 @@ def _facts(doc: Json) -> dict[str, Any]:
     facts |= {f"option {k}": v for k, v in (run.get("options") or {}).items()}
     facts |= {f"version {k}": v for k, v in (run.get("versions") or {}).items()}
     facts |= {f"plan phase {k + 1}": phase for k, phase in enumerate(run.get("plan") or [])}
-    facts["noise model"] = doc["noise"].get("model")
+    facts["noise model"] = result.noise.get("model") if isinstance(result, DriftTestResult) else None
     return facts
 
 
@@ -154,7 +163,7 @@ def page(doc: Json) -> Page:
             Section(
                 "Responses and estimates of all runs",
                 "figures",
-                [*responses.side_by_side(doc, _letter), *_figures(doc)],
+                [*_side_by_side(doc, doc["responses"]), *_figures(doc)],
             ),
             Section("Common settings", "equal", _equal(doc)),
         ]
@@ -172,8 +181,21 @@ def side_figure(doc: Json, key: str) -> str:
     """A loop, else the first response of the runs, all runs in it, with ids that begin with ``key``; "" without one."""
     loops_first = sorted(doc["responses"], key=lambda r: all(run is None or run["kind"] != "loop" for run in r["runs"]))
     with styled():
-        blocks = responses.side_by_side({**doc, "responses": loops_first[:1]}, _letter)
+        blocks = _side_by_side(doc, loops_first[:1])
     return next((p.svg.replace(f"{p.key}-", f"{key}-") for b in blocks for p in b.items), "")
+
+
+def _side_by_side(doc: Json, shown: Sequence[Json]) -> list[Any]:
+    """Return a figure for each response that two runs or more have, all runs in it."""
+    blocks: list[Any] = []
+    for k, entry in enumerate(shown):
+        named = [
+            (f"{_letter(i)} {doc['runs'][i]['name']}", typed(Response, run))
+            for i, run in enumerate(entry["runs"])
+            if run is not None
+        ]
+        blocks += responses.of_all_runs(f"response-{k + 1}", named)
+    return blocks
 
 
 def _letter(k: int) -> str:

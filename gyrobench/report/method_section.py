@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.report import wiring_figure
@@ -11,120 +10,94 @@ from gyrobench.report.page_model import (
     BulletList,
     Cell,
     CollapsedBlocks,
-    Column,
     Equation,
     Picture,
     Row,
     Table,
+    columns,
     number_cell,
     pictures,
     text_cell,
 )
+from gyrobench.report.provenance import Provenance
 from gyrobench.report.references import source_blocks
-from gyrobench.report.result_json import value_at
+from gyrobench.report.result_json import Report
+from gyrobench.result import Result
 
-Json = dict[str, Any]
+#: columns of the plan: field of PlanLine -> head, unit
+PLAN = {
+    "phase": ("phase", ""),
+    "label": ("label", ""),
+    "mode": ("mode", ""),
+    "shape": ("shape", ""),
+    "face": ("orientation", ""),
+    "axis": ("axis", ""),
+    "amplitude": ("amplitude", ""),
+    "unit": ("unit", ""),
+    "frequency_Hz": ("frequency", "Hz"),
+    "angle_deg": ("angle", "°"),
+    "angle_y_deg": ("second angle", "°"),
+    "rate_deg_per_h": ("rate", "°/h"),
+    "settle_s": ("settle", "s"),
+    "dwell_s": ("dwell", "s"),
+    "travel_deg": ("travel", "°"),
+    "window_s": ("window", "s"),
+    "window_deg": ("window", "°"),
+}
 
 
-def model(doc: Json) -> list[Any]:
-    blocks: list[Any] = [Equation(doc["equation"])] if doc["equation"] else []
-    blocks += [BulletList(doc["conventions"])] if doc["conventions"] else []
-    return blocks + source_blocks(doc["sources"])
+def model(result: Result) -> list[Any]:
+    """Return equation, conventions and sources."""
+    blocks: list[Any] = [Equation(result.equation)] if result.equation else []
+    blocks += [BulletList(result.conventions)] if result.conventions else []
+    return blocks + source_blocks(result.sources)
 
 
-def system(doc: Json) -> list[Any]:
-    run = doc["provenance"]
-    order = [str(s) for s in run.get("order") or []]
+def system(report: Report[Result]) -> list[Any]:
+    """Return the drawing of the system, the order of execution, and the plan."""
+    run = report.run
     blocks: list[Any] = []
-    if order:
+    if run.order:
         caption = (
             "Components on the diagonal in execution order. Connections above the diagonal (solid) carry values of the "
             "current communication step, those below it (dashed) values of the previous one."
         )
-        svg = wiring_figure.draw(order, run, "system")
-        blocks += pictures(
-            Picture("system", svg, caption, "Components in execution order with their connections: " + ", ".join(order))
-        )
-        blocks.append(BulletList([f"Execution order: {', '.join(order)}.", *_cuts(run)]))
-    rows = []
-    keys = (
-        "phase",
-        "label",
-        "mode",
-        "shape",
-        "face",
-        "axis",
-        "amplitude",
-        "unit",
-        "frequency_Hz",
-        "angle_deg",
-        "angle_y_deg",
-        "rate_deg_per_h",
-        "settle_s",
-        "dwell_s",
-        "travel_deg",
-        "window_s",
-        "window_deg",
-    )
-    heads = [
-        ("phase", ""),
-        ("label", ""),
-        ("mode", ""),
-        ("shape", ""),
-        ("orientation", ""),
-        ("axis", ""),
-        ("amplitude", ""),
-        ("unit", ""),
-        ("frequency", "Hz"),
-        ("angle", "°"),
-        ("second angle", "°"),
-        ("rate", "°/h"),
-        ("settle", "s"),
-        ("dwell", "s"),
+        svg = wiring_figure.draw(run.order, run.wires, "system")
+        alt = "Components in execution order with their connections: " + ", ".join(run.order)
+        blocks += pictures(Picture("system", svg, caption, alt))
+        blocks.append(BulletList([f"Execution order: {', '.join(run.order)}.", *_cuts(run)]))
+    plan = report.derived.plan
+    shown = [name for name in PLAN if any(getattr(line, name) not in (None, "") for line in plan)]
+    rows = [
+        Row([number_cell(report.document, ("derived", "plan", k, name), significant=7) for name in shown])
+        for k in range(len(plan))
     ]
-    heads += [("travel", "°"), ("window", "s"), ("window", "°")]
-    plan = doc["derived"]["plan"]
-    for k in range(len(plan)):
-        rows.append(Row([number_cell(doc, ("derived", "plan", k, key), significant=7) for key in keys]))
-    if rows:
-        empty = [all(value_at(plan, k, key) in (None, "") for k in range(len(plan))) for key in keys]
-        for row in rows:
-            row.cells = [c for c, e in zip(row.cells, empty, strict=True) if not e]
-        columns = [Column(h, unit) for (h, unit), e in zip(heads, empty, strict=True) if not e]
-        blocks.append(Table(columns, rows, "Test plan.", small=True))
-    return blocks
+    return blocks + ([Table(columns(*(PLAN[n] for n in shown)), rows, "Test plan.", small=True)] if rows else [])
 
 
-def _cuts(run: Mapping[str, Any]) -> list[str]:
-    """Cuts and delays as sentences; a record gives cuts as sentences and delays in s by wire, or both as wires."""
-    cuts, delays = run.get("cuts") or [], run.get("delays") or []
-    sentences = [f"Delayed connection {c}" for c in map(str, cuts)] or [
-        "No delayed connection: every value is used in the communication step in which it is computed"
-    ]
-    times = dict(delays) if isinstance(delays, Mapping) else dict.fromkeys(delays)
-    for wire, seconds in times.items():
-        time = "one communication step" if seconds is None else f"{write_number(seconds).text} s"
-        k = next((k for k, s in enumerate(sentences) if wire in s), None)
-        if k is None:
-            sentences.append(f"Delay on {wire}: {time}")
-        else:
-            sentences[k] += f", {time}"
+def _cuts(run: Provenance) -> list[str]:
+    """Return cuts and delays as sentences: a record gives cuts as "connection: why", and delays in s by connection."""
+    cuts = {cut.partition(": ")[0]: cut for cut in run.cuts}
+    sentences = []
+    for wire, cut in cuts.items():
+        delay = f", {write_number(run.delays[wire]).text} s" if wire in run.delays else ""
+        sentences.append(f"Delayed connection {cut}{delay}")
+    if not cuts:
+        sentences = ["No delayed connection: every value is used in the communication step in which it is computed"]
+    sentences += [f"Delay on {w}: {write_number(s).text} s" for w, s in run.delays.items() if w not in cuts]
     return [s.replace("->", "→") + "." for s in sentences]
 
 
-def full_values(doc: Json) -> list[Any]:
+def full_values(report: Report[Result]) -> list[Any]:
     """Return the table of the estimates at full precision, as they are in result.json."""
     rows = []
-    for k, c in enumerate(doc["coefficients"]):
+    for k, c in enumerate(report.result.coefficients):
         path = ("coefficients", k)
-        cells = [number_cell(doc, (*path, *p)) for p in (("estimate",), ("u",), ("interval", 0), ("interval", 1))]
+        cells = [number_cell(report.document, (*path, *p))
+                 for p in (("estimate",), ("u",), ("interval", 0), ("interval", 1))]  # fmt: skip
         rows.append(
-            Row([text_cell(c["name"], "strong"), *(Cell(x.full or "–", pointer=x.pointer, full=x.full) for x in cells)])
+            Row([text_cell(c.name, "strong"), *(Cell(x.full or "–", pointer=x.pointer, full=x.full) for x in cells)])
         )
-    columns = [Column("name"), Column("estimate"), Column("u"), Column("95\N{NO-BREAK SPACE}% from"), Column("to")]
-    return [
-        CollapsedBlocks(
-            "Full precision, as in result.json",
-            [Table(columns, rows, "Estimates at full precision, units as in the table of coefficients.", small=True)],
-        )
-    ]
+    heads = columns("name", "estimate", "u", "95\N{NO-BREAK SPACE}% from", "to")
+    caption = "Estimates at full precision, units as in the table of coefficients."
+    return [CollapsedBlocks("Full precision, as in result.json", [Table(heads, rows, caption, small=True)])]

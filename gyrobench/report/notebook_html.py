@@ -5,16 +5,18 @@ The tables and figures are those of the reports; colours follow the notebook's l
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench import notebook
 from gyrobench.record.record import Record
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import BulletList, Cell, Column, Row, Table, text_cell
-from gyrobench.result import NO_VERDICT, Result, SuiteResult
+from gyrobench.result import NO_VERDICT, DriftRecordResult, DriftTestResult, LoopResult, Result, SuiteResult
+
+if TYPE_CHECKING:
+    from gyrobench.report.result_json import Report
 
 THEME = {  # colour of the report -> that of the notebook, if it has one
     "ink": "var(--jp-content-font-color1, var(--vscode-editor-foreground, #1f2328))",
@@ -98,38 +100,33 @@ def figure_html(svg: str) -> str:
 @notebook.html.register
 def result_html(result: Result) -> str:
     """Return verdict, warnings, coefficients with u, interval and verdict, and the figure of the fit or the loop."""
-    from gyrobench.report.result_json import document
+    from gyrobench.report.result_json import Report
     from gyrobench.report.result_page import coefficients
 
-    doc = document(result)
+    report = Report.of(result)
     verdict = f"Verdict: {result.verdict}." if result.verdict != NO_VERDICT else f"{NO_VERDICT.capitalize()}."
     head = [paragraph(result.title, strong=True), paragraph(verdict), *map(paragraph, result.summary)]
     methods = [paragraph(f"Methods: {result.suite.consistency}.")] if isinstance(result, SuiteResult) else []
-    blocks = coefficients(doc)
+    blocks = coefficients(report)
     tables = [table_html(b) for b in blocks if isinstance(b, Table)]
     tables += [warning_list(b.items) for b in blocks if isinstance(b, BulletList)]
-    return fragment(*head, *methods, warning_list(result.warnings), *tables, figure_html(_main_figure(doc)))
+    return fragment(*head, *methods, warning_list(result.warnings), *tables, figure_html(_main_figure(report)))
 
 
-def _main_figure(doc: Mapping[str, Any]) -> str:
+def _main_figure(report: Report[Result]) -> str:
     """Return the first loop or response, the deviations of a drift record, or the richest fit, as SVG; "" for none."""
     from gyrobench.report import drift_record_figures, plots, responses
     from gyrobench.report.style import styled
 
-    key = f"nb{doc['report_id']}"  # unique in the notebook
+    key, result = f"nb{report.report_id}", report.result  # unique in the notebook
     with styled():
-        drawn = sorted(doc.get("responses") or [], key=lambda r: r["kind"] != "loop")
-        if drawn:
-            return responses.draw([("measured", drawn[0])], key, curves=drawn[0]["curves"])
-        if doc["columns"]:
-            return drift_record_figures.deviations(doc["columns"][0], key)
-        curves = [s for s in doc["series"] if plots.is_curve(s)]
-        if not curves:
-            return ""
-        points = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
-        axis = points.most_common(1)[0][0]
-        alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
-        return plots.fit(alike[:2], key, alike, curves)
+        if isinstance(result, LoopResult) and result.responses:
+            first = min(result.responses, key=lambda r: r.kind != "loop")
+            return responses.draw([("measured", first)], key, curves=first.curves)
+        if isinstance(result, DriftRecordResult) and result.columns:
+            return drift_record_figures.deviations(result.columns[0], key)
+        groups = plots.by_axis(result.series) if isinstance(result, DriftTestResult | LoopResult) else []
+        return plots.fit(groups[0][:2], key, groups[0], [s for alike in groups for s in alike]) if groups else ""
 
 
 @notebook.html.register
@@ -148,9 +145,7 @@ def record_html(record: Record) -> str:
         shown = channel_figure.panels(record.channels, run.units, most=MAX_CHANNELS)
         key = f"nb{abs(hash((run.system, run.seed, tuple(run.tables.values()), id(record)))):x}"
         with styled():
-            blocks.append(
-                figure_html(channel_figure.draw(record.channels, shown, run.units, key, run.as_dict()["plan"]))
-            )
+            blocks.append(figure_html(channel_figure.draw(record.channels, shown, run.units, key, run.plan)))
     return fragment(*blocks)
 
 

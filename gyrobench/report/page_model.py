@@ -7,7 +7,7 @@ was read from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,6 +38,12 @@ class Column:
     number: bool = False
     wide: bool = False  # may take the room that is left
     width: int = 0  # characters after the decimal sign, set by Table
+
+
+def columns(*heads: str | tuple[str, str], wide: Collection[str] = ()) -> list[Column]:
+    """Return columns by head, or head and unit; wide: heads of those that may take the room that is left."""
+    named = [(h, "") if isinstance(h, str) else h for h in heads]
+    return [Column(head, unit, wide=head in wide) for head, unit in named]
 
 
 @dataclass

@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.report.numbers import write_number
 from gyrobench.report.ranking_section import place_text, probability_text
-from gyrobench.result import NO_VERDICT, Result, SuiteResult
+from gyrobench.result import NO_VERDICT, Result, StepCheck, SuiteResult
 
 WIDTH, NARROW = 120, 30  # characters of a line with a meaning, and of a meaning at least
 
@@ -59,10 +59,10 @@ def format_result(result: Result) -> str:
     return "\n".join([result.title, "", *answer, *table, "", *notes, *agreement])
 
 
-def step_sentence(check: Mapping[str, Any]) -> str:
+def step_sentence(check: StepCheck) -> str:
     """Return what a step check has found, and its cost."""
-    cost = f" ({check['seconds']:.1f} s)" if check.get("seconds") else ""
-    worst = check.get("worst")
+    cost = f" ({check.seconds:.1f} s)" if check.seconds else ""
+    worst = check.worst
     most = "" if worst is None else f", at most {write_number(worst, significant=2).text} times the u without it"
     if worst is not None and worst > 1.0:  # by how much, of which, is a sentence of its own
         most = ", larger than the u without it for some measures: see the warnings and the table of the step check"
@@ -81,8 +81,8 @@ def no_values(coefficients: Iterable[tuple[str, str]]) -> list[str]:
 def _agreement(result: SuiteResult) -> list[str]:
     rows = [["measurand", "methods", "largest E_n", "p", ""]]
     for q in result.suite.quantities:
-        if q["p"] is not None:
-            rows.append([q["name"], str(len(q["values"])), f"{q['largest E_n']:.2f}", f"{q['p']:.2g}", q["words"]])
+        if q.p is not None:
+            rows.append([q.name, str(len(q.values)), f"{q.largest_E_n:.2f}", f"{q.p:.2g}", q.words])
     table = ["", *align_columns(rows, {0, 4})] if len(rows) > 1 else []
     return [*table, "", f"methods: {result.suite.consistency}", *result.summary]
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
+from gyrobench.report.numbers import write_number
 from gyrobench.report.style import (
     BLUE,
     CYCLE,
@@ -25,8 +26,8 @@ from gyrobench.report.style import (
     time_axis,
     zero_line,
 )
+from gyrobench.result import AllanDeviation, Coefficient, PowerSpectrum, Series
 
-Json = Mapping[str, Any]
 MANY = 20  # coefficients, from which a correlation below 0.3 is colour only
 
 
@@ -43,10 +44,19 @@ def finite(*columns: Sequence[float | None]) -> list[list[float]]:
     return [list(c) for c in zip(*rows, strict=True)] if rows else [[] for _ in columns]
 
 
-def is_curve(series: Json) -> bool:
+def is_curve(series: Series) -> bool:
     """Return whether a series can be drawn: three or more points that are not all in one place."""
-    x = [v for v in series["x"] if v is not None]
+    (x,) = finite(series.x)
     return len(x) >= 3 and max(x) > min(x)
+
+
+def by_axis(series: Sequence[Series]) -> list[list[Series]]:
+    """Return the series that can be drawn, together where they have one axis, the axis with most points first."""
+    groups: dict[tuple[str, str], list[Series]] = {}
+    for s in series:
+        if is_curve(s):
+            groups.setdefault((s.x_name, s.x_unit), []).append(s)
+    return sorted(groups.values(), key=lambda alike: -sum(len(s.x) for s in alike))
 
 
 def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | None:
@@ -56,47 +66,43 @@ def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | 
     return low - pad * (high - low), high + pad * (high - low)
 
 
-def fit(series: Sequence[Json], key: str, alike: Sequence[Json], everything: Sequence[Json]) -> str:
+def fit(series: Sequence[Series], key: str, alike: Sequence[Series], everything: Sequence[Series]) -> str:
     """Points, fit and, beneath on the same axis, residuals.
 
     The scale is shared with the series that are ``alike``, that of the residuals with ``everything``.
     """
     fig, axes = figure(
-        WIDE if len(series) > 1 else WIDE * 0.75,
-        84,
-        nrows=2,
-        ncols=len(series),
-        sharex="col",
-        sharey="row",
+        WIDE if len(series) > 1 else WIDE * 0.75, 84, nrows=2, ncols=len(series), sharex="col", sharey="row",
         height_ratios=[2.2, 1],
-    )
+    )  # fmt: skip
     for k, s in enumerate(series):
         top, bottom = axes[0, k], axes[1, k]
-        x, y = finite(s["x"], s["y"])
+        x, y = finite(s.x, s.y)
         top.plot(x, y, "o", color=BLUE, markersize=2.8, markeredgewidth=0, zorder=3)
-        fx, fy = finite(*((s["shown_fit_x"], s["shown_fit_y"]) if s["shown_fit_x"] else (s["x"], s["fit"])))
+        fx, fy = finite(*((s.shown_fit_x, s.shown_fit_y) if s.shown_fit_x else (s.x, s.fit)))
         order = sorted(range(len(fx)), key=lambda i, fx=fx: fx[i])  # type: ignore[misc]
         top.plot([fx[i] for i in order], [fy[i] for i in order], "-", color=VERMILION)
-        top.set_title(short(s["label"], 48), color=INK)
-        rx, ry = finite(s["x"], s["residual"])
+        top.set_title(short(s.label, 48), color=INK)
+        rx, ry = finite(s.x, s.residual)
         zero_line(bottom)
         bottom.plot(rx, ry, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
-        bottom.set_xlabel(axis_label(s["x_name"], s["x_unit"]))
-        degree_ticks(bottom, s["x_unit"])
+        bottom.set_xlabel(axis_label(s.x_name, s.x_unit))
+        degree_ticks(bottom, s.x_unit)
     first = series[0]
-    axes[0, 0].set_ylabel(axis_label(first["y_name"], first["y_unit"]))
-    axes[1, 0].set_ylabel(axis_label("residual", first["y_unit"]))
-    for row, names, others in ((0, ("y", "shown_fit_y"), alike), (1, ("residual",), everything)):
-        shared = limits([v for s in others for name in names for v in s[name] if v is not None])
+    axes[0, 0].set_ylabel(axis_label(first.y_name, first.y_unit))
+    axes[1, 0].set_ylabel(axis_label("residual", first.y_unit))
+    values = [[*s.y, *s.shown_fit_y] for s in alike], [s.residual for s in everything]
+    for row, others in enumerate(values):
+        shared = limits([v for column in others for v in column if math.isfinite(v)])
         if shared:
             axes[row, 0].set_ylim(*shared)
     fig.align_ylabels(axes[:, 0])
     return svg(fig, key)
 
 
-def residuals_in_time(series: Sequence[Json], key: str) -> str:
+def residuals_in_time(series: Sequence[Series], key: str) -> str:
     """Residuals of all series against time, the series shaded and named."""
-    seconds = [t for s in series for t in s["t"] if t is not None]
+    seconds = [t for s in series for t in s.t if math.isfinite(t)]
     if len(seconds) < 3:
         return ""
     divisor, unit = time_axis(seconds)
@@ -104,33 +110,32 @@ def residuals_in_time(series: Sequence[Json], key: str) -> str:
     ax = axes[0, 0]
     zero_line(ax)
     spans = []
-    for s in sorted((s for s in series if s["t"]), key=lambda s: min(t for t in s["t"] if t is not None)):
-        t, r = finite(s["t"], s["residual"])
+    for s in sorted((s for s in series if s.t), key=lambda s: min(t for t in s.t if math.isfinite(t))):
+        t, r = finite(s.t, s.residual)
         if not t:
             continue
         t, r = envelope([v / divisor for v in t], r)
         half = 0.5 * (t[-1] - t[0]) / max(len(t) - 1, 1)
-        spans.append((t[0] - half, t[-1] + half, short(s["label"])))
+        spans.append((t[0] - half, t[-1] + half, short(s.label)))
         ax.plot(t, r, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
     ax.set_xlabel(axis_label("time", unit))
-    ax.set_ylabel(axis_label("residual", series[0]["y_unit"]))
+    ax.set_ylabel(axis_label("residual", series[0].y_unit))
     ax.margins(x=0.01)
     span_labels(ax, spans)
     return svg(fig, key, zoom=ax)
 
 
-def acf(data: Json, key: str, of: str = "windows") -> str:
-    """Return the autocorrelation of residuals (or of others, lag in ``of``) with its bounds for white noise."""
-    lag, rho = finite(data["lag"], data["rho"])
+def acf(lags: Sequence[float], values: Sequence[float], bound: Sequence[float], key: str, of: str = "windows") -> str:
+    """Return an autocorrelation against its lags in ``of``, with the bounds of white noise: of each lag, or of all."""
+    lag, rho = finite(lags, values)
     lag, rho = [m for m in lag if m > 0], [r for m, r in zip(lag, rho, strict=True) if m > 0]
     if not lag:
         return ""
     fig, axes = figure(HALF, 56)
     ax = axes[0, 0]
-    bound = data.get("bound")
-    bounds = [b for b in (bound if isinstance(bound, list) else [bound]) if b is not None]
-    if len(bounds) == len(data["lag"]):
-        ax.fill_between(data["lag"], [-b for b in bounds], bounds, color=GREEN, alpha=0.2, linewidth=0)
+    (bounds,) = finite(bound)
+    if len(bounds) == len(lags):
+        ax.fill_between(lags, [-b for b in bounds], bounds, color=GREEN, alpha=0.2, linewidth=0)
     elif bounds:
         ax.axhspan(-abs(bounds[0]), abs(bounds[0]), color=GREEN, alpha=0.2, linewidth=0)
     zero_line(ax)
@@ -148,7 +153,7 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
     import numpy as np
     from scipy.special import betaincinv, ndtri
 
-    values = np.sort(np.asarray([r for r in residuals if r is not None], float))
+    values = np.sort(np.asarray(finite(residuals)[0], float))
     n = len(values)
     spread = float(values.std(ddof=1)) if n > 2 else 0.0
     if n < 5 or spread == 0.0:
@@ -169,9 +174,9 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
     return svg(fig, key)
 
 
-def allan(data: Json, key: str) -> str:
+def allan(data: AllanDeviation, key: str) -> str:
     """Allan deviation against averaging time with 95 % intervals, both axes logarithmic."""
-    tau, dev, low, high = finite(data["tau"], data["dev"], data.get("lo") or data["dev"], data.get("hi") or data["dev"])
+    tau, dev, low, high = finite(data.tau, data.dev, data.lo or data.dev, data.hi or data.dev)
     rows = [r for r in zip(tau, dev, low, high, strict=True) if r[0] > 0 and r[1] > 0]
     if len(rows) < 2:
         return ""
@@ -183,15 +188,15 @@ def allan(data: Json, key: str) -> str:
     ax.set_yscale("log")
     ax.fill_between(tau, low, high, color=BLUE, alpha=0.2, linewidth=0)
     ax.plot(tau, dev, "o-", color=BLUE, linewidth=0.8, markeredgewidth=0)
-    ax.set_xlabel(axis_label("averaging time", data.get("tau_unit", "s")))
-    ax.set_ylabel(axis_label("Allan deviation", data.get("unit", "")))
+    ax.set_xlabel(axis_label("averaging time", data.tau_unit))
+    ax.set_ylabel(axis_label("Allan deviation", data.unit))
     plain_log(ax, max(high) / min(low))
     return svg(fig, key)
 
 
-def psd(data: Json, key: str) -> str:
+def psd(data: PowerSpectrum, key: str) -> str:
     """Return the power spectral density of the residuals, both axes logarithmic."""
-    f, density = finite(data["f"], data["S"])
+    f, density = finite(data.f, data.S)
     rows = [(a, b) for a, b in zip(f, density, strict=True) if a > 0 and b > 0]
     if len(rows) < 2:
         return ""
@@ -201,8 +206,8 @@ def psd(data: Json, key: str) -> str:
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.plot(f, density, "-", color=BLUE, linewidth=1.0)
-    ax.set_xlabel(axis_label("frequency", data.get("f_unit", "Hz")))
-    ax.set_ylabel(axis_label("density", data.get("unit", "")))
+    ax.set_xlabel(axis_label("frequency", data.f_unit))
+    ax.set_ylabel(axis_label("density", data.unit))
     plain_log(ax, max(density) / min(density))
     return svg(fig, key)
 
@@ -210,8 +215,6 @@ def psd(data: Json, key: str) -> str:
 def plain_log(ax: Any, ratio: float) -> None:
     """Decades as plain numbers or powers of ten; 2 and 5 between them where the axis is short."""
     from matplotlib.ticker import FuncFormatter, LogLocator
-
-    from gyrobench.report.numbers import write_number
 
     low, high = ax.get_xlim()
     for axis, span in ((ax.xaxis, high / low), (ax.yaxis, ratio)):
@@ -235,7 +238,7 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
     for i in range(1, n):
         for j in range(i):
             r = matrix[i][j]
-            if r is None:
+            if not math.isfinite(r):
                 continue
             colour, depth = (BLUE if r > 0.0 else VERMILION), 0.6 * min(1.0, abs(r))
             ax.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, facecolor=colour, alpha=depth, linewidth=0))
@@ -253,9 +256,9 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
     return svg(fig, key)
 
 
-def scores(names: Sequence[str], z: Sequence[float], k: Sequence[float], key: str) -> str:
-    """(estimate - truth) / u of each coefficient with the band in which 95 % should lie."""
-    rows = [(n, v, w) for n, v, w in zip(names, z, k, strict=True) if v is not None and w is not None]
+def scores(coefficients: Sequence[Coefficient], key: str) -> str:
+    """(estimate - truth) / u of each coefficient with the band in which 95 % should lie."""
+    rows = [(c.name, c.z, c.k) for c in coefficients if c.z is not None and math.isfinite(c.z) and math.isfinite(c.k)]
     if not rows:
         return ""
     fig, axes = figure(HALF, 14 + 6.4 * len(rows))

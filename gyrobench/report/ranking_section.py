@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.suite.ranking import RankedValue, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
+from gyrobench.report.replicates import ComparedRun, Draws
+from gyrobench.result import Coefficient
 
 Json = dict[str, Any]
 NOTE = (
@@ -18,55 +21,57 @@ NOTE = (
 )
 
 
-def ranking(docs: Sequence[Json]) -> Json:
+def ranking(runs: Sequence[ComparedRun]) -> Json:
     """Return the ranking by the measure that all runs name, see :func:`ranking_by`; {} where they name none, or not the
     same one.
     """
-    (name, *others) = dict.fromkeys(str(doc.get("ranked_by") or "") for doc in docs)
-    return {} if others or not name else ranking_by(docs, name)
+    (name, *others) = dict.fromkeys(run.result.ranked_by for run in runs)
+    return {} if others or not name else ranking_by(runs, name)
 
 
-def by_purpose(docs: Sequence[Json]) -> list[Json]:
+def by_purpose(runs: Sequence[ComparedRun]) -> list[Json]:
     """Return a ranking by each further measure that all runs name (``Result.purposes``), with its "purpose"."""
-    common = [n for n in docs[0].get("purposes") or {} if all(n in (doc.get("purposes") or {}) for doc in docs)]
-    ranked = [(ranking_by(docs, name), docs[0]["purposes"][name]) for name in common]
+    purposes = runs[0].result.purposes
+    common = [n for n in purposes if all(n in run.result.purposes for run in runs)]
+    ranked = [(ranking_by(runs, name), purposes[name]) for name in common]
     return [{**found, "purpose": purpose} for found, purpose in ranked if found]
 
 
-def ranking_by(docs: Sequence[Json], name: str) -> Json:
+def ranking_by(runs: Sequence[ComparedRun], name: str) -> Json:
     """Return ``{"name", "unit", "meaning", "order": [{"run", "place", "value", "u", "over_best", "apart",
     "probability"}], "void": [{"run", "reason"}]}``; {} where fewer than two runs can be ordered.
 
     place, probability: see :mod:`gyrobench.reduction.suite.ranking`.  apart: whether the run begins a rank of its own;
     None for the first of all.  void: runs without a value of the measure, or with the verdict void; they have no rank.
     """
-    ranked = [next((c for c in doc["coefficients"] if c["name"] == name), None) for doc in docs]
+    ranked = [run.find(name) for run in runs]
+    why = [found[0].no_value if found else "" for found in ranked]
     void = [
-        {"run": k, "reason": (c and c["no_value"]) or "another measure of the run has no value"}
-        for k, (doc, c) in enumerate(zip(docs, ranked, strict=True))
-        if doc["verdict"] == "void" or (c and c["no_value"])
+        {"run": k, "reason": why[k] or "another measure of the run has no value"}
+        for k, run in enumerate(runs)
+        if run.result.verdict == "void" or why[k]
     ]
     out = {v["run"] for v in void}
-    known = [(k, c) for k, c in enumerate(ranked) if k not in out and c is not None and c["estimate"] is not None]
-    if not known or len(known) + len(void) < 2 or len({c["unit"] for _, c in known}) > 1:
+    known = [(k, *found) for k, found in enumerate(ranked)
+             if k not in out and found is not None and math.isfinite(found[0].estimate)]  # fmt: skip
+    if not known or len(known) + len(void) < 2 or len({c.unit for _, c, _ in known}) > 1:
         return {}
-    places = rank([candidate(c) for _, c in known])
+    places = rank([candidate(c, draws) for _, c, draws in known])
     best = known[places[0].index][1]
     order: list[Json] = []
     for count, p in enumerate(places):
-        k, c = known[p.index]
-        over = c["estimate"] / best["estimate"] if best["estimate"] else None
+        k, c, _ = known[p.index]
+        over = c.estimate / best.estimate if best.estimate else None
         order.append(
-            {"run": k, "place": p.place, "value": c["estimate"], "u": c["u"], "over_best": over,
+            {"run": k, "place": p.place, "value": c.estimate, "u": c.u, "over_best": over,
              "apart": p.place == count + 1 if count else None, "probability": p.probability}
         )  # fmt: skip
-    return {"name": name, "unit": best["unit"], "meaning": best["meaning"], "order": order, "void": void}
+    return {"name": name, "unit": best.unit, "meaning": best.meaning, "order": order, "void": void}
 
 
-def candidate(c: Json) -> RankedValue:
-    """Return a coefficient of a document as a candidate of a ranking."""
-    draws = {int(seed): value for seed, value in (c.get("draws") or {}).items()}
-    return RankedValue(c["estimate"], c["u"], c["k"] or NORMAL, draws)
+def candidate(c: Coefficient, draws: Draws) -> RankedValue:
+    """Return a coefficient as a candidate of a ranking."""
+    return RankedValue(c.estimate, c.u if math.isfinite(c.u) else None, c.k or NORMAL, draws)
 
 
 def place_text(ranked: Json, entry: Json) -> str:

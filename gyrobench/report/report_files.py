@@ -10,7 +10,7 @@ from typing import Any
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 from gyrobench.report.page_model import Page
-from gyrobench.report.result_json import document
+from gyrobench.report.result_json import Report
 from gyrobench.result import DriftRecordResult, Result, SuiteResult
 
 FORMATS = ("json", "html", "pdf")
@@ -44,22 +44,23 @@ def write(
     Raises ValueError for an unknown format and :class:`ReportError`, after all others were written, when a
     format fails.
     """
-    doc = document(result)
+    report = Report.of(result)
+    return write_files(dict(report.document), lambda: page(report, record), Path(folder), formats, NAMES, bench)
 
-    def page() -> Page:
-        if isinstance(result, SuiteResult):
-            from gyrobench.report import suite_page
 
-            return suite_page.page(doc)
-        if isinstance(result, DriftRecordResult):
-            from gyrobench.report import drift_record_page
+def page(report: Report[Any], record: Mapping[str, Any] | None = None) -> Page:
+    """Return the page of the report of a result of any kind; record: as in :func:`write`."""
+    if isinstance(report.result, SuiteResult):
+        from gyrobench.report import suite_page
 
-            return drift_record_page.page(doc)
-        from gyrobench.report import result_page
+        return suite_page.page(report)
+    if isinstance(report.result, DriftRecordResult):
+        from gyrobench.report import drift_record_page
 
-        return result_page.page(doc, record)
+        return drift_record_page.page(report)
+    from gyrobench.report import result_page
 
-    return write_files(doc, page, Path(folder), formats, NAMES, bench)
+    return result_page.page(report, record)
 
 
 def compare(

@@ -3,143 +3,144 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report.page_model import CollapsedBlocks, Column, Picture, Row, Table, number_cell, pictures, text_cell
+from gyrobench.report.numbers import write_number
+from gyrobench.report.page_model import CollapsedBlocks, Picture, Row, Table, columns, number_cell, pictures, text_cell
 from gyrobench.report.plots import finite, short
+from gyrobench.report.result_json import Report
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
+from gyrobench.result import Curve, LoopResult, Response, Result
 
-Json = Mapping[str, Any]
 LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their order
+Named = Sequence[tuple[str, Response]]
 
 
-def blocks(doc: Json) -> list[Any]:
-    """One figure for each response of a result document: what happened in the run, open loops, then the others."""
+def blocks(report: Report[Result]) -> list[Any]:
+    """Return a figure for each response of a loop: what happened in the run, open loops, then the others."""
+    if not isinstance(report.result, LoopResult):
+        return []
     figures: list[Any] = []
     order = {"time": 0, "loop": 1}
-    for k, r in sorted(enumerate(doc.get("responses") or []), key=lambda item: order.get(item[1]["kind"], 2)):
+    for k, r in sorted(enumerate(report.result.responses), key=lambda item: order.get(item[1].kind, 2)):
         key = f"response-{k + 1}"
-        alt = f"{r['name']}: " + ("lines over time" if r["kind"] == "time" else "measured points and linear curves")
-        label = r["name"] if r["kind"] == "step" and r["name"] == r["y_name"] else "measured"
-        figures += pictures(Picture(key, draw([(label, r)], key, curves=r["curves"]), r["caption"], alt))
-        if r["kind"] not in ("step", "time") and r["x"]:
-            figures.append(CollapsedBlocks(f"Points of the {r['name']}", [_points(doc, k)]))
+        alt = f"{r.name}: " + ("lines over time" if r.kind == "time" else "measured points and linear curves")
+        label = r.name if r.kind == "step" and r.name == r.y_name else "measured"
+        figures += pictures(Picture(key, draw([(label, r)], key, r.curves), r.caption, alt))
+        if r.kind not in ("step", "time") and r.x:
+            figures.append(CollapsedBlocks(f"Points of the {r.name}", [_points(report, k, r)]))
     return figures
 
 
-def _points(doc: Json, k: int) -> Table:
-    """Frequency, gain, phase, uncertainty and coherence of every measured point."""
-    r = doc["responses"][k]
-    columns = {"x": (r["x_name"], r["x_unit"]), "y": (r["y_name"], r["y_unit"]), "phase": ("phase", "°")}
-    columns |= {"u": ("u, relative", ""), "coherence": ("coherence", "")}
-    shown = [name for name in columns if r[name]]
+def _points(report: Report[Result], k: int, r: Response) -> Table:
+    """Return frequency, gain, phase, uncertainty and coherence of every measured point."""
+    heads = {"x": (r.x_name, r.x_unit), "y": (r.y_name, r.y_unit), "phase": ("phase", "°")}
+    heads |= {"u": ("u, relative", ""), "coherence": ("coherence", "")}
+    shown = {name: head for name, head in heads.items() if getattr(r, name)}
     digits = {"x": 4, "u": 2, "coherence": 7}
-    rows = [
-        Row([number_cell(doc, ("responses", k, n, i), significant=digits.get(n, 6)) for n in shown])
-        for i in range(len(r["x"]))
-    ]
-    if r["counts"]:
-        columns["counts"] = ("counts", "")
-        shown.append("counts")
-        for row, counts in zip(rows, r["counts"], strict=True):
-            row.cells.append(text_cell("yes" if counts else "no"))
-    caption = f"Points of the {r['name']}. u: standard uncertainty of the gain, relative, and of the phase in radians."
-    return Table([Column(*columns[n]) for n in shown], rows, caption, small=True)
+    rows = []
+    for i in range(len(r.x)):
+        cells = [number_cell(report.document, ("responses", k, n, i), significant=digits.get(n, 6)) for n in shown]
+        rows.append(Row([*cells, *([text_cell("yes" if r.counts[i] else "no")] if r.counts else [])]))
+    caption = f"Points of the {r.name}. u: standard uncertainty of the gain, relative, and of the phase in radians."
+    return Table(columns(*shown.values(), *(["counts"] if r.counts else [])), rows, caption, small=True)
 
 
-def side_by_side(doc: Json, letter: Callable[[int], str]) -> list[Any]:
-    """One figure for each response that two runs or more of a comparison document have, all runs in it."""
-    figures: list[Any] = []
-    for k, r in enumerate(doc["responses"]):
-        named = [(f"{letter(i)} {doc['runs'][i]['name']}", run) for i, run in enumerate(r["runs"]) if run is not None]
-        alike = [n for n in named if (n[1]["kind"], n[1]["y_unit"]) == (named[0][1]["kind"], named[0][1]["y_unit"])]
-        if len(alike) > 1:
-            key = f"response-{k + 1}"
-            lines = alike[0][1]["curves"]
-            several = alike[0][1]["kind"] == "time" and len(lines) > 1
-            name = f"{r['name']}, {lines[0]['label']}" if several else r["name"]
-            text = f"{name[:1].upper()}{name[1:]} of all runs."
-            figures += pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
-    return figures
+def of_all_runs(key: str, named: Named) -> list[Any]:
+    """Return the figure of one response of several runs (name -> response), none where fewer than two are alike."""
+    first = named[0][1]
+    alike = [n for n in named if (n[1].kind, n[1].y_unit) == (first.kind, first.y_unit)]
+    if len(alike) < 2:
+        return []
+    several = first.kind == "time" and len(first.curves) > 1
+    name = f"{first.name}, {first.curves[0].label}" if several else first.name
+    text = f"{name[:1].upper()}{name[1:]} of all runs."
+    return pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
 
 
-def draw(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json] = ()) -> str:
+def draw(named: Named, key: str, curves: Sequence[Curve] = ()) -> str:
     """Return the same response of one or several runs in one figure; gain in dB over phase, or values over time."""
     first = named[0][1]
-    if first["kind"] == "time":
-        return _steps([(c["label"], {**first, **c}) for c in curves] or named, key, ())
-    if first["kind"] == "step":
-        return _steps(named, key, curves)
-    phases = first["kind"] == "loop"
+    if first.kind == "time":
+        lines = [(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named]
+        return _over_time(lines, first, key, ())
+    if first.kind == "step":
+        return _over_time([(label, r.x, r.y) for label, r in named], first, key, curves)
+    phases = first.kind == "loop"
     fig, axes = figure(WIDE * 0.8, 96 if phases else 62, nrows=2 if phases else 1, sharex=True)
     top = axes[0, 0]
     for i, (label, r) in enumerate(named):
         colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
-        counts = r["counts"] or [True] * len(r["x"])
-        near = _nearest(r["phase"], first) if phases and r["phase"] else [0.0] * len(r["x"])
+        near = _nearest(r.phase, first) if phases and r.phase else []
         line = "-" if len(named) > 1 else ""
-        for chosen, shade in ((True, colour), (False, MUTED)):
-            pick = [k for k, c in enumerate(counts) if c is chosen]
-            relative = [0.0 if not r["u"] or r["u"][k] is None else r["u"][k] for k in pick]
-            x, y, u, phase = finite(
-                [r["x"][k] for k in pick], [r["y"][k] for k in pick], relative, [near[k] for k in pick]
-            )
-            if not x:
-                continue
-            style: dict[str, Any] = {
-                "color": shade,
-                "markersize": 3.6,
-                "markeredgewidth": 0,
-                "zorder": 3 if chosen else 2,
-            }
-            style |= {"label": label if chosen else "too noisy to count", "elinewidth": 0.9, "linewidth": 0.8}
-            shape = MARKERS[i % len(MARKERS)] + (line if chosen else "")
-            top.errorbar(x, _db(y), yerr=[20.0 * math.log10(1.0 + 1.96 * v) for v in u], fmt=shape, **style)
-            if phases and r["phase"]:
-                axes[1, 0].errorbar(x, phase, yerr=[math.degrees(1.96 * v) for v in u], fmt=shape, **style)
+        for counts, shade in ((True, colour), (False, MUTED)):
+            _draw_points(axes[:, 0], r, near, counts, {
+                "color": shade, "zorder": 3 if counts else 2, "label": label if counts else "too noisy to count",
+                "fmt": MARKERS[i % len(MARKERS)] + (line if counts else ""),
+            })  # fmt: skip
     for (colour, dashes), curve in zip(LINES, curves, strict=False):
-        top.plot(curve["x"], _db(curve["y"]), dashes, color=colour, linewidth=1.0, label=curve["label"])
+        top.plot(curve.x, _db(curve.y), dashes, color=colour, linewidth=1.0, label=curve.label)
         if phases:
             shift = _shift(curve, first)
-            axes[1, 0].plot(curve["x"], [p + shift for p in curve["phase"]], dashes, color=colour, linewidth=1.0)
-    for ax in axes[:, 0]:
-        ax.set_xscale("log")
-    if top.dataLim.height < 1e-6:  # a ratio of 1 and its rounding errors
-        top.set_ylim(top.dataLim.y0 - 1.0, top.dataLim.y0 + 1.0)
-    unit = first["y_unit"]
-    top.set_ylabel(axis_label(first["y_name"], "dB" if unit in ("", "1") else f"dB re {unit}"))
-    if phases:
-        top.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
-        bottom = axes[1, 0]
-        bottom.set_ylabel(axis_label("phase", "°"))
-        _phase_axis(bottom)
-        fig.align_ylabels(axes[:, 0])
-    axes[-1, 0].set_xlabel(axis_label("frequency", "Hz"))
-    _frequency_axis(axes[-1, 0])
-    if len(named) + len(curves) > 1 or not all(all(r["counts"]) for _, r in named):
+            axes[1, 0].plot(curve.x, [p + shift for p in curve.phase], dashes, color=colour, linewidth=1.0)
+    _axes(fig, axes[:, 0], first)
+    if len(named) + len(curves) > 1 or not all(all(r.counts) for _, r in named):
         fig.legend(*top.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=2.2)
     return svg(fig, key)
 
 
-def _steps(named: Sequence[tuple[str, Json]], key: str, curves: Sequence[Json]) -> str:
+def _draw_points(axes: Any, r: Response, phase: Sequence[float], counts: bool, style: dict[str, Any]) -> None:
+    """Draw the points of a response that count, or those that do not, with 95 % error bars."""
+    pick = [k for k, c in enumerate(r.counts or [True] * len(r.x)) if c is counts]
+    known = [(r.u[k] if r.u else None) or 0.0 for k in pick]
+    u = [v if math.isfinite(v) else 0.0 for v in known]
+    x, y, u, p = finite([r.x[k] for k in pick], [r.y[k] for k in pick], u, [phase[k] if phase else 0.0 for k in pick])
+    if not x:
+        return
+    style |= {"markersize": 3.6, "markeredgewidth": 0, "elinewidth": 0.9, "linewidth": 0.8}
+    axes[0].errorbar(x, _db(y), yerr=[20.0 * math.log10(1.0 + 1.96 * v) for v in u], **style)
+    if phase:
+        axes[1].errorbar(x, p, yerr=[math.degrees(1.96 * v) for v in u], **style)
+
+
+def _axes(fig: Any, axes: Any, first: Response) -> None:
+    """Label the axes of gain and, where there is one, phase over frequency."""
+    top = axes[0]
+    for ax in axes:
+        ax.set_xscale("log")
+    if top.dataLim.height < 1e-6:  # a ratio of 1 and its rounding errors
+        top.set_ylim(top.dataLim.y0 - 1.0, top.dataLim.y0 + 1.0)
+    top.set_ylabel(axis_label(first.y_name, "dB" if first.y_unit in ("", "1") else f"dB re {first.y_unit}"))
+    if len(axes) > 1:
+        top.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
+        axes[1].set_ylabel(axis_label("phase", "°"))
+        _phase_axis(axes[1])
+        fig.align_ylabels(axes)
+    axes[-1].set_xlabel(axis_label("frequency", "Hz"))
+    _frequency_axis(axes[-1])
+
+
+def _over_time(
+    lines: Sequence[tuple[str, Sequence[float], Sequence[float]]], first: Response, key: str, curves: Sequence[Curve]
+) -> str:
+    """Return lines (label, x, y) in one figure, with the curves of models over them; a step alone as points."""
     fig, axes = figure(WIDE * 0.8, 62)
     ax = axes[0, 0]
-    for i, (label, r) in enumerate(named):
-        x, y = finite(r["x"], r["y"])
-        colour = BLUE if len(named) == 1 else CYCLE[i % len(CYCLE)]
-        points = len(named) == 1 and r["kind"] == "step"
+    points = len(lines) == 1 and first.kind == "step"
+    for i, (label, *values) in enumerate(lines):
+        x, y = finite(*values)
+        colour = BLUE if len(lines) == 1 else CYCLE[i % len(CYCLE)]
         marks: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 2.4} if points else {"linestyle": "-"}
         every = max(1, len(x) // 120) if points else 1
         marks |= {"linewidth": 0.6} if len(x) > 1000 else {}
         ax.plot(x[::every], y[::every], color=colour, markeredgewidth=0, label=short(label), zorder=3, **marks)
     for (colour, dashes), curve in zip(LINES, curves, strict=False):
-        ax.plot(curve["x"], curve["y"], dashes, color=colour, linewidth=1.0, label=curve["label"])
-    first = named[0][1]
-    ax.set_xlabel(axis_label(first["x_name"], first["x_unit"]))
-    ax.set_ylabel(axis_label(first["y_name"], first["y_unit"]))
+        ax.plot(curve.x, curve.y, dashes, color=colour, linewidth=1.0, label=curve.label)
+    ax.set_xlabel(axis_label(first.x_name, first.x_unit))
+    ax.set_ylabel(axis_label(first.y_name, first.y_unit))
     ax.margins(x=0.01)
-    if len(named) + len(curves) > 1:
+    if len(lines) + len(curves) > 1:
         fig.legend(loc="outside upper left", ncols=3, handlelength=2.2)
     return svg(fig, key)
 
@@ -148,18 +149,18 @@ def _db(values: Sequence[float]) -> list[float]:
     return [20.0 * math.log10(v) if v > 0.0 else math.nan for v in values]
 
 
-def _shift(curve: Json, points: Json) -> float:
-    """Whole turns that bring a curve's phase to that of the points."""
-    if not points["phase"] or not curve["phase"]:
+def _shift(curve: Curve, points: Response) -> float:
+    """Return whole turns that bring a curve's phase to that of the points."""
+    if not points.phase or not curve.phase:
         return 0.0
-    x0 = points["x"][0]
-    k = min(range(len(curve["x"])), key=lambda i: abs(math.log(curve["x"][i] / x0)))
-    return 360.0 * float(round((points["phase"][0] - curve["phase"][k]) / 360.0))
+    x0 = points.x[0]
+    k = min(range(len(curve.x)), key=lambda i: abs(math.log(curve.x[i] / x0)))
+    return 360.0 * float(round((points.phase[0] - curve.phase[k]) / 360.0))
 
 
-def _nearest(phase: Sequence[float], first: Json) -> list[float]:
+def _nearest(phase: Sequence[float], first: Response) -> list[float]:
     """Return the phase moved by whole turns to that of the first run."""
-    turns = 360.0 * round((first["phase"][0] - phase[0]) / 360.0) if first["phase"] else 0.0
+    turns = 360.0 * round((first.phase[0] - phase[0]) / 360.0) if first.phase else 0.0
     return [p + turns for p in phase]
 
 
@@ -176,8 +177,6 @@ def _phase_axis(ax: Any) -> None:
 
 def _frequency_axis(ax: Any) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator
-
-    from gyrobench.report.numbers import write_number
 
     low, high = ax.get_xlim()
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 300 else (1.0, 2.0, 5.0), numticks=12))

@@ -1,25 +1,32 @@
-"""``result.json`` as a Python object: the only source of every number on a page.
+"""``result.json``, and the report of a result: the result, its document, and the few numbers that a page adds.
 
-:func:`document` turns a Result into plain JSON values (NaN and infinities become None) and adds
-``derived``: the few numbers a report shows that no reduction delivers (expanded uncertainty, budget
-sums, the plan in shown units).  HTML and PDF take numbers from this document by JSON pointer and from
-nowhere else.
+:class:`Report` is what pages are made from.  Everything they say comes from the typed result; every number they show is
+found in ``Report.document``, the JSON content (NaN and infinities are null), by its JSON pointer.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from gyrobench import reading
 from gyrobench.errors import GyrobenchError
-from gyrobench.result import Result
+from gyrobench.result import DriftTestResult, LoopResult, Result, Series, SuiteResult
+from gyrobench.result_content import content
 
+if TYPE_CHECKING:
+    from gyrobench.record.run_document import Document, PlanRow, SuiteDocument
+    from gyrobench.report.provenance import Provenance
+
+R = TypeVar("R", bound=Result, covariant=True)
+S = TypeVar("S", bound=Result)
 SCHEMA = "gyrobench-result-1"
-MODES = {0: "hold", 1: "index", 2: "rate", 3: "servo"}
+DEGREE = 180.0 / math.pi
 
 
 class ResultError(GyrobenchError, ValueError):
@@ -43,16 +50,142 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+@dataclass(frozen=True)
+class SeriesMoments:
+    """Mean of the windows of a series and root mean square of their residuals; None where there is none."""
+
+    mean: float | None
+    residual_rms: float | None
+
+
+@dataclass(frozen=True)
+class PlanLine:
+    """A phase of the plan in degrees, degrees per hour and seconds; None: not stated, or not of its mode."""
+
+    phase: int
+    label: str
+    mode: str
+    shape: str | None
+    face: str | None
+    axis: int | None
+    amplitude: float | None
+    unit: str | None
+    frequency_Hz: float | None
+    angle_deg: float | None
+    angle_y_deg: float | None
+    rate_deg_per_h: float | None
+    settle_s: float | None
+    dwell_s: float | None
+    travel_deg: float | None
+    window_s: float | None
+    window_deg: float | None
+
+
+@dataclass(frozen=True)
+class Derived:
+    """Numbers that a report shows and no reduction delivers.
+
+    U: expanded uncertainties, closed_minus_estimate: both in the order of the coefficients.  budget_sum: root sum of
+    squares of the contributions to a coefficient.  series, plan: in the order of the result's and of the run's.
+    """
+
+    U: list[float]
+    closed_minus_estimate: list[float | None]
+    budget_sum: dict[str, float]
+    series: list[SeriesMoments]
+    plan: list[PlanLine]
+
+
+@dataclass(frozen=True)
+class Report(Generic[R]):
+    """A result with what a page adds to it.  document: the content of result.json, for the cells of numbers alone."""
+
+    result: R
+    derived: Derived
+    document: Mapping[str, Any]
+
+    @staticmethod
+    def of(result: S) -> Report[S]:
+        """Return the report of a result.  Raises ResultError where its provenance is no run.json."""
+        derived = _derived(result)
+        found = plain({**result.as_dict(), "derived": content(derived)})
+        return Report(result, derived, {"schema": SCHEMA, "report_id": content_hash(found), **found})
+
+    @property
+    def report_id(self) -> str:
+        """Ten hexadecimal digits that stand for the content: same numbers and provenance, same id."""
+        return str(self.document["report_id"])
+
+    @functools.cached_property
+    def run(self) -> Provenance:
+        """The run.json of the result of a record."""
+        from gyrobench.report.provenance import Provenance, provenance
+
+        return provenance(self.result, Provenance)
+
+    @functools.cached_property
+    def suite(self) -> SuiteDocument:
+        """The run.json of the result of a suite."""
+        from gyrobench.record.run_document import SuiteDocument
+        from gyrobench.report.provenance import provenance
+
+        return provenance(self.result, SuiteDocument)
+
+    @property
+    def about(self) -> Document:
+        """What the run.json of a record or a suite says of its circumstances."""
+        return self.suite if isinstance(self.result, SuiteResult) else self.run
+
+
+def _derived(result: Result) -> Derived:
+    from gyrobench.report.provenance import Provenance, provenance
+
+    sums: dict[str, float] = {}
+    for line in result.budget if isinstance(result, DriftTestResult | LoopResult) else ():
+        if math.isfinite(line.contribution):
+            sums[line.coefficient] = math.hypot(sums.get(line.coefficient, 0.0), line.contribution)
+    drawn: list[Series] = result.series if isinstance(result, DriftTestResult | LoopResult) else []
+    run = None if isinstance(result, SuiteResult) else provenance(result, Provenance)
+    return Derived(
+        U=[c.k * c.u for c in result.coefficients],
+        closed_minus_estimate=[None if c.closed is None else c.closed - c.estimate for c in result.coefficients],
+        budget_sum=sums,
+        series=[_moments(s) for s in drawn],
+        plan=[] if run is None else [_plan_line(row) for row in run.plan],
+    )
+
+
+def _moments(series: Series) -> SeriesMoments:
+    ys, rs = ([v for v in values if math.isfinite(v)] for values in (series.y, series.residual))
+    rms = math.sqrt(math.fsum(r * r for r in rs) / len(rs)) if rs else None
+    return SeriesMoments(math.fsum(ys) / len(ys) if ys else None, rms)
+
+
+def _plan_line(row: PlanRow) -> PlanLine:
+    given, turning = row.as_dict(), row.mode == "rate"
+
+    def number(key: str, factor: float = 1.0, shown: bool = True) -> float | None:
+        return factor * given[key] if shown and given.get(key) is not None else None
+
+    return PlanLine(
+        phase=row.phase, label=row.label, mode=row.mode, shape=given.get("shape"), face=given.get("face"),
+        axis=given.get("axis"), amplitude=given.get("amplitude"), unit=given.get("unit"),
+        frequency_Hz=given.get("frequency"), angle_deg=number("target", DEGREE, not turning),
+        angle_y_deg=number("target_y", DEGREE, not turning), rate_deg_per_h=number("target", DEGREE * 3600.0, turning),
+        settle_s=number("settle"), dwell_s=number("dwell", shown=not turning),
+        travel_deg=number("travel", DEGREE, turning), window_s=number("window", shown=not turning),
+        window_deg=number("window", DEGREE, turning),
+    )  # fmt: skip
+
+
 def document(result: Result) -> dict[str, Any]:
     """Return the content of ``result.json``: the result, ``derived``, ``schema`` and ``report_id``."""
-    content = plain(result.as_dict())
-    content["derived"] = _derived(content)
-    return {"schema": SCHEMA, "report_id": content_hash(content), **content}
+    return dict(Report.of(result).document)
 
 
 def report_id(result: Result) -> str:
-    """Return ten hexadecimal digits that stand for the content: same numbers and provenance, same id."""
-    return str(document(result)["report_id"])
+    """Return ten hexadecimal digits that stand for the content of a result."""
+    return Report.of(result).report_id
 
 
 def load(text: str) -> Result:
@@ -83,70 +216,7 @@ def value_at(doc: Any, *path: str | int) -> Any:
     return doc
 
 
-def content_hash(content: dict[str, Any]) -> str:
+def content_hash(content: Mapping[str, Any]) -> str:
     """Return ten hexadecimal digits of the SHA-256 of JSON content."""
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:10]
-
-
-def _derived(content: dict[str, Any]) -> dict[str, Any]:
-    coefficients = content["coefficients"]
-    expanded = [_times(c["k"], c["u"]) for c in coefficients]
-    difference = [_minus(c["closed"], c["estimate"]) for c in coefficients]
-    sums: dict[str, float | None] = {}
-    for line in content["budget"]:
-        if line["contribution"] is not None:
-            sums[line["coefficient"]] = math.hypot(sums.get(line["coefficient"]) or 0.0, line["contribution"])
-    plan = value_at(content, "provenance", "plan")
-    return {
-        "U": expanded,
-        "closed_minus_estimate": difference,
-        "budget_sum": sums,
-        "series": [_moments(s["y"], s["residual"]) for s in content["series"]],
-        "plan": [_phase(p) for p in plan] if isinstance(plan, list) else [],
-    }
-
-
-def _moments(y: Sequence[float | None], residual: Sequence[float | None]) -> dict[str, float | None]:
-    """Return the mean of the windows and root mean square of the residuals of a series."""
-    ys = [v for v in y if v is not None]
-    rs = [v for v in residual if v is not None]
-    return {
-        "mean": math.fsum(ys) / len(ys) if ys else None,
-        "residual_rms": math.sqrt(math.fsum(r * r for r in rs) / len(rs)) if rs else None,
-    }
-
-
-def _phase(phase: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a phase of the plan in degrees, degrees per hour and seconds, as the plan table shows it."""
-    mode = phase.get("mode")
-    name = mode if isinstance(mode, str) else MODES.get(int(mode), str(mode)) if mode is not None else ""
-    turning = name == "rate"
-    degree = 180.0 / math.pi
-    return {
-        "phase": phase.get("phase"),
-        "label": str(phase.get("label", "")),
-        "mode": name,
-        "shape": phase.get("shape"),
-        "face": phase.get("face"),
-        "axis": phase.get("axis"),
-        "amplitude": phase.get("amplitude"),
-        "unit": phase.get("unit"),
-        "frequency_Hz": phase.get("frequency"),
-        "angle_deg": None if turning else _times(phase.get("target"), degree),
-        "angle_y_deg": None if turning else _times(phase.get("target_y"), degree),
-        "rate_deg_per_h": _times(phase.get("target"), degree * 3600.0) if turning else None,
-        "settle_s": phase.get("settle"),
-        "dwell_s": None if turning else phase.get("dwell"),
-        "travel_deg": _times(phase.get("travel"), degree) if turning else None,
-        "window_s": None if turning else phase.get("window"),
-        "window_deg": _times(phase.get("window"), degree) if turning else None,
-    }
-
-
-def _times(a: Any, b: Any) -> float | None:
-    return float(a) * float(b) if isinstance(a, int | float) and isinstance(b, int | float) else None
-
-
-def _minus(a: Any, b: Any) -> float | None:
-    return float(a) - float(b) if isinstance(a, int | float) and isinstance(b, int | float) else None

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gyrobench.record.run_document import ABOUT, SetupError
+from gyrobench.record.run_document import ABOUT
 from gyrobench.report import channel_figure, diagnostics_section, method_section, plots, responses
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     BulletList,
     Cell,
-    Column,
     Page,
     Picture,
     ResultSummary,
@@ -21,70 +20,74 @@ from gyrobench.report.page_model import (
     Section,
     Table,
     Text,
+    columns,
     number_cell,
     pictures,
     text_cell,
 )
 from gyrobench.report.plain_text import no_values
+from gyrobench.report.provenance import Provenance
+from gyrobench.report.result_json import Report
 from gyrobench.report.signature_section import signing
 from gyrobench.report.style import styled
 from gyrobench.report.tables import heading, how_tables, limit_text, unit_groups, words
-from gyrobench.result import NO_VERDICT
+from gyrobench.result import NO_VERDICT, Coefficient, DriftTestResult, LoopResult, Result, Series
 
-Json = dict[str, Any]
+RunResult = DriftTestResult | LoopResult
 
 
-def page(doc: Json, record: Mapping[str, Any] | None = None) -> Page:
-    """Return the report of one result document (see :func:`gyrobench.report.result_json.document`).
+def page(report: Report[RunResult], record: Mapping[str, Any] | None = None) -> Page:
+    """Return the page of the report of a drift test or a loop.
 
     ``record`` may hold the decimated channels of the run: "time" in s and "slot.variable" columns; they
     are drawn as long records.
     """
     with styled():
         sections = [
-            Section("Result and conformity", "answer", [answer(doc)]),
-            Section("Simulated set-up errors", "setup-errors", setup_errors(doc)),
-            Section("Coefficients", "coefficients", coefficients(doc)),
-            Section("Measurement data", "measured", _measured(doc, record or {})),
+            *opening(report, "Coefficients"),
+            Section("Measurement data", "measured", _measured(report, record or {})),
             Section("Validity of the results", "believed", []),
-            _residuals(doc),
-            Section(
-                "Stability: Allan deviation and spectrum", "stability", diagnostics_section.stability(doc), sub=True
-            ),
-            Section("Uncertainty of the estimates", "estimates", diagnostics_section.estimates(doc), sub=True),
-            Section("Repeatability and step check", "repeatability", diagnostics_section.repeatability(doc), sub=True),
-            Section("Uncertainty budget", "budget", diagnostics_section.budget(doc)),
-            Section("Method and provenance", "how", []),
-            Section("Model and conventions", "model", method_section.model(doc), sub=True),
-            Section("System and test plan", "system", method_section.system(doc), sub=True),
-            Section("Components, parameters and provenance", "provenance", how_tables(doc), sub=True),
-            Section("Values at full precision", "values", method_section.full_values(doc), sub=True),
-            Section("Statements and signatures", "signatures", signing(doc)),
+            *diagnostics_section.validity(report),
+            Section("Uncertainty budget", "budget", diagnostics_section.budget(report)),
+            *closing(report),
         ]
-    return Page(doc["title"], doc["report_id"], head(doc), sections).finish()
+    return Page(report.result.title, report.report_id, head(report), sections).finish()
 
 
-def _residuals(doc: Json) -> Section:
-    """Return the section on the residuals of a fit, or on the errors and innovations of an estimator."""
-    if doc["kind"] == "loop":
-        return Section("Errors and innovations", "innovations", diagnostics_section.innovations(doc), sub=True)
-    return Section("Residuals", "residuals", diagnostics_section.residuals(doc), sub=True)
-
-
-def head(doc: Json) -> list[tuple[str, str]]:
-    run = doc["provenance"]
-    site = place(doc["site"])
-    rows = [
-        ("Report", doc["report_id"]),
-        ("Date", date(str(run.get("date") or "not recorded"))),
-        ("Instrument", doc["instrument"] or "not named"),
-        ("Site", site or "not stated"),
-        ("Operator", str(run.get("operator") or "not recorded")),
-        *((name.capitalize(), str(run[name])) for name in ABOUT if run.get(name)),
-        ("Method", doc["method"]),
-        ("Data", f"simulated, system {doc['system']}" if doc["simulated"] else f"measured, system {doc['system']}"),
+def opening(report: Report[Result], title: str) -> list[Section]:
+    """Return the first sections of the report of a record: answer, set-up errors, coefficients under a title."""
+    return [
+        Section("Result and conformity", "answer", [answer(report)]),
+        Section("Simulated set-up errors", "setup-errors", setup_errors(report)),
+        Section(title, "coefficients", coefficients(report)),
     ]
-    return rows
+
+
+def closing(report: Report[Result]) -> list[Section]:
+    """Return the last sections of the report of a record."""
+    return [
+        Section("Method and provenance", "how", []),
+        Section("Model and conventions", "model", method_section.model(report.result), sub=True),
+        Section("System and test plan", "system", method_section.system(report), sub=True),
+        Section("Components, parameters and provenance", "provenance", how_tables(report), sub=True),
+        Section("Values at full precision", "values", method_section.full_values(report), sub=True),
+        Section("Statements and signatures", "signatures", signing(report)),
+    ]
+
+
+def head(report: Report[Result]) -> list[tuple[str, str]]:
+    """Return the lines at the head of a report: name and text."""
+    result, about = report.result, report.about
+    return [
+        ("Report", report.report_id),
+        ("Date", date(about.date or "not recorded")),
+        ("Instrument", result.instrument or "not named"),
+        ("Site", place(result.site) or "not stated"),
+        ("Operator", about.operator or "not recorded"),
+        *((name.capitalize(), text) for name in ABOUT if (text := getattr(about, name))),
+        ("Method", result.method),
+        ("Data", f"{'simulated' if result.simulated else 'measured'}, system {result.system}"),
+    ]
 
 
 def place(site: Mapping[str, Any]) -> str:
@@ -107,110 +110,96 @@ def _unit(key: str) -> str:
     return "" if not unit else unit if unit == "°" else f" {unit}"
 
 
-def answer(doc: Json) -> ResultSummary:
+def answer(report: Report[Result]) -> ResultSummary:
+    """Return the box with verdict, summary and warnings, and the table of the requirements."""
+    result, doc = report.result, report.document
     rows = []
-    for k, c in enumerate(doc["coefficients"]):
-        if c["limit"] is None:
-            continue
-        path, u = ("coefficients", k), c["u"]
-        rows.append(
-            Row(
-                [
-                    text_cell(c["name"], "strong"),
-                    text_cell(c["meaning"]),
-                    number_cell(doc, (*path, "estimate"), u),
-                    number_cell(doc, ("derived", "U", k), u),
-                    text_cell(c["unit"]),
-                    text_cell(limit_text(c["limit"])),
-                    text_cell(c["verdict"], c["verdict"]),
-                ]
-            )
-        )
-    columns = [
-        Column("requirement"),
-        Column("meaning", wide=True),
-        Column("estimate"),
-        Column("U (95 %)"),
-        Column("unit"),
-        Column("limit"),
-        Column("verdict"),
-    ]
-    table = Table(columns, rows, "Conformity with each requirement.") if rows else None
-    rule = doc["decision_rule"] if rows or doc["verdict"] != NO_VERDICT else ""
-    return ResultSummary(doc["verdict"], rule, doc["summary"], doc["warnings"], table)
+    for k, c in enumerate(result.coefficients):
+        if c.limit is not None:
+            cells = [
+                text_cell(c.name, "strong"),
+                text_cell(c.meaning),
+                number_cell(doc, ("coefficients", k, "estimate"), c.u),
+                number_cell(doc, ("derived", "U", k), c.u),
+                *(text_cell(x) for x in (c.unit, limit_text(c.limit))),
+                text_cell(c.verdict, c.verdict),
+            ]
+            rows.append(Row(cells))
+    heads = columns("requirement", "meaning", "estimate", "U (95 %)", "unit", "limit", "verdict", wide=("meaning",))
+    table = Table(heads, rows, "Conformity with each requirement.") if rows else None
+    rule = result.decision_rule if rows or result.verdict != NO_VERDICT else ""
+    return ResultSummary(result.verdict, rule, result.summary, result.warnings, table)
 
 
-def setup_errors(doc: Json) -> list[Any]:
+def setup_errors(report: Report[Result]) -> list[Any]:
     """Return what was set past the options of the test; nothing where nothing was."""
-    errors = [SetupError.model_validate(e) for e in doc["provenance"].get("setup_errors") or []]
-    if not errors:
-        return []
+    errors = report.run.setup_errors
     text = (
         "The simulated instrument or its set-up differs from what the test assumes. The estimates, their u and their "
         "verdicts do not allow for these errors."
     )
-    return [Text(text), BulletList([e.sentence() for e in errors], warn=True)]
+    return [Text(text), BulletList([e.sentence() for e in errors], warn=True)] if errors else []
 
 
-def coefficients(doc: Json) -> list[Any]:
-    limits = any(c["limit"] is not None for c in doc["coefficients"])
-    truth = any(c["truth"] is not None for c in doc["coefficients"])
-    columns = [
-        Column("name"),
-        Column("meaning", wide=True),
-        Column("estimate"),
-        Column("u"),
-        Column("95 % from"),
-        Column("to"),
-    ]
-    columns += [Column("truth"), Column("z")] if truth else []
-    columns += [Column("limit"), Column("verdict")] if limits else []
-    groups = unit_groups(doc["coefficients"])
+def coefficients(report: Report[Result]) -> list[Any]:
+    """Return the table of the coefficients, and why some have no value."""
+    result = report.result
+    limits = any(c.limit is not None for c in result.coefficients)
+    truth = any(c.truth is not None for c in result.coefficients)
+    heads = ["name", "meaning", "estimate", "u", "95 % from", "to"]
+    heads += [*(["truth", "z"] if truth else []), *(["limit", "verdict"] if limits else [])]
+    groups = unit_groups(result.coefficients)
     if not groups:
-        columns.insert(4, Column("unit"))
+        heads.insert(4, "unit")
     rows: list[Row] = []
-    for unit, members in groups or [("", list(range(len(doc["coefficients"]))))]:
+    for unit, members in groups or [("", list(range(len(result.coefficients))))]:
         rows += [heading(f"in {unit}")] if groups else []
-        for k in members:
-            c = doc["coefficients"][k]
-            path, u = ("coefficients", k), c["u"]
-            cells = [
-                text_cell(c["name"], "strong"),
-                text_cell(c["meaning"]),
-                text_cell("no value", "warn") if c["no_value"] else number_cell(doc, (*path, "estimate"), u),
-                number_cell(doc, (*path, "u"), u),
-                *([] if groups else [text_cell(c["unit"])]),
-                number_cell(doc, (*path, "interval", 0), u),
-                number_cell(doc, (*path, "interval", 1), u),
-            ]
-            if truth:
-                cells += [number_cell(doc, (*path, "truth"), u), number_cell(doc, (*path, "z"), 0.1)]
-            if limits:
-                verdict = c["verdict"] if c["limit"] is not None or c["no_value"] else "–"
-                cells += [text_cell(limit_text(c["limit"])), text_cell(verdict, verdict)]
-            rows.append(Row(cells))
+        rows += [Row(_coefficient(report, k, not groups, truth, limits)) for k in members]
     note = (
-        f"u: {_uncertainty(doc)}; estimates are rounded to its second significant digit. 95 % from, to: limits of the "
-        "coverage interval."
+        f"u: {_uncertainty(report)}; estimates are rounded to its second significant digit. 95 % from, to: limits of "
+        "the coverage interval."
     )
     if truth:
         note += " Truth: true value in the simulation; z = (estimate − truth) / u."
     if not limits:
         note += " No specification was applied; conformity is not stated."
-    missing = no_values((c["name"], c["no_value"]) for c in doc["coefficients"])
-    table = [Table(columns, rows, f"Coefficients. {note}")] if rows else []
+    missing = no_values((c.name, c.no_value) for c in result.coefficients)
+    table = [Table(columns(*heads, wide=("meaning",)), rows, f"Coefficients. {note}")] if rows else []
     return [*table, BulletList(missing, warn=True)] if missing else table
 
 
-def _uncertainty(doc: Json) -> str:
+def _coefficient(report: Report[Result], k: int, unit: bool, truth: bool, limits: bool) -> list[Cell]:
+    """Return the cells of a coefficient, with those that its table has."""
+    c: Coefficient = report.result.coefficients[k]
+
+    def number(*path: str | int, u: float = c.u) -> Cell:
+        return number_cell(report.document, ("coefficients", k, *path), u)
+
+    cells = [
+        text_cell(c.name, "strong"),
+        text_cell(c.meaning),
+        text_cell("no value", "warn") if c.no_value else number("estimate"),
+        number("u"),
+        *([text_cell(c.unit)] if unit else []),
+        number("interval", 0),
+        number("interval", 1),
+        *([number("truth"), number("z", u=0.1)] if truth else []),
+    ]
+    if limits:
+        verdict = c.verdict if c.limit is not None or c.no_value else "–"
+        cells += [text_cell(limit_text(c.limit)), text_cell(verdict, verdict)]
+    return cells
+
+
+def _uncertainty(report: Report[Result]) -> str:
     """Return what u is: combined, or of type A only, and why."""
-    run = doc["provenance"]
-    valued = [c for c in doc["coefficients"] if c["u"] is not None]
-    if any(c["u_a"] is None or c["u"] > c["u_a"] * (1.0 + 1e-9) for c in valued):
+    valued = [c for c in report.result.coefficients if math.isfinite(c.u)]
+    if any(c.u_a is None or c.u > c.u_a * (1.0 + 1e-9) for c in valued):
         return "combined standard uncertainty"
-    if not run.get("measured"):
+    run = report.about
+    if not isinstance(run, Provenance) or not run.measured:
         return "standard uncertainty, type A only (no uncertainty of type B was set)"
-    why = "type B is declared absent" if run.get("type_b") == "none" else "no statement of type B"
+    why = "type B is declared absent" if run.type_b == "none" else "no statement of type B"
     return f"standard uncertainty, type A only: {why}"
 
 
@@ -218,10 +207,9 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _channels(run: Json, record: Mapping[str, Any]) -> list[Any]:
+def _channels(run: Provenance, record: Mapping[str, Any]) -> list[Any]:
     """Return the figure of the channels that the system shows."""
-    units = run.get("units") or {}
-    shown = channel_figure.panels(record, units, run.get("shown") or ())
+    shown = channel_figure.panels(record, run.units, run.shown)
     caption = (
         "Recorded channels against time. Long records are drawn as the envelope of minimum and maximum in each "
         "interval."
@@ -229,58 +217,46 @@ def _channels(run: Json, record: Mapping[str, Any]) -> list[Any]:
     names = [n for panel in shown for n in panel]
     left = [n for n in record if n != "time" and n not in names]
     caption += f" Not drawn: {', '.join(left)}." if left else ""
-    svg = channel_figure.draw(record, shown, units, "channels", run.get("plan") or ()) if shown else ""
+    svg = channel_figure.draw(record, shown, run.units, "channels", run.plan) if shown else ""
     alt = "Recorded channels against time: " + ", ".join(names)
     return pictures(Picture("channels", svg, caption, alt, zoom=True))
 
 
-def _measured(doc: Json, record: Mapping[str, Any]) -> list[Any]:
-    curves = [s for s in doc["series"] if plots.is_curve(s)]
-    blocks: list[Any] = responses.blocks(doc)
+def _measured(report: Report[RunResult], record: Mapping[str, Any]) -> list[Any]:
+    result = report.result
+    blocks = [*responses.blocks(report), *_fits(result.series), *_channels(report.run, record)]
+    rows = []
+    for k, s in enumerate(result.series):
+        count = str(len(s.y))
+        moments = [
+            number_cell(report.document, ("derived", "series", k, name), result.residual_std)
+            for name in ("mean", "residual_rms")
+        ]
+        windows = Cell(text=count, whole=count, full=count, number=True)
+        rows.append(Row([text_cell(s.label), windows, text_cell(f"{s.y_name} / ({s.y_unit})"), *moments]))
+    if rows:
+        caption = "Measured series: mean of the windows and rms residual, in the unit of the quantity."
+        heads = columns("series", "windows", "quantity", "mean", "residual rms", wide=("series",))
+        blocks.append(Table(heads, rows, caption))
+    return blocks
+
+
+def _fits(series: Sequence[Series]) -> list[Any]:
+    """Return the figures of the series with their fits, two in each, the richest record first."""
+    groups = plots.by_axis(series)
+    curves = [s for alike in groups for s in alike]
+    blocks: list[Any] = []
     number = 0
-    axes = Counter(axis for s in curves for axis in [(s["x_name"], s["x_unit"])] * len(s["x"]))
-    for axis, _ in axes.most_common():  # the richest record first
-        alike = [s for s in curves if (s["x_name"], s["x_unit"]) == axis]
+    for alike in groups:
         for k in range(0, len(alike), 2):
             pair = alike[k : k + 2]
             number += 1
             key = f"fit-{number}"
-            both = " and ".join(f"“{s['label']}”" for s in pair)
+            both = " and ".join(f"“{s.label}”" for s in pair)
             caption = (
-                f"{_capital(pair[0]['y_name'])} against {axis[0]}, {both}. Points: window means; line: fitted model; "
-                f"lower panel: residuals. A pattern in the residuals is evidence against the model."
+                f"{_capital(pair[0].y_name)} against {pair[0].x_name}, {both}. Points: window means; line: fitted "
+                "model; lower panel: residuals. A pattern in the residuals is evidence against the model."
             )
             alt = f"Points and fitted curve with residuals: {both}"
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, curves), caption, alt))
-    blocks += _channels(doc["provenance"], record)
-    rows = []
-    for k, s in enumerate(doc["series"]):
-        rows.append(
-            Row(
-                [
-                    text_cell(s["label"]),
-                    Cell(text=str(len(s["y"])), whole=str(len(s["y"])), full=str(len(s["y"])), number=True),
-                    text_cell(f"{s['y_name']} / ({s['y_unit']})"),
-                    *(
-                        number_cell(doc, ("derived", "series", k, name), doc["residual_std"])
-                        for name in ("mean", "residual_rms")
-                    ),
-                ]
-            )
-        )
-    columns = [
-        Column("series", wide=True),
-        Column("windows"),
-        Column("quantity"),
-        Column("mean"),
-        Column("residual rms"),
-    ]
-    if rows:
-        blocks.append(
-            Table(
-                columns,
-                rows,
-                "Measured series: mean of the windows and rms residual, in the unit of the quantity.",
-            )
-        )
     return blocks

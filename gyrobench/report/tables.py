@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from gyrobench.report.numbers import write_number
+from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     BulletList,
     Cell,
     CollapsedBlocks,
-    Column,
     Row,
     Table,
     Text,
+    columns,
     number_cell,
     text_cell,
 )
-from gyrobench.report.result_json import value_at
+from gyrobench.report.result_json import Report, value_at
+from gyrobench.result import Coefficient
+from gyrobench.result import Table as MethodTable
 
 # endings of names that tell the unit, longest first
 _UNITS = {
@@ -37,6 +39,7 @@ _UNITS = {
     "_h": "h",
     "_m": "m",
 }
+SYMBOLS = {"frequency": "f", "amplitude": "A"}  # of heads that have a column u(symbol)
 
 
 def words(key: str) -> tuple[str, str]:
@@ -54,17 +57,39 @@ def heading(text: str) -> Row:
     return Row([], group=text)
 
 
-def unit_groups(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[int]]]:
-    """Numbers of the rows by their "unit", units in the order in which they come.
+def unit_groups(coefficients: Sequence[Coefficient]) -> list[tuple[str, list[int]]]:
+    """Return the numbers of the coefficients by their unit, units in the order in which they come.
 
     Empty where most units have one row only, as in loop tests: there the unit belongs into a column, for headings
     would tear the table.
     """
     by_unit: dict[str, list[int]] = {}
-    for k, row in enumerate(rows):
-        by_unit.setdefault(str(row["unit"]), []).append(k)
+    for k, c in enumerate(coefficients):
+        by_unit.setdefault(c.unit, []).append(k)
     alone = sum(len(members) == 1 for members in by_unit.values())
     return [] if 2 * alone > len(by_unit) > 1 else list(by_unit.items())
+
+
+def method_table(doc: Any, path: tuple[str | int, ...], table: MethodTable, wide: Collection[str] = ()) -> list[Any]:
+    """Return a table of a method as a block, none where it has no rows.  wide: heads that take the room that is left.
+
+    Numbers are rounded to the column "u(symbol)" of their own or "u" where there is one; a column "p" is written as
+    probabilities, a "difference", which may be far below u, to two digits.
+    """
+    heads = [str(h) for h in table.columns]
+    rows = []
+    for i, values in enumerate(table.rows):
+        beside = dict(zip(heads, values, strict=False))
+        cells = []
+        for j, head in enumerate(heads):
+            u = beside.get(f"u({SYMBOLS.get(words(head)[0], words(head)[0])})") or beside.get("u")
+            shown: dict[str, Any] = {"significant": 2} if head == "difference" else {"u": u}
+            if head == "p" or head.startswith("p "):
+                shown = {"write": write_p}
+            cells.append(number_cell(doc, (*path, "rows", i, j), **shown))
+        rows.append(Row(cells))
+    caption = ". ".join(t.rstrip(".") for t in (table.title, table.caption) if t)
+    return [Table(columns(*map(words, heads), wide=wide), rows, f"{caption}.")] if rows else []
 
 
 def limit_text(limit: Sequence[float | None] | None) -> str:
@@ -101,15 +126,10 @@ def render_value(
             for k in flat:
                 name, unit = words(k)
                 rows.append(Row([text_cell(name), _cell(doc, (*path, k), None, significant), text_cell(unit)]))
-            blocks.append(Table([Column("quantity"), Column("value"), Column("unit")], rows, caption))
+            blocks.append(Table(columns("quantity", "value", "unit"), rows, caption))
         for k in nested:
-            blocks += render_value(
-                doc,
-                (*path, k),
-                f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption,
-                by_u,
-                significant,
-            )
+            text = f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption
+            blocks += render_value(doc, (*path, k), text, by_u, significant)
         return blocks
     if _is_rows(value):
         keys = list(dict.fromkeys(k for row in value for k in row))
@@ -117,7 +137,7 @@ def render_value(
             next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value
         ]
         rows = [Row([_cell(doc, (*path, i, k), us[i], significant) for k in keys]) for i in range(len(value))]
-        return [Table([Column(*words(k)) for k in keys], rows, caption)]
+        return [Table(columns(*map(words, keys)), rows, caption)]
     return [Text(f"{caption.rstrip('.')}: {compact(value)}.")]
 
 
@@ -151,100 +171,65 @@ def compact(value: Any, length: int = 72) -> str:
     return f"{text[:length]}…{count}"
 
 
-def how_tables(doc: Any) -> list[Any]:
-    """Parts, parameters, run and versions."""
-    run = doc["provenance"]
+def how_tables(report: Report[Any]) -> list[Any]:
+    """Return parts, parameters, settings of the run and versions."""
+    run, doc = report.run, report.document
     blocks: list[Any] = []
-    if isinstance(run.get("parts"), Mapping) and run["parts"]:
+    if run.parts:
         rows = []
-        for slot, part in run["parts"].items():
-            part = part if isinstance(part, Mapping) else {"name": part}
-            rows.append(
-                Row(
-                    [
-                        text_cell(slot, "strong"),
-                        text_cell(part.get("name")),
-                        text_cell(part.get("version")),
-                        text_cell(" ".join(str(part[k]) for k in ("target",) if part.get(k))),
-                        text_cell(part.get("fmi")),
-                        number_cell(doc, ("provenance", "timing", slot), significant=3),
-                        Cell(str(part.get("sha256") or "–"), mark="hash"),
-                    ]
-                )
-            )
-        heads = (
-            ("slot", ""),
-            ("component", ""),
-            ("version", ""),
-            ("target", ""),
-            ("FMI", ""),
-            ("time", "s"),
-            ("SHA-256", ""),
-        )
-        columns = [Column(h, unit, wide=h == "SHA-256") for h, unit in heads]
-        blocks.append(Table(columns, rows, "Components in their slots, with the computing time of each.", small=True))
-    blocks += _changed(doc) + _defaults(doc)
-    facts = [k for k in ("seed", "step", "engine", "complete", "stopped_at") if run.get(k) is not None]
-    if facts:
-        units = {"step": "s", "stopped_at": "s"}
-        rows = [
-            Row(
-                [
-                    text_cell({"stopped_at": "end of the run"}.get(k, k)),
-                    _cell(doc, ("provenance", k), None, 8),
-                    text_cell(units.get(k, "")),
-                ]
-            )
-            for k in facts
-        ]
-        blocks.append(Table([Column("setting"), Column("value"), Column("unit")], rows, "Settings of the run."))
-    if run.get("data"):
-        blocks += render_value(doc, ("provenance", "data"), "Data reduced.")
-    if run.get("notes"):
-        blocks.append(BulletList([str(n) for n in run["notes"]]))
-    if run.get("versions"):
-        rows = [Row([text_cell(k), text_cell(v)]) for k, v in run["versions"].items()]
-        blocks.append(
-            CollapsedBlocks(
-                "Package versions",
-                [Table([Column("package"), Column("version")], rows, "Package versions.", small=True)],
-            )
-        )
+        for slot, part in run.parts.items():
+            names = [text_cell(x or None) for x in (part.name, part.version, part.target, part.fmi)]
+            time = number_cell(doc, ("provenance", "timing", slot), significant=3)
+            rows.append(Row([text_cell(slot, "strong"), *names, time, Cell(part.sha256 or "–", mark="hash")]))
+        heads = columns("slot", "component", "version", "target", "FMI", ("time", "s"), "SHA-256", wide=("SHA-256",))
+        blocks.append(Table(heads, rows, "Components in their slots, with the computing time of each.", small=True))
+    blocks += _changed(report) + _defaults(report)
+    facts = {"seed": "", "step": "s", "engine": "", "complete": "", "stopped_at": "s"}
+    rows = [
+        Row([text_cell("end of the run" if k == "stopped_at" else k), _cell(doc, ("provenance", k), None, 8),
+             text_cell(unit)])
+        for k, unit in facts.items()
+        if value_at(doc, "provenance", k) is not None
+    ]  # fmt: skip
+    if rows:
+        blocks.append(Table(columns("setting", "value", "unit"), rows, "Settings of the run."))
+    blocks += render_value(doc, ("provenance", "data"), "Data reduced.")
+    if run.notes:
+        blocks.append(BulletList(run.notes))
+    if run.versions:
+        rows = [Row([text_cell(k), text_cell(v)]) for k, v in run.versions.items()]
+        table = Table(columns("package", "version"), rows, "Package versions.", small=True)
+        blocks.append(CollapsedBlocks("Package versions", [table]))
     return blocks
 
 
-def _changed(doc: Any) -> list[Any]:
+def _changed(report: Report[Any]) -> list[Any]:
     """Return what was changed against the defaults: parameters, options, swapped parts."""
-    run = doc["provenance"]
-    changed = [str(c) for c in (run.get("changed") or [])]
-    if not changed:
+    run = report.run
+    if not run.changed:
         text = "No option, parameter or component differs from its default."
-        return [Text(text)] if run.get("parameters") or run.get("options") else []
+        return [Text(text)] if run.parameters or run.options else []
     rows = []
-    for name in changed:
-        where = next((k for k in ("parameters", "options") if name in (run.get(k) or {})), "")
-        value = _plain(doc, ("provenance", where, name)) if where else text_cell("changed")
+    for name in run.changed:
+        where = "parameters" if name in run.parameters else "options" if name in run.options else ""
+        value = _plain(report.document, ("provenance", where, name)) if where else text_cell("changed")
         rows.append(Row([text_cell(name, "strong"), value]))
-    return [
-        Table(
-            [Column("changed"), Column("value (SI)")],
-            rows,
-            "Options, parameters and components that differ from their defaults, in SI units.",
-            small=True,
-        )
-    ]
+    caption = "Options, parameters and components that differ from their defaults, in SI units."
+    return [Table(columns("changed", "value (SI)"), rows, caption, small=True)]
 
 
-def _defaults(doc: Any) -> list[Any]:
+def _defaults(report: Report[Any]) -> list[Any]:
     """Options and parameters that stand at their defaults, folded."""
-    run = doc["provenance"]
-    changed = {str(c) for c in (run.get("changed") or [])}
+    run = report.run
     blocks: list[Any] = []
-    for key, what in (("options", "options of the system"), ("parameters", "parameters of the components")):
-        names = [n for n in (run.get(key) or {}) if n not in changed]
+    for key, values, what in (
+        ("options", run.options, "options of the system"),
+        ("parameters", run.parameters, "parameters of the components"),
+    ):
+        names = [n for n in values if n not in run.changed]
         if names:
-            rows = [Row([text_cell(n), _plain(doc, ("provenance", key, n))]) for n in names]
+            rows = [Row([text_cell(n), _plain(report.document, ("provenance", key, n))]) for n in names]
             caption = f"{what.capitalize()} at their default values, in SI units."
-            table = Table([Column("name"), Column("value (SI)")], rows, caption, small=True)
+            table = Table(columns("name", "value (SI)"), rows, caption, small=True)
             blocks.append(CollapsedBlocks(f"Defaults: {len(names)} {what}", [table]))
     return blocks

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from gyrobench.report.style import BLUE, INK, MM, PAPER, VERMILION, WIDE, figure, styled, svg
 
@@ -17,22 +16,12 @@ PAD = 1.2  # mm, around a text
 GAP = 0.8  # mm, between columns
 
 
-def wires_of(provenance: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """(from slot, variable, to slot, variable) of each wire.
-
-    A wire is "a.x -> b.y", a pair of ends, or a dictionary with "wire" or with "from" and "to"; one that is marked as
-    not connected is left out.
-    """
+def ends_of(wires: Sequence[str]) -> list[tuple[str, str, str, str]]:
+    """Return slot and variable of both ends of connections "a.x -> b.y"."""
     out = []
-    for wire in provenance.get("wires") or []:
-        if isinstance(wire, Mapping):
-            if not wire.get("connected", True):
-                continue
-            wire = wire["wire"] if "wire" in wire else (wire.get("from"), wire.get("to"))
-        ends = re.split(r"\s*->\s*", wire) if isinstance(wire, str) else [str(e) for e in wire]
-        if len(ends) == 2 and all("." in e for e in ends):
-            (a, x), (b, y) = (e.split(".", 1) for e in ends)
-            out.append((a, x, b, y))
+    for wire in wires:
+        (a, x), (b, y) = (end.strip().split(".", 1) for end in wire.split("->"))
+        out.append((a, x, b, y))
     return out
 
 
@@ -120,22 +109,20 @@ def broken_name(name: str, longest: float) -> list[str]:
     return lines
 
 
-def draw(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str:
+def draw(order: Sequence[str], wires: Sequence[str], key: str) -> str:
     """Return the SVG: parts on the diagonal in execution order, wires above it forward, below it backward.
 
-    A wire below the diagonal carries the value of the step before: it is drawn dashed.  ``provenance`` holds the
-    "wires"; the SVG can also stand alone.
+    A wire below the diagonal carries the value of the step before: it is drawn dashed.  The SVG can also stand alone.
     """
     with styled():
-        return _n_squared(order, provenance, key)
+        return _n_squared(order, [w for w in ends_of(wires) if w[0] in order and w[2] in order], key)
 
 
-def _n_squared(order: Sequence[str], provenance: Mapping[str, Any], key: str) -> str:
+def _n_squared(order: Sequence[str], wires: Sequence[tuple[str, str, str, str]], key: str) -> str:
     from matplotlib.patches import Rectangle
 
     if len(order) < 2:
         return ""
-    wires = [w for w in wires_of(provenance) if w[0] in order and w[2] in order]
     places = layout(order, wires)
     fig, axes = figure((places.width + 2.0) * MM, places.height + 2.0)  # wider than the page: it is made smaller there
     ax = axes[0, 0]

@@ -43,7 +43,7 @@ from gyrobench.system.values import InvalidValueError, flatten
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
-    from gyrobench.result import Reason, Result, Specification
+    from gyrobench.result import Reason, Result, Specification, StepCheck
     from gyrobench.system.part_values import PartValues
 
 __all__ = [
@@ -263,7 +263,7 @@ class System(Configurable):
         self,
         record: Record,
         limits: Specification | None = None,
-        step_check: Mapping[str, Any] | None = None,
+        step_check: StepCheck | None = None,
         reasons: Sequence[Reason] = (),
     ) -> Result:
         """Return the result of a record: its findings, judged.  Raises as :meth:`findings`.

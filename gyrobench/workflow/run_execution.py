@@ -13,7 +13,7 @@ from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Coefficient, Reason, Specification
+from gyrobench.result import Coefficient, Reason, Specification, StepChange, StepCheck
 from gyrobench.system.system import System
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
@@ -140,7 +140,7 @@ def _report(
     with record_kept(folder, record):
         if not system.has_reduction:
             return RunOutcome(record, folder=folder)
-        check: dict[str, Any] = {}
+        check: StepCheck | None = None
         by_default = bool(system.loops) or system.closed_loop
         wanted = by_default if request.check_step is None else request.check_step
         if wanted and record.complete:
@@ -162,7 +162,7 @@ def _report(
 
 def check_step(
     session: Session, system: System, seed: int, step: float, feedback: Feedback = SILENT, short: bool = False
-) -> dict[str, Any]:
+) -> StepCheck:
     """Return what the step does to each coefficient, from two runs with the noise off; see reduction.step_effect.
 
     The second run has half the step.  short: twice the step, in a quarter of the time, and the shortest holds that the
@@ -186,7 +186,7 @@ def check_step(
 
     start = time.perf_counter()
     at_step = coefficients(step)
-    rows: list[dict[str, Any]] = []
+    rows: list[StepChange] = []
     factor = 2.0 if short else 0.5
     if any(not c.no_value for c in at_step):
         try:
@@ -199,4 +199,4 @@ def check_step(
         if not rows:
             factor = 0.5
             rows = step_effects(at_step, coefficients(factor * step), factor)
-    return {"step": step, "other": factor * step, "seconds": time.perf_counter() - start, "rows": rows}
+    return StepCheck(step, rows, factor * step, time.perf_counter() - start)

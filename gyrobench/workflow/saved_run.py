@@ -12,7 +12,8 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Result
+from gyrobench.result import Result, StepCheck
+from gyrobench.result_content import typed
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_limits
 from gyrobench.workflow.user_errors import PostRunError, record_kept
@@ -59,16 +60,25 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
     limits = load_limits(spec)
     with record_kept(folder, record):
         old = folder / "result.json"  # the step check needs further runs and is kept
-        check = (reading.json_object(reading.read_text(old, RecordError), old, RecordError).get("step_check") or {}
-                 ) if old.exists() else {}  # fmt: skip
+        check = _step_check(old) if old.exists() else None
         try:
-            result = system.reduce(record, limits, check if "other" in check else None)
+            result = system.reduce(record, limits, check)
         except GyrobenchError:
             if record.complete:
                 raise
             missing = missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
         return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
+
+
+def _step_check(file: Path) -> StepCheck | None:
+    """Return the step check of a result.json.  Raises RecordError for one that cannot be read."""
+    held = reading.json_object(reading.read_text(file, RecordError), file, RecordError).get("step_check") or {}
+    try:
+        check: StepCheck = typed(StepCheck, held)
+    except TypeError:  # none, or of before the step was in u
+        return None
+    return None if check.other is None else check
 
 
 def missing_windows(record: Record) -> str:

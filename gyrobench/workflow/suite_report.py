@@ -162,7 +162,7 @@ def _load_member(folder: Path, label: str) -> Member:
         changed=run.changed, result_sha256=hashlib.sha256(text.encode()).hexdigest(),
         record_sha256=_record_hash(folder), data=run.data, versions=run.versions or None,
         parts={s: PartInfo(name=p.name, version=p.version, sha256=p.sha256) for s, p in run.parts.items()},
-        step_check=(result.step_check or {}).get("worst"), complete=run.complete,
+        step_check=result.step_check.worst if result.step_check else None, complete=run.complete,
     )  # fmt: skip
     return Member(result, test)
 

@@ -44,6 +44,7 @@ from gyrobench.reduction.toolkit import (
     truth_of,
     window_problems,
 )
+from gyrobench.result import Harmonic
 from gyrobench.units import ARCSEC
 
 from . import budget, closed
@@ -249,8 +250,8 @@ class Reduction(DriftTest[MultipointSetup]):
         """Return the result with the harmonics of each mount."""
         return replace(result, harmonics=self._harmonics())
 
-    def _harmonics(self) -> list[dict[str, Any]]:
-        out: list[dict[str, Any]] = []
+    def _harmonics(self) -> list[Harmonic]:
+        out = []
         for m in self.v.mounts:
             mine = self.v.mount == m
             n, uneven = closed.spacing(self.v.angle[mine])
@@ -261,7 +262,7 @@ class Reduction(DriftTest[MultipointSetup]):
             for n in range(4):
                 b = h[f"B{n}"] / UG if n else None
                 size = u * (math.sqrt(2.0) if n else 1.0)
-                out.append({"series": f"mount {m}", "n": n, "a": h[f"A{n}"] / UG, "b": b, "u": size, "unit": "µg"})
+                out.append(Harmonic(f"mount {m}", n, h[f"A{n}"] / UG, b, size, "µg"))
         return out
 
     def _reasons(self) -> list[Reason]:

@@ -178,7 +178,9 @@ class CurrentChannel(DriftTest[EightPositionSetup]):
         parts = residual_series.stretches(np.asarray(w["t_start"], float), np.asarray(w["t_end"], float), off)
         allan, psd = residual_series.allan(parts), residual_series.spectrum(parts)
         return replace(
-            result, allan={**allan, "unit": "°/h"} if allan else {}, psd={**psd, "unit": "(°/h)²/Hz"} if psd else {}
+            result,
+            allan=None if allan is None else replace(allan, unit="°/h"),
+            psd=None if psd is None else replace(psd, unit="(°/h)²/Hz"),
         )
 
     def account(self, found: Findings) -> Account:

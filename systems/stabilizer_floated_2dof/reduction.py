@@ -88,9 +88,9 @@ class Reduction(LoopTest):
         found, white = self.found, self.run.parameters.get("gyro.white_x")
         found.drift(gate, ANGLE, truth=self._truth(float(np.mean(gate[ANGLE]))))  # the command has turned it
         found.coefficients = [c for c in found.coefficients if c.name != "N"]
-        if not found.allan:
+        if (allan := found.allan) is None:
             return
-        tau, dev, low, high = (np.array(found.allan[n], float) for n in ("tau", "dev", "lo", "hi"))
+        tau, dev, low, high = (np.asarray(x) for x in (allan.tau, allan.dev, allan.lo, allan.hi))
         wide = tau >= 0.5
         if np.count_nonzero(wide) < 3:
             return

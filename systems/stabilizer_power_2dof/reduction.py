@@ -146,7 +146,7 @@ class Reduction(LoopTest):
 
     def _servo(self, gate: Gate) -> None:
         """Measure what the torque adds to the platform's own drift."""
-        d, own = drift(gate.t, _platform(gate)), self.own or Drift(0.0, 0.0, {}, None)
+        d, own = drift(gate.t, _platform(gate)), self.own or Drift(0.0, 0.0, None, None)
         self.found.measure("servo rate", "turned by M_y on the precession axis, −M_y/H", "°/h", d.rate - own.rate,
                            math.hypot(d.u, own.u), scale=DPH, closed=-gate.amplitude / self.gyro["H"])  # fmt: skip
 

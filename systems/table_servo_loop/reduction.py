@@ -47,7 +47,7 @@ class Reduction(LoopTest):
         found.warn("table_servo.no_shaper", "" if self.shaper else NO_SHAPER)
         own = drift(self.hold.t, self.hold[ANGLE]) if self.hold is not None else None
         if self.shaper:
-            self._hung(own or Drift(0.0, 0.0, {}, None))
+            self._hung(own or Drift(0.0, 0.0, None, None))
             self._limits(found.open_loop("stabilizer", ERROR, COMMAND, kind="command"))
         else:
             self._square_law()

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from gyrobench.reduction.toolkit import (
     Table,
     window_problems,
 )  # fmt: skip
+from gyrobench.result import Harmonic
 from gyrobench.units import DPH
 
 from . import closed, geometry
@@ -133,7 +133,7 @@ class Reduction(RestTest[TwoAxisSetup]):
 
     # ----------------------------------------------------------------------------------------- harmonic route
     def closed(self, y: Array) -> dict[str, float]:
-        self.harmonics: list[dict[str, Any]] = []
+        self.harmonics: list[Harmonic] = []
         self.checks: list[Table] = []
         book, self.no_closed = self._harmonic_route(y)
         if self.setup.harmonic and self.no_closed:
@@ -161,8 +161,8 @@ class Reduction(RestTest[TwoAxisSetup]):
             return {}, why
         A, B = closed.amplitudes(at, mean, s.m, s.n)
         for j, f in enumerate([0, *geometry.frequencies(s.m, s.n)]):
-            one = {"series": f"positions {s.m}:{s.n}", "n": f, "a": float(A[j]) / DPH, "u": None, "unit": "°/h"}
-            self.harmonics.append({**one, "b": float(B[j]) / DPH if j else None})
+            b = float(B[j]) / DPH if j else None
+            self.harmonics.append(Harmonic(f"positions {s.m}:{s.n}", f, float(A[j]) / DPH, b, None, "°/h"))
         value = {"A": A / DPH, "B": B / DPH}
         checks = [[f"{a}{i} − ({'−' if sign < 0 else ''}{b}{j})", value[a][i], value[a][i] - sign * value[b][j]]
                   for a, i, sign, b, j in closed.TIES]  # fmt: skip

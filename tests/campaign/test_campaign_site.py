@@ -230,8 +230,9 @@ def wait(browser: Browser, condition: str) -> None:
 
 
 # ----------------------------------------------------------------------------------------------------- lot
-def test_what_the_whole_lot_warns_of_singles_out_nobody(tmp_path: Path) -> None:
-    lot = synthetic.lot(tmp_path / "lot", 30, remark="Inconclusive instead of pass: D_{k}. State u_remount.")
+@pytest.mark.parametrize("ids", [True, False], ids=["ids", "0.1.0"])
+def test_what_the_whole_lot_warns_of_singles_out_nobody(tmp_path: Path, ids: bool) -> None:
+    lot = synthetic.lot(tmp_path / "lot", 30, remark="Inconclusive instead of pass: D_{k}. State u_remount.", ids=ids)
     doc = analyse(Campaign.open(lot))
     assert [i["instrument"] for i in doc["lot"]["instruments"] if i["why"]] == ["gyro 3", "gyro 11", "gyro 20"]
     assert doc["lot"]["common"] == [{"warning": "Inconclusive instead of pass: D_0. State u_remount.", "runs": 29}]

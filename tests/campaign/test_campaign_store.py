@@ -65,7 +65,7 @@ def test_order_and_files_of_the_rows_change_no_bit(tmp_path: Path) -> None:
     frame = campaign.table()
     assert list(frame.columns) == [
         "run", "index", "system", "seed", "data", "state", "reason", "in.T", "a.estimate", "a.u", "b.estimate",
-        "c.estimate", "c.truth", "verdict", "warnings", "report", "instrument", "date",
+        "c.estimate", "c.truth", "verdict", "warnings", "warning_ids", "report", "instrument", "date",
     ]  # fmt: skip
     assert frame["index"].tolist() == [0, 1, 2, 3]
     assert campaign.units == UNITS == frame.attrs["units"]

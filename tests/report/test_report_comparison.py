@@ -4,7 +4,7 @@ import math
 
 import pytest
 from reading import pdf_text
-from simulated import tumble
+from simulated import tumble, with_coefficient
 
 from gyrobench import report
 
@@ -53,9 +53,8 @@ def test_one_figure_per_measure(compared):
 
 
 def test_coefficients_of_other_name_or_unit_are_not_subtracted(tmp_path):
-    a, b = tumble(windows=12), tumble(windows=12)
-    b.coefficients[0].name = "D_F + D_OO·X²"
-    b.coefficients[1].unit = "rad/s"
+    a = tumble(windows=12)
+    b = with_coefficient(with_coefficient(a, 0, name="D_F + D_OO·X²"), 1, unit="rad/s")
     paths = report.compare([("a", a), ("b", b)], tmp_path, formats=("json", "html"))
     import json
 

@@ -18,10 +18,10 @@ from gyrobench.report.assets import read_content
 from gyrobench.report.channel_figure import panels, scaled
 from gyrobench.report.comparison_page import comparison
 from gyrobench.report.responses import blocks, draw
-from gyrobench.report.result_json import document
+from gyrobench.report.result_json import Report, document
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
-from gyrobench.result import Coefficient, LoopResult, Response, Result
+from gyrobench.result import Coefficient, Curve, LoopResult, Response, Result
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import load_system
 
@@ -40,12 +40,7 @@ def responses(gain: float) -> list[Response]:
     def phase(x: np.ndarray) -> list[float]:
         return np.degrees(np.unwrap(np.angle(loop(x)))).tolist()
 
-    curve = {
-        "label": "linear, continuous",
-        "x": dense.tolist(),
-        "y": np.abs(loop(dense)).tolist(),
-        "phase": phase(dense),
-    }
+    curve = Curve("linear, continuous", dense.tolist(), np.abs(loop(dense)).tolist(), phase(dense))
     t = np.linspace(0, 1, 50)
     axis = {"x_name": "frequency", "x_unit": "Hz"}
     return [
@@ -91,9 +86,8 @@ def test_each_response_has_its_figure(written: Written) -> None:
     for k in (1, 2, 3):
         assert f'id="figure-response-{k}"' in html
     assert re.findall(r'id="figure-response-(\d)"', html) == ["1", "2", "3"]
-    turned = result()
-    turned.responses = turned.responses[::-1]  # step, ratio, open loop: the open loop comes first
-    keys = [b.items[0].key for b in blocks(document(turned)) if hasattr(b, "items")]
+    turned = dataclasses.replace(result(), responses=responses(2.0)[::-1])  # step, ratio, open loop: that comes first
+    keys = [b.items[0].key for b in blocks(Report.of(turned)) if hasattr(b, "items")]
     assert keys == ["response-3", "response-1", "response-2"]
     assert "The design matrix has rank" not in html and "Residual standard deviation" not in html
 
@@ -120,11 +114,10 @@ def test_comparison_lays_responses_over_each_other(tmp_path: Any) -> None:
 
 def test_phases_a_turn_apart_are_drawn_together() -> None:
     """The second run's phase is written 360 degrees lower: the figure is the same as with it at the same turn."""
-    a, b = responses(2.0)[0], responses(2.0)[0]
-    b.phase = [p - 360.0 for p in b.phase]
+    a = responses(2.0)[0]
+    b = dataclasses.replace(a, phase=[p - 360.0 for p in a.phase])
     with styled():
-        one = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(a))], "k")
-        two = draw([("a", dataclasses.asdict(a)), ("b", dataclasses.asdict(b))], "k")
+        one, two = draw([("a", a), ("b", a)], "k"), draw([("a", a), ("b", b)], "k")
     assert one == two
 
 
@@ -132,18 +125,20 @@ def test_units_of_a_loop_stand_in_a_column(tmp_path: Any) -> None:
     """Gain margin in dB, crossover in Hz, stiffness in N·m/rad: headings would make as many groups as rows."""
     loop = result()
     first = loop.coefficients[0]
-    loop.coefficients += [dataclasses.replace(first, name=f"other {unit}", unit=unit) for unit in ("Hz", "s", "V")]
+    loop.coefficients.extend(dataclasses.replace(first, name=f"other {unit}", unit=unit) for unit in ("Hz", "s", "V"))
     html = Written(report.write(loop, tmp_path)).paths["html"].read_text(encoding="utf-8")
     assert ">unit<" in html and ">Hz<" in html and ">in Hz<" not in html
-    loop.coefficients += [dataclasses.replace(first, name=f"further {unit}", unit=unit) for unit in ("Hz", "s", "V")]
+    loop.coefficients.extend(dataclasses.replace(first, name=f"further {unit}", unit=unit) for unit in ("Hz", "s", "V"))
     html = Written(report.write(loop, tmp_path)).paths["html"].read_text(encoding="utf-8")
     assert ">in Hz<" in html and ">in s<" in html
 
 
 def test_a_ratio_of_one_is_no_figure_of_rounding_errors() -> None:
-    ratio = dataclasses.asdict(responses(1.0)[1])
-    n = len(ratio["x"])
-    flat, rounded = ({**ratio, "y": [1.0 - k * 1e-16 * (i % 3) for i in range(n)], "u": [0.0] * n} for k in (0, 1))
+    ratio = responses(1.0)[1]
+    n = len(ratio.x)
+    flat, rounded = (
+        dataclasses.replace(ratio, y=[1.0 - k * 1e-16 * (i % 3) for i in range(n)], u=[0.0] * n) for k in (0, 1)
+    )
     with styled():
         one, other = (
             re.sub(r"f-p\w+", "", draw([("measured", r)], "f")) for r in (flat, rounded)
@@ -171,7 +166,9 @@ def test_a_system_says_which_channels_matter() -> None:
 
 def test_declared_channels_are_drawn_and_the_others_named(tmp_path: Any) -> None:
     loop = result()
-    loop.provenance |= {"shown": ["platform.attitude"], "units": {"platform.attitude": "rad", "exciter.phase": "1"}}
+    loop.provenance.update(
+        {"shown": ["platform.attitude"], "units": {"platform.attitude": "rad", "exciter.phase": "1"}}
+    )
     t = np.linspace(0.0, 10.0, 50)
     record = {"time": t, "exciter.phase": 1.0 + (t > 4.0), "platform.attitude": np.sin(t)}
     html = Written(report.write(loop, tmp_path, ("json", "html"), record)).paths["html"].read_text(encoding="utf-8")
@@ -193,7 +190,10 @@ def test_fast_rates_are_shown_in_degrees_a_second() -> None:
 
 
 def test_one_unit_or_few_units_of_many_rows_are_groups() -> None:
-    rows = [{"unit": unit} for unit in ("°/h", "°/h/g", "°/h/g", "°/h/g²", "°/h/g²")]
-    assert unit_groups(rows) == [("°/h", [0]), ("°/h/g", [1, 2]), ("°/h/g²", [3, 4])]
-    assert unit_groups(rows[:1]) == [("°/h", [0])]
-    assert unit_groups([{"unit": "s"}, {"unit": "Hz"}, {"unit": "s"}, {"unit": "V"}]) == []
+    def rows(*units: str) -> list[Coefficient]:
+        return [dataclasses.replace(result().coefficients[0], unit=unit) for unit in units]
+
+    drift = rows("°/h", "°/h/g", "°/h/g", "°/h/g²", "°/h/g²")
+    assert unit_groups(drift) == [("°/h", [0]), ("°/h/g", [1, 2]), ("°/h/g²", [3, 4])]
+    assert unit_groups(drift[:1]) == [("°/h", [0])]
+    assert unit_groups(rows("s", "Hz", "s", "V")) == []

@@ -8,7 +8,7 @@ import math
 
 import pytest
 from scipy import stats
-from simulated import tumble
+from simulated import tumble, with_coefficient
 
 from gyrobench.report.comparison_page import comparison
 from gyrobench.report.notebook_html import comparison_html, result_html
@@ -20,10 +20,8 @@ def runs(*values, ranked_by="D_F", u=0.001):
     """Tumbles whose first coefficient, D_F, has these estimates."""
     found = []
     for k, value in enumerate(values):
-        r = tumble(windows=12)
-        r.ranked_by = ranked_by
-        r.coefficients[0] = dataclasses.replace(r.coefficients[0], name="D_F", estimate=value, u=u, k=2.0)
-        found.append((f"run {k}", r))
+        r = with_coefficient(tumble(windows=12), 0, name="D_F", estimate=value, u=u, k=2.0)
+        found.append((f"run {k}", dataclasses.replace(r, ranked_by=ranked_by)))
     return found
 
 
@@ -70,25 +68,24 @@ def test_a_best_of_zero_has_no_ratio():
 def test_runs_that_name_no_measure_or_not_the_same_are_not_ranked():
     assert comparison(runs(1.0, 2.0, ranked_by=""))["ranking"] == {}
     mixed = runs(1.0, 2.0)
-    mixed[1][1].ranked_by = "D_I"
+    mixed[1] = ("run 1", dataclasses.replace(mixed[1][1], ranked_by="D_I"))
     assert comparison(mixed)["ranking"] == {}
     assert comparison(runs(1.0, 2.0, ranked_by="nothing"))["ranking"] == {}
 
 
 def test_units_are_not_mixed():
     mixed = runs(1.0, 2.0)
-    mixed[1][1].coefficients[0] = dataclasses.replace(mixed[1][1].coefficients[0], unit="rad/s")
+    mixed[1] = ("run 1", with_coefficient(mixed[1][1], 0, unit="rad/s"))
     assert comparison(mixed)["ranking"] == {}
 
 
 def test_void_runs_are_listed_last_and_have_no_rank():
     """An unstable run whose rest would be the smallest, and one that has no value of the ranked measure."""
     mixed = runs(2.0, 0.1, 1.0, 3.0)
-    mixed[1][1].verdict = "void"
+    mixed[1] = ("run 1", dataclasses.replace(mixed[1][1], verdict="void"))
     nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
-    mixed[3][1].coefficients[0] = dataclasses.replace(
-        mixed[3][1].coefficients[0], **nothing, verdict="void", no_value="unstable, pole at 1.59 Hz"
-    )
+    unstable = with_coefficient(mixed[3][1], 0, **nothing, verdict="void", no_value="unstable, pole at 1.59 Hz")
+    mixed[3] = ("run 3", unstable)
     ranking = comparison(mixed)["ranking"]
     assert [e["run"] for e in ranking["order"]] == [2, 0]
     assert [v["run"] for v in ranking["void"]] == [1, 3]
@@ -99,9 +96,8 @@ def test_void_runs_are_listed_last_and_have_no_rank():
 
 
 def test_a_result_without_a_value_keeps_its_reason_on_disk():
-    r = tumble(windows=12)
     nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
-    r.coefficients[0] = dataclasses.replace(r.coefficients[0], **nothing, verdict="void", no_value="unstable, pole")
+    r = with_coefficient(tumble(windows=12), 0, **nothing, verdict="void", no_value="unstable, pole")
     again = load(json.dumps(document(r)))
     assert math.isnan(again.coefficients[0].estimate) and again.coefficients[0].no_value == "unstable, pole"
     assert document(again) == document(r)
@@ -115,9 +111,9 @@ def replicate(values_by_part, purposes=None):
     for part, values in values_by_part.items():
         for seed, value in enumerate(values, 1):
             ((_, r),) = runs(value)
-            r.purposes = purposes or {}
-            provenance = {"seed": seed, "parts": {"gyro": part}, "parameters": {"gyro.seed": 7 * seed, "gyro.H": 0.2}}
-            r.provenance = {**r.provenance, **provenance}
+            own = {"seed": seed, "parts": {"gyro": {"name": part}}}
+            own["parameters"] = {"gyro.seed": 7 * seed, "gyro.H": 0.2}
+            r = dataclasses.replace(r, purposes=purposes or {}, provenance={**r.provenance, **own})
             found.append((f"{part}/{seed}", r))
     return found
 
@@ -146,8 +142,7 @@ def test_runs_that_differ_in_the_seed_alone_are_one_candidate():
 def test_a_seed_without_a_value_leaves_its_candidate_without_rank():
     mixed = replicate({"b": [0.031, 0.021, 0.011], "a": [0.03, 0.02, 0.01]})
     nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
-    r = mixed[4][1]
-    r.coefficients[0] = dataclasses.replace(r.coefficients[0], **nothing, no_value="did not settle")
+    mixed[4] = ("a/2", with_coefficient(mixed[4][1], 0, **nothing, no_value="did not settle"))
     (void,) = comparison(mixed)["ranking"]["void"]
     assert void == {"run": 1, "reason": "no value with seed 2: did not settle"}
 

@@ -6,11 +6,30 @@ report something real to show.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any, TypeVar
+
 import numpy as np
 from scipy import stats
 
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Test
+from gyrobench.result import (
+    AllanDeviation,
+    AllanSlope,
+    Autocorrelation,
+    BudgetLine,
+    Coefficient,
+    DriftTestResult,
+    Harmonic,
+    PowerSpectrum,
+    Reason,
+    Result,
+    Series,
+    StepChange,
+    StepCheck,
+    Test,
+)
 
+R = TypeVar("R", bound=Result)
 NAMES = ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_IS", "D_OS"]
 MEANINGS = [
     "constant",
@@ -95,10 +114,10 @@ def tumble(
     u = np.hypot(ua, systematic)
     k = float(stats.t.ppf(0.975, dof))
     start = 0
-    for s, d in zip(series, designs, strict=True):
+    for k, (s, d) in enumerate(zip(series, designs, strict=True)):
         part = slice(start, start + len(d))
-        s.fit, s.residual = (d @ estimate).tolist(), residual[part].tolist()
-        s.shown_fit_y = (np.array(s.shown_fit_y) @ estimate).tolist() if s.shown_fit_y else []
+        shown = (np.array(s.shown_fit_y) @ estimate).tolist() if s.shown_fit_y else []
+        series[k] = replace(s, fit=(d @ estimate).tolist(), residual=residual[part].tolist(), shown_fit_y=shown)
         start += len(d)
     specification = [
         (-0.6, 0.6),
@@ -150,27 +169,38 @@ def tumble(
         size = float(ua[i] / sigma)
         budget.append(
             BudgetLine(
-                "random drift and current noise", sigma, "°/h", size, "1", float(ua[i]), UNITS[i], name, "type A"
-            )
-        )
-        budget.append(
-            BudgetLine(
-                "table axis off the pole", 5.0, "″", systematic[i] / 5.0, "°/h/″", float(systematic[i]), UNITS[i], name
-            )
-        )
-        budget.append(
-            BudgetLine(
-                "torquer scale factor",
-                1e-4,
+                "type_a",
+                "random drift and current noise",
+                sigma,
+                "°/h",
+                size,
                 "1",
-                abs(estimate[i]),
+                float(ua[i]),
                 UNITS[i],
-                float(1e-4 * abs(estimate[i])),
+                name,
+                "type A",
+            )
+        )
+        budget.append(
+            BudgetLine(
+                "table.axis.pole",
+                "table axis off the pole",
+                5.0,
+                "″",
+                systematic[i] / 5.0,
+                "°/h/″",
+                float(systematic[i]),
                 UNITS[i],
                 name,
             )
         )
-    halved = [{"name": n, "change": 1e-7 * i, "u": float(u[i]), "ratio": 1e-7 * i / u[i]} for i, n in enumerate(NAMES)]
+        budget.append(
+            BudgetLine(
+                "torquer.scale_factor", "torquer scale factor", 1e-4, "1", abs(estimate[i]), UNITS[i],
+                float(1e-4 * abs(estimate[i])), UNITS[i], name,
+            )
+        )  # fmt: skip
+    halved = [StepChange(n, UNITS[i], 1e-7 * i, float(u[i]), 1e-7 * i / float(u[i])) for i, n in enumerate(NAMES)]
     correlation = covariance / np.outer(ua, ua)
     runs = float(random.normal())
     return DriftTestResult(
@@ -197,46 +227,50 @@ def tumble(
         dof=float(dof),
         noise={"model": "white", "sigma_deg_per_h": float(np.sqrt(variance))},
         tests=[
-            Test("Ljung-Box", 11.2, 0.51, "correlation of the residuals up to lag 12", "no correlation seen"),
             Test(
+                "ljung_box", "Ljung-Box", 11.2, 0.51, "correlation of the residuals up to lag 12", "no correlation seen"
+            ),
+            Test(
+                "runs",
                 "runs",
                 runs,
                 float(2 * stats.norm.sf(abs(runs))),
                 "too few or too many changes of sign",
                 "as in white noise",
             ),
-            Test("turn to turn", 0.94, 0.62, "scatter between turns against within", "no larger than within"),
+            Test(
+                "turns.agree",
+                "turn to turn",
+                0.94,
+                0.62,
+                "scatter between turns against within",
+                "no larger than within",
+            ),
         ],
         residual_std=float(np.sqrt(variance)),
         residual_unit="°/h",
-        acf={"lag": lags.tolist(), "rho": rho, "bound": [float(1.96 / np.sqrt(len(residual)))] * len(lags)},
-        allan={
-            "tau": taus.tolist(),
-            "dev": dev,
-            "unit": "°/h",
-            "lo": [float(d * np.sqrt(e / stats.chi2.ppf(0.975, e))) for d, e in zip(dev, edf, strict=True)],
-            "hi": [float(d * np.sqrt(e / stats.chi2.ppf(0.025, e))) for d, e in zip(dev, edf, strict=True)],
-            "slopes": [
-                {
-                    "process": "white (slope −½)",
-                    "value": dev[0] * (width / 3600) ** 0.5,
-                    "unit": "°/√h",
-                    "resolved": "yes",
-                },
-                {"process": "bias instability (flat)", "value": None, "unit": "°/h", "resolved": "not resolved"},
-                {"process": "random walk (slope +½)", "value": None, "unit": "°/h/√h", "resolved": "not resolved"},
+        acf=Autocorrelation(lags.tolist(), rho, [float(1.96 / np.sqrt(len(residual)))] * len(lags)),
+        allan=AllanDeviation(
+            taus.tolist(),
+            dev,
+            [float(d * np.sqrt(e / stats.chi2.ppf(0.975, e))) for d, e in zip(dev, edf, strict=True)],
+            [float(d * np.sqrt(e / stats.chi2.ppf(0.025, e))) for d, e in zip(dev, edf, strict=True)],
+            [
+                AllanSlope(float(taus[k]), float(taus[k + 1]), float(np.log2(dev[k + 1] / dev[k])))
+                for k in range(len(dev) - 1)
             ],
-        },
-        psd={"f": frequency.tolist(), "S": density.tolist(), "unit": "(°/h)²/Hz"},
+            unit="°/h",
+        ),
+        psd=PowerSpectrum(frequency.tolist(), density.tolist(), unit="(°/h)²/Hz"),
         harmonics=[
-            {"series": f"mount {m}", "n": n, "a_deg_per_h": a, "b_deg_per_h": b, "u_deg_per_h": sigma / 6}
+            Harmonic(f"mount {m}", n, a, b, sigma / 6, "°/h")
             for m in (1, 2)
             for n, (a, b) in enumerate(random.normal(0.0, sigma / 6, (3, 2)).tolist(), start=3)
         ],
         budget=budget,
         repeatability={"turns": 2, "between_deg_per_h": 0.0021, "within_deg_per_h": 0.0022, "F": 0.94, "p": 0.62},
-        step_check={"step": 0.0005, "other": 0.00025, "seconds": 2.5, "rows": halved, "worst": 1e-4},
-        warnings=["D_OO cannot be had from this test; it folds into D_F, D_II and D_SS."],
+        step_check=StepCheck(0.0005, halved, 0.00025, 2.5, 1e-4),
+        reasons=[Reason("inseparable", "D_OO cannot be had from this test; it folds into D_F, D_II and D_SS.")],
         summary=[
             f"Constant drift D_F = {estimate[0]:.4f} °/h, U = {k * u[0]:.4f} °/h.",
             f"Largest unbalance D_I = {estimate[1]:.4f} °/h/g, U = {k * u[1]:.4f} °/h/g.",
@@ -294,8 +328,8 @@ def provenance(seed: int, width: float) -> dict:
         {
             "phase": 1,
             "label": "mount 1",
-            "mode": 2,
-            "face": 1,
+            "mode": "rate",
+            "face": "mount 1",
             "target": -7.2921159e-4,
             "settle": 60.0,
             "dwell": 0.0,
@@ -305,8 +339,8 @@ def provenance(seed: int, width: float) -> dict:
         {
             "phase": 2,
             "label": "mount 2",
-            "mode": 2,
-            "face": 2,
+            "mode": "rate",
+            "face": "mount 2",
             "target": -7.2921159e-4,
             "settle": 60.0,
             "dwell": 0.0,
@@ -316,8 +350,8 @@ def provenance(seed: int, width: float) -> dict:
         {
             "phase": 3,
             "label": "output axis up",
-            "mode": 0,
-            "face": 3,
+            "mode": "hold",
+            "face": "output axis up",
             "target": 0.0,
             "settle": 60.0,
             "dwell": 1200.0,
@@ -327,8 +361,8 @@ def provenance(seed: int, width: float) -> dict:
         {
             "phase": 4,
             "label": "output axis down",
-            "mode": 0,
-            "face": 4,
+            "mode": "hold",
+            "face": "output axis down",
             "target": 0.0,
             "settle": 60.0,
             "dwell": 1200.0,
@@ -345,7 +379,7 @@ def provenance(seed: int, width: float) -> dict:
         "order": slots,
         "wires": wires,
         "cuts": ["rebalance.i -> gyro.i"],
-        "delays": [*wires[9:11], wires[12]],
+        "delays": {w: 0.001 for w in (*wires[9:11], wires[12])},
         "parts": {
             slot: {"name": part, "version": "1.0.0", "target": "native", "fmi": "2.0", "sha256": f"{i + 1:02x}" * 32}
             for i, (slot, part) in enumerate(zip(slots, parts, strict=True))
@@ -367,6 +401,11 @@ def provenance(seed: int, width: float) -> dict:
 
 def unplotted(result: DriftTestResult) -> DriftTestResult:
     """The result without what its figures of data are drawn from, for a test of the words around them."""
-    result.series, result.correlation, result.budget = [], [], []
-    result.acf, result.allan, result.psd = {}, {}, {}
-    return result
+    return replace(result, series=[], correlation=[], budget=[], acf=None, allan=None, psd=None)
+
+
+def with_coefficient(result: R, index: int, **changes: Any) -> R:
+    """The result with changes of one of its coefficients."""
+    rows = list(result.coefficients)
+    rows[index] = replace(rows[index], **changes)
+    return replace(result, coefficients=rows)

@@ -32,6 +32,7 @@ def write(folder: Path, columns: dict[str, Any], units: dict[str, str], **defini
         "date": [None] * n,
     } | columns
     kinds = {"index": pa.int64(), "seed": pa.int64(), "warnings": pa.list_(pa.string())}
+    kinds["warning_ids"] = kinds["warnings"]
     texts = ("run", "system", "data", "state", "reason", "verdict", "report", "instrument", "date")
     fields, arrays = [], []
     for name, values in rows.items():
@@ -109,8 +110,11 @@ def keep(folder: Path, runs: int, reports: tuple[int, ...]) -> list[str | None]:
     return column
 
 
-def lot(folder: Path, files: int, seed: int = 5, remark: str = "") -> Path:
-    """Measured files of gyros: number 3 torn, 11 with exchanged mounts, 20 with a D_I of 9 in a lot of unit normals."""
+def lot(folder: Path, files: int, seed: int = 5, remark: str = "", ids: bool = True) -> Path:
+    """Measured files of gyros: number 3 torn, 11 with exchanged mounts, 20 with a D_I of 9 in a lot of unit normals.
+
+    ids: the rows have those of their warnings; false: as those of version 0.1.0.
+    """
     rng = np.random.default_rng(seed)
     columns: dict[str, Any] = {
         "data": [f"lot/{k:03d}.csv" for k in range(files)],
@@ -124,12 +128,16 @@ def lot(folder: Path, files: int, seed: int = 5, remark: str = "") -> Path:
     values["D_I"][20] = 9.0
     state[3], reason[3] = "refused", "row 7: 3 cells, expected 5"  # type: ignore[call-overload]
     columns["verdict"][11], columns["verdict"][3] = "inconclusive", None
-    warnings[11] = ["Residuals are correlated.", "Handling error: exchanged mounts."]  # type: ignore[list-item]
+    named = [[] for _ in range(files)]
+    said = ["Residuals are correlated.", "This record contradicts itself: exchanged mounts."]
+    warnings[11] = said  # type: ignore[call-overload]
+    named[11] = ["residuals", "handling.error"]  # type: ignore[list-item]
     if remark:  # that makes all of them inconclusive
         columns["verdict"] = ["inconclusive"] * files
         warnings = [[remark.format(k=k), *more] for k, more in enumerate(warnings)]
+        named = [["type_b.unstated", *more] for more in named]
     for name, y in values.items():
         columns |= measure(name, np.where(np.array(state) == "done", y, np.nan), 0.02)
-    columns |= {"state": state, "reason": reason, "warnings": warnings}
+    columns |= {"state": state, "reason": reason, "warnings": warnings} | ({"warning_ids": named} if ids else {})
     axes = [{"name": "data", "kind": "data", "unit": ""}]
     return write(folder, columns, units_of(UNITS), axes=axes, question="Which gyros of the lot may be delivered?")

@@ -14,31 +14,36 @@ import numpy as np
 
 from gyrobench.campaign.analysis.lot_outliers import LotOutliers
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json
+from gyrobench.reduction.diagnosis.handling_errors import HANDLING
 from gyrobench.report.numbers import write_number
 from gyrobench.result import NO_VERDICT
 
 DOUBTFUL = ("void", "inconclusive")
 COMMON = 0.5  # share of the results from which on a warning is one of the lot
-HANDLING = "Handling error"  # opens the warning of gyrobench.reduction.diagnosis.handling_errors
 
 
-def pattern(warning: str) -> str:
-    """Return a warning without its numbers and names of coefficients, to compare warnings of several runs."""
+def warnings_of(row: Any) -> list[tuple[str, str]]:
+    """Return the warnings of a row, each with its id.
+
+    In a row of version 0.1.0, which has no ids, the sentence without its numbers and names of coefficients stands for
+    it.
+    """
+    texts = [] if row["warnings"] is None else [str(w) for w in row["warnings"]]
+    ids = row.get("warning_ids")
+    return list(zip(map(_pattern, texts) if ids is None else map(str, ids), texts, strict=True))
+
+
+def _pattern(warning: str) -> str:
     text = re.sub(r"\S*[\d_]\S*", "", warning)
     return re.sub(r"[\W_]+", " ", text).strip()
 
 
-def warnings_of(row: Any) -> list[str]:
-    """Return the warnings of a row."""
-    return [] if row["warnings"] is None else [str(w) for w in row["warnings"]]
-
-
 def common_warnings(rows: Any) -> dict[str, tuple[int, str]]:
-    """Return what more than half of the results warn of: pattern -> number of results, the first warning."""
+    """Return what more than half of the results warn of: id -> number of results, the first warning."""
     done = [warnings_of(row) for _, row in rows[rows["state"] == "done"].iterrows()]
-    counts = Counter(p for warnings in done for p in {pattern(w) for w in warnings})
-    first = {pattern(w): w for warnings in reversed(done) for w in reversed(warnings)}
-    return {p: (n, first[p]) for p, n in counts.most_common() if n > COMMON * len(done) and n > 1}
+    counts = Counter(i for warnings in done for i in {i for i, _ in warnings})
+    first = {i: text for warnings in reversed(done) for i, text in reversed(warnings)}
+    return {i: (n, first[i]) for i, n in counts.most_common() if n > COMMON * len(done) and n > 1}
 
 
 def contradictions(rows: Any) -> list[list[str]]:
@@ -46,8 +51,8 @@ def contradictions(rows: Any) -> list[list[str]]:
     common = common_warnings(rows)
     found = []
     for _, row in rows.iterrows():
-        own = [w for w in warnings_of(row) if pattern(w) not in common]
-        handling = [w for w in own if w.startswith(HANDLING)]
+        own = [text for i, text in warnings_of(row) if i not in common]
+        handling = [text for i, text in warnings_of(row) if i == HANDLING and i not in common]
         if row["state"] != "done":
             found.append([re.sub(r"\s*\n[\s-]*", " ", row["reason"] or "no reason is stored")])
         elif handling:

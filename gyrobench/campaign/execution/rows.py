@@ -23,5 +23,6 @@ def result_columns(result: Result, tests: Mapping[str, Result]) -> tuple[dict[st
         row.update({f"{name}.{k}": None if v is None else float(v) for k, v in numbers.items()})
         units.update({f"{name}.{k}": c.unit for k in numbers})
     row["verdict"] = None if result.verdict == NO_VERDICT else result.verdict
-    row["warnings"] = list(result.warnings)
+    ids = {r.text: r.id for r in result.reasons}
+    row["warnings"], row["warning_ids"] = list(result.warnings), [ids[text] for text in result.warnings]
     return row, units

@@ -8,8 +8,9 @@
 ``earlier/*.parquet`` rows of runs that the present definition does not have, found again when it does
 
 Columns of ``runs``: run, index (place in the plan), system, seed, data, state, reason, ``in.<axis>``, verdict,
-warnings, for each coefficient ``<name>.estimate``, ``.u``, ``.lo``, ``.hi`` (95 % interval), ``.truth``, and report
-(path in this folder), for measured data also instrument and date.  A number has its unit in the metadata of its field.
+warnings, warning_ids, for each coefficient ``<name>.estimate``, ``.u``, ``.lo``, ``.hi`` (95 % interval), ``.truth``,
+and report (path in this folder), for measured data also instrument and date.  A number has its unit in the metadata of
+its field.
 
 Every file is written whole and renamed, so a folder is readable at any moment.  One process writes at a time; between
 the two steps of a merge a run may stand in two files, with equal rows, and readers take one of them.
@@ -52,6 +53,7 @@ FIRST = {
 LAST = {
     "verdict": pa.string(),
     "warnings": pa.list_(pa.string()),
+    "warning_ids": pa.list_(pa.string()),  # in the same order; none in rows of version 0.1.0
     "report": pa.string(),
     "instrument": pa.string(),
     "date": pa.string(),
@@ -391,7 +393,7 @@ def merge(tables: Sequence[pa.Table]) -> pa.Table:
         return True, places.get(f"{base}.estimate", last), base, NUMBERS.index(number)
 
     results = sorted((n for n in names if n in places or not n.startswith("in.")), key=order)
-    rows = _concatenated(tables)
+    rows = _concatenated([*tables, _as_table([], {})])  # rows of older versions have fewer columns
     seen: set[str] = set()
     first = []
     for run in rows.column("run").to_pylist():

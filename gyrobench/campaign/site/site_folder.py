@@ -113,8 +113,8 @@ def _publish_reports(campaign: Campaign, folder: Path, reports: list[str]) -> No
 def _csv(rows: Any, units: Mapping[str, str]) -> str:
     """Return the rows as text: units in the header, lists joined."""
     flat = rows.copy()
-    if "warnings" in flat:
-        flat["warnings"] = ["; ".join(map(str, w)) if w is not None else "" for w in flat["warnings"]]
+    for name in {"warnings", "warning_ids"} & set(flat):
+        flat[name] = ["; ".join(map(str, w)) if w is not None else "" for w in flat[name]]
     heads = [f"{c} [{units[c]}]" if units.get(c) not in (None, "", "1") else c for c in flat.columns]
     return str(flat.to_csv(index=False, header=heads))
 

@@ -6,7 +6,7 @@ from gyrobench.component.blocks.table import AxisTable
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Noise, Parameter, State
 from gyrobench.component.math import Number, Vector, cos, exp, fabs, sign, sin, vector
-from gyrobench.component.set_up import unbalanced
+from gyrobench.component.set_up import Simulated, unbalanced
 
 GONE = 50.0  # exp(-50) = 2e-22 changes no last digit of what it is added to
 SMALL = 1e-3  # rad: below it the series of cos and sin are exact to the last digit
@@ -222,7 +222,7 @@ class BodyTable(AxisTable):
     torque of the unbalance is added here, that of the next step at its middle.
     """
 
-    simulates = (unbalanced("axis_unbalance"),)
+    simulates: tuple[Simulated, ...] = (unbalanced("axis_unbalance"),)
 
     axis = AxisBody()
     angle0 = Parameter(0.0, "rad", "angle at the start")

@@ -7,7 +7,7 @@ from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter
 from gyrobench.component.math import Number, Vector, cos, fabs, index, maximum, minimum, sign, sin, sqrt, vector
 from gyrobench.component.rotation import IDENTITY, Rotation
-from gyrobench.component.set_up import each
+from gyrobench.component.set_up import Simulated, each
 
 FIVE = [0.0, 0.0, 0.0, 0.0, 0.0]
 
@@ -118,7 +118,7 @@ class AxisTable(Component):
     input `face` (rows: the gyro axes in table axes).
     """
 
-    simulates = (
+    simulates: tuple[Simulated, ...] = (
         each(
             "tilt",
             ("table.axis.pole.east", "table.axis.vertical.east", "table.axis.servo.y", "axis.square"),
@@ -183,7 +183,7 @@ class TwoAxisTable(Component):
     `face` (rows: the gyro axes in plate axes).
     """
 
-    simulates = (each("squareness", ("table.square",)),)
+    simulates: tuple[Simulated, ...] = (each("squareness", ("table.square",)),)
 
     base = Rotation("rows: outer axis X, inner axis Y at x = 0, and Z in ENU at angles 0")
     squareness = Parameter(0.0, "rad", "inner axis turned about Z out of the right angle", min=-0.1, max=0.1)

@@ -47,7 +47,7 @@ from gyrobench.reduction.estimation.fit_result import REMOUNT_UNSTATED
 from gyrobench.reduction.estimation.nuisances import BOTH, NUISANCES, InTheModel
 from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Reason, Table
+from gyrobench.result import Autocorrelation, DriftTestResult, Reason, Table
 
 Reduce = Callable[[Record], DriftTestResult]
 DIAGNOSIS = "handling.diagnosis"  # id of the table
@@ -157,7 +157,8 @@ def _freedom(result: DriftTestResult, windows: int) -> float:
     is not significant.
     """
     total = 0.0
-    for rho, bound in list(zip(result.acf.get("rho", []), result.acf.get("bound", []), strict=False))[1:]:
+    acf = result.acf or Autocorrelation([], [], [])
+    for rho, bound in zip(acf.rho[1:], acf.bound[1:], strict=True):
         if rho < bound:
             break
         total += rho

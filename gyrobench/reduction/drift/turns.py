@@ -21,7 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
-from gyrobench.result import Table
+from gyrobench.result import Harmonic, Table
 
 AGREE, HIGH = "turns.agree", "turns.harmonics"  # ids of the tests
 
@@ -79,7 +79,7 @@ class Turns:
                 for j, label in enumerate(labels)
             ]
 
-    def harmonics(self, fits: Mapping[str, Fit]) -> list[dict[str, Any]]:
+    def harmonics(self, fits: Mapping[str, Fit]) -> list[Harmonic]:
         """Return amplitudes with u in the unit of the data: of ``fits``, then of the residuals the model does not hold.
 
         fits: label -> harmonic.fit of the data.
@@ -90,12 +90,8 @@ class Turns:
             for n in range(self.held + 1):
                 j = f.names.index(f"A{n}")
                 b = float(f.beta[j + 1]) / scale if n else None
-                out.append(
-                    {"series": label, "n": n, "a": float(f.beta[j]) / scale, "b": b, "u": float(u[j]), "unit": unit}
-                )
-        for label, n, a, b, u_ab in self.high:
-            out.append({"series": label, "n": n, "a": a, "b": b, "u": u_ab, "unit": unit})
-        return out
+                out.append(Harmonic(label, n, float(f.beta[j]) / scale, b, float(u[j]), unit))
+        return out + [Harmonic(label, n, a, b, u_ab, unit) for label, n, a, b, u_ab in self.high]
 
     # ------------------------------------------------------------------------------------------ turns
     def _turn_columns(self) -> Array:

@@ -26,7 +26,7 @@ from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.result import Reason, Series, Table, Test
+from gyrobench.result import AllanDeviation, Autocorrelation, PowerSpectrum, Reason, Series, Table, Test
 
 if TYPE_CHECKING:
     from gyrobench.reduction.estimation.linear_fit import Regression
@@ -258,17 +258,17 @@ class Findings:
         parts = [v for _, v in series.stretches(self.t_start, self.t_end, values)]
         return [values] if self.white or max(p.size for p in parts) < 3 else parts
 
-    def acf(self) -> dict[str, list[float]]:
+    def acf(self) -> Autocorrelation:
         parts = self._parts(self.est.residual / self.y_scale)
         return series.autocorrelation(parts, min(40, max(max(p.size for p in parts) // 2, 1)))
 
-    def allan(self) -> dict[str, Any]:
-        values = {} if self.ideal else series.allan(self.stretches)
-        return {**values, "unit": self.y_unit} if values else {}
+    def allan(self) -> AllanDeviation | None:
+        values = None if self.ideal else series.allan(self.stretches)
+        return values and replace(values, unit=self.y_unit)
 
-    def psd(self) -> dict[str, Any]:
-        values = {} if self.ideal else series.spectrum(self.stretches)
-        return {**values, "unit": f"({self.y_unit})²/Hz"} if values else {}
+    def psd(self) -> PowerSpectrum | None:
+        values = None if self.ideal else series.spectrum(self.stretches)
+        return values and replace(values, unit=f"({self.y_unit})²/Hz")
 
     # ------------------------------------------------------------------------------------------ noise
     def noise(self) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.verdict import DECISION_RULE, SLOW_RULE
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Table, TypeB
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Harmonic, Reason, Table, TypeB
 
 CONDITION = 100.0  # above this a warning names the weakest direction
 TYPE_A = "type_a"  # id of the line of a budget
@@ -55,7 +55,7 @@ class Account:
     no_closed: str = ""
     closed_caption: str = "From the same data"
     tables: Sequence[Table] = ()
-    harmonics: Sequence[dict[str, Any]] = ()
+    harmonics: Sequence[Harmonic] = ()
     repeatability: Mapping[str, Any] = field(default_factory=dict)
     reasons: Sequence[Reason] = ()
     title: str = ""  # where it is not that of the system

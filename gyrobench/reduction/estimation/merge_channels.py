@@ -56,7 +56,7 @@ def merge(
         acf=loud.acf,
         allan=loud.allan,
         psd=loud.psd,
-        harmonics=[{**h, "series": f"{n}: {h.get('series', '')}"} for n, r in results.items() for h in r.harmonics],
+        harmonics=[replace(h, series=f"{n}: {h.series}") for n, r in results.items() for h in r.harmonics],
         budget=[b for r in parts for b in r.budget],
         type_b=_side_by_side(parts),
         repeatability={f"{n}: {key}": value for n, r in results.items() for key, value in r.repeatability.items()},

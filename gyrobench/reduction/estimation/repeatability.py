@@ -133,7 +133,7 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
         noise={"model": f"standard deviation over {n} {what}s, treated as independent"},
         tests=tests,
         residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
-        acf={}, allan={}, psd={}, harmonics=[],
+        acf=None, allan=None, psd=None, harmonics=[],
         budget=budget,
         repeatability={f"σ of {c.name} / ({c.unit})": statistics(table[:, j].tolist()).sigma
                        for j, c in enumerate(first.coefficients)},

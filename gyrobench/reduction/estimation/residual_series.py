@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import math
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.deviations import deviations
+from gyrobench.result import AllanDeviation, AllanSlope, Autocorrelation, PowerSpectrum
 
 DRAWS = 500  # of white noise, for the distribution of Q
 LARGE = 2000  # values beyond which a fit does not change it
@@ -34,7 +34,7 @@ def stretches(t0: Array, t1: Array, x: Array, tolerance: float = 0.01) -> list[t
     return [(s / (b - a), x[a:b]) for s, (a, b) in zip(total, pairwise(edges), strict=True)]
 
 
-def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
+def autocorrelation(parts: list[Array], lags: int) -> Autocorrelation:
     """Autocorrelation about zero (residuals have no mean left), lag 0..lags in windows, with the 95 % white bound.
 
     Biased low by the coefficients that were fitted; that is normal.  Pairs across gaps are left out.
@@ -47,16 +47,16 @@ def autocorrelation(parts: list[Array], lags: int) -> dict[str, list[float]]:
         product = sum(float(p[k:] @ p[: p.size - k]) for p in parts if p.size > k)
         rho.append(product / power * (count / pairs) if pairs and power > 0 else 0.0)
         bound.append(NORMAL / math.sqrt(pairs) if pairs else 0.0)
-    return {"lag": [float(k) for k in range(lags + 1)], "rho": rho, "bound": bound}
+    return Autocorrelation([float(k) for k in range(lags + 1)], rho, bound)
 
 
-def ljung_box(acf: dict[str, list[float]], n: int, lags: int) -> tuple[float, float]:
+def ljung_box(acf: Autocorrelation, n: int, lags: int) -> tuple[float, float]:
     """Q and its chi-squared probability over ``lags``, of values to which nothing was fitted.
 
     Q = (n + 2)/n sum m_k rho_k^2 with m_k pairs at lag k (taken from the bound), rho_k from :func:`autocorrelation`;
     without gaps it is n (n + 2) sum r_k^2/(n - k) of the biased r_k.
     """
-    terms = zip(acf["rho"][1 : lags + 1], acf["bound"][1 : lags + 1], strict=True)
+    terms = zip(acf.rho[1 : lags + 1], acf.bound[1 : lags + 1], strict=True)
     q = (n + 2) / n * sum((r * NORMAL / b) ** 2 for r, b in terms if b > 0.0)
     return q, float(special.chdtrc(lags, q))
 
@@ -153,42 +153,42 @@ def normality(x: Array) -> tuple[float, float]:
     return float(w), 1.0 if light else float(p)
 
 
-def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> dict[str, Any]:
+def allan(parts: list[tuple[float, Array]], minimum: int = 9) -> AllanDeviation | None:
     """Overlapping Allan deviation of rate means, pooled over stretches of the most frequent window length.
 
     tau [s] up to a third of the longest stretch, dev, lo, hi (95 %, unit of the data), see
-    :mod:`gyrobench.reduction.series.deviations`; slopes: local log-log slopes.  Empty when no stretch has ``minimum``
+    :mod:`gyrobench.reduction.series.deviations`; slopes: local log-log slopes.  None when no stretch has ``minimum``
     windows, and where the residuals alone are asked for (asked).
     """
     chosen, window = _alike(parts, minimum)
     if not chosen:
-        return {}
+        return None
     found = deviations(chosen, window)["allan"]
     long = found.tau <= window * (max(p.size for p in chosen) // 3)
     use = long & (found.deviation > 0.0)
     tau, dev, low, high = (x[use].tolist() for x in (found.tau, found.deviation, found.low, found.high))
     slopes = [
-        {"from": a, "to": b, "slope": math.log(y / x) / math.log(b / a)}
+        AllanSlope(a, b, math.log(y / x) / math.log(b / a))
         for a, b, x, y in zip(tau, tau[1:], dev, dev[1:], strict=False)
     ]
-    return {"tau": tau, "dev": dev, "lo": low, "hi": high, "slopes": slopes, "tau_unit": "s"}
+    return AllanDeviation(tau, dev, low, high, slopes)
 
 
-def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> dict[str, Any]:
+def spectrum(parts: list[tuple[float, Array]], minimum: int = 16) -> PowerSpectrum | None:
     """One-sided power spectral density (Welch, Hann), averaged over the stretches of the most frequent window length.
 
     f [Hz], S [unit of the data squared per Hz].  The averaging windows act as a filter sinc^2(f T), not divided out.
-    Empty as the Allan deviation.
+    None as the Allan deviation.
     """
     from scipy import signal
 
     chosen, window = _alike(parts, minimum)
     if not chosen:
-        return {}
+        return None
     n = min(p.size for p in chosen)
     both = [signal.welch(p, 1.0 / window, nperseg=n, detrend=False) for p in chosen]
     mean = np.mean([s for _, s in both], axis=0)
-    return {"f": both[0][0][1:].tolist(), "S": mean[1:].tolist(), "f_unit": "Hz"}
+    return PowerSpectrum(both[0][0][1:].tolist(), mean[1:].tolist())
 
 
 def _alike(parts: list[tuple[float, Array]], minimum: int) -> tuple[list[Array], float]:

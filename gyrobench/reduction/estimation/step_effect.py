@@ -1,7 +1,7 @@
 """What the communication step does to the measures of a run, as a part of their uncertainty.
 
     effects = step_effects(at_step, other, factor=0.5)            # quiet runs at the step h and at factor h
-    result = with_step(result, {"step": h, "rows": effects})      # lines of the budget, u, intervals, warning
+    result = with_step(result, StepCheck(h, effects))             # lines of the budget, u, intervals, warning
 
 The effect is what a measure at the step h is away from that at step zero, from two steps, of first order in the step:
 
@@ -22,7 +22,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.result import BudgetLine, Coefficient, Reason, Result
+from gyrobench.result import BudgetLine, Coefficient, Reason, Result, StepChange, StepCheck
 
 R = TypeVar("R", bound=Result)
 STEP = "step"  # id of its line of the budget, and of the warning
@@ -32,8 +32,8 @@ LISTED = 3  # measures in a warning
 FINEST = 4  # the step recommended is at most that much shorter
 
 
-def step_effects(at_step: Sequence[Coefficient], other: Sequence[Coefficient], factor: float) -> list[dict[str, Any]]:
-    """Return name, unit and ``change`` of each measure of two runs without noise: at the step, and ``factor`` times it.
+def step_effects(at_step: Sequence[Coefficient], other: Sequence[Coefficient], factor: float) -> list[StepChange]:
+    """Return the change of each measure of two runs without noise: at the step, and ``factor`` times it.
 
     A measure without a value in one of them has no row.
     """
@@ -42,7 +42,7 @@ def step_effects(at_step: Sequence[Coefficient], other: Sequence[Coefficient], f
     for c in at_step:
         if not c.no_value and c.name in there:
             change = _effect(c.unit, c.estimate, there[c.name].estimate, factor)
-            rows.append({"name": c.name, "unit": c.unit, "change": change})
+            rows.append(StepChange(c.name, c.unit, change))
     return rows
 
 
@@ -54,23 +54,22 @@ def _effect(unit: str, at_step: float, other: float, factor: float) -> float:
     return -20.0 * math.log10(max(zero, FLOOR))
 
 
-def with_step(result: R, check: Mapping[str, Any]) -> R:
+def with_step(result: R, check: StepCheck) -> R:
     """Return the result with the effects of the step in u and intervals, lines of the budget and a warning.
 
-    check: ``{"step": s, "rows": ...}`` of :func:`step_effects`, with whatever else is to stand in the result.  Its rows
-    get u without the step, and the ratio of effect and u.
+    check: with the rows of :func:`step_effects`; they get u without the step, and the ratio of effect and u.
     """
-    step = float(check["step"])
-    changes = {row["name"]: row for row in check["rows"]}
-    rows, parts, widened, budget = [], {}, [], list(getattr(result, "budget", ()))
+    step = check.step
+    changes = {row.name: row for row in check.rows}
+    rows: list[StepChange] = []
+    parts, widened, budget = {}, [], list(getattr(result, "budget", ()))
     for c in result.coefficients:
         row = changes.get(c.name)
         if row is None or c.no_value:
             widened.append(c)
             continue
-        change = float(row["change"])
-        rows.append({**row, "u": c.u, "ratio": abs(change) / c.u if c.u > 0.0 else None})
-        parts[c.name] = change / math.sqrt(3.0)
+        rows.append(replace(row, u=c.u, ratio=abs(row.change) / c.u if c.u > 0.0 else None))
+        parts[c.name] = row.change / math.sqrt(3.0)
         if c.u > 0.0 and not any(b.coefficient == c.name for b in budget):
             budget.append(
                 BudgetLine("type_a", "noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A")
@@ -78,14 +77,14 @@ def with_step(result: R, check: Mapping[str, Any]) -> R:
         size = (step, "s", parts[c.name] / step, f"{c.unit}/s", abs(parts[c.name]), c.unit, c.name)
         budget.append(BudgetLine(STEP, "coupling step", *size, "m(h) − m(0), rectangular"))
         widened.append(_widened(c, abs(parts[c.name])))
-    worst = max((r["ratio"] for r in rows if r["ratio"] is not None), default=None)
+    worst = max((r.ratio for r in rows if r.ratio is not None), default=None)
     text = _warning(result, rows, step)
     more: dict[str, Any] = {"budget": budget} if hasattr(result, "budget") else {}
     if getattr(result, "correlation", None):
         more["correlation"] = _correlation(result, widened, parts)
     reasons = [*result.reasons, Reason(STEP, text)] if text else result.reasons
-    step_check = {**check, "rows": rows, "worst": worst}
-    return replace(result, coefficients=widened, step_check=step_check, reasons=reasons, **more)
+    checked = replace(check, rows=rows, worst=worst)
+    return replace(result, coefficients=widened, step_check=checked, reasons=reasons, **more)
 
 
 def _widened(c: Coefficient, part: float) -> Coefficient:
@@ -108,20 +107,21 @@ def _correlation(result: Result, widened: Sequence[Coefficient], parts: Mapping[
     return matrix
 
 
-def _warning(result: Result, rows: Sequence[Mapping[str, Any]], step: float) -> str:
+def _warning(result: Result, rows: Sequence[StepChange], step: float) -> str:
     """Return what to do where the step moves measures by more than their u; "" where it does not."""
     sizes = {c.name: abs(c.estimate) for c in result.coefficients}
-    large = [r for r in rows if abs(r["change"]) > max(r["u"], RELATIVE * sizes[r["name"]])]
-    if not large:
+    measured = [(abs(r.change), r.u or 0.0, r) for r in rows]
+    over = [(change / max(u, RELATIVE * sizes[r.name], 1e-300), change, u, r) for change, u, r in measured
+            if change > max(u, RELATIVE * sizes[r.name])]  # fmt: skip
+    if not over:
         return ""
-    large.sort(key=lambda r: -abs(r["change"]) / max(r["u"], RELATIVE * sizes[r["name"]]))
+    over.sort(key=lambda row: -row[0])
     shown = [
-        f"{r['name']} by {_short(abs(r['change']))} {r['unit']} (u without it {_short(r['u'])} {r['unit']})"
-        for r in large[:LISTED]
+        f"{r.name} by {_short(change)} {r.unit} (u without it {_short(u)} {r.unit})"
+        for _, change, u, r in over[:LISTED]
     ]
-    more = f" and {len(large) - LISTED} more" if len(large) > LISTED else ""
-    wanted = max(abs(r["change"]) / max(r["u"], RELATIVE * sizes[r["name"]]) for r in large)
-    finer = step / min(FINEST, 2 ** math.ceil(math.log2(wanted)))
+    more = f" and {len(over) - LISTED} more" if len(over) > LISTED else ""
+    finer = step / min(FINEST, 2 ** math.ceil(math.log2(over[0][0])))
     return (
         f"The communication step of {step_text(step)} moves {', '.join(shown)}{more}: more than their u. It is part of "
         f"the u stated. For figures with less of it run with --step {step_text(finer).replace(' ', '')}."

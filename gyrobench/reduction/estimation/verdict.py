@@ -17,7 +17,7 @@ temperature of the record (conditions), and what the record itself says against 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -26,7 +26,7 @@ from gyrobench.reduction.estimation.sentences import renewed
 from gyrobench.reduction.estimation.step_effect import with_step
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.setup import conditions
-from gyrobench.result import NO_VERDICT, Coefficient, Limit, Reason, Result, Specification
+from gyrobench.result import NO_VERDICT, Coefficient, Limit, Reason, Result, Specification, StepCheck
 
 R = TypeVar("R", bound=Result)
 PASS, FAIL, INCONCLUSIVE, VOID = "pass", "fail", "inconclusive", "void"
@@ -68,7 +68,7 @@ def worst_verdict(verdicts: Iterable[str]) -> str:
 
 def conclude(
     found: R, record: Record | None = None, limits: Specification | None = None,
-    step_check: Mapping[str, Any] | None = None, **facts: Any,
+    step_check: StepCheck | None = None, **facts: Any,
 ) -> R:  # fmt: skip
     """Return the result of what a reduction found: with the record's conditions and the step in it, and judged.
 
@@ -78,7 +78,7 @@ def conclude(
     found = replace(found, **facts)
     if record is not None:
         found = conditions.applied(found, record)
-    if step_check and step_check.get("rows"):
+    if step_check is not None and step_check.rows:
         found = with_step(found, step_check)
     if record is not None:
         missed = missed_truth(found, set_values(record.run))

@@ -27,6 +27,7 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.result import Autocorrelation
 
 STRETCHES = 10
 DECIBEL = 20.0 / math.log(10.0)
@@ -271,7 +272,7 @@ def nis(values: Array, level: float = 0.999) -> Consistency:
     return _consistency(float(np.mean(values)), float(values.size), level)
 
 
-def whiteness(innovation: Array, lags: int = 20) -> tuple[dict[str, list[float]], float, float]:
+def whiteness(innovation: Array, lags: int = 20) -> tuple[Autocorrelation, float, float]:
     """Return autocorrelation (see :func:`gyrobench.reduction.estimation.residual_series.autocorrelation`), Ljung-Box Q,
     probability.
 

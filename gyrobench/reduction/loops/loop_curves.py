@@ -13,23 +13,18 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.loop_measures import Gate, Point
-from gyrobench.result import Response
+from gyrobench.result import Curve, Response
 
 CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
 ENVELOPE = 700  # points of a drawn line of a flight
 
 
-def curve(label: str, f: Array, values: Any) -> dict[str, Any]:
+def curve(label: str, f: Array, values: Any) -> Curve:
     """Return a model's curve, thinned for drawing; phase unwrapped, degrees."""
     phase = np.degrees(np.unwrap(np.angle(values)))
     pick = thinned(len(f), CURVE)
-    return {
-        "label": label,
-        "x": np.asarray(f)[pick].tolist(),
-        "y": np.abs(values)[pick].tolist(),
-        "phase": phase[pick].tolist(),
-    }
+    return Curve(label, np.asarray(f)[pick].tolist(), np.abs(values)[pick].tolist(), phase[pick].tolist())
 
 
 def thinned(n: int, most: int) -> NDArray[np.int_]:
@@ -37,9 +32,9 @@ def thinned(n: int, most: int) -> NDArray[np.int_]:
     return np.unique(np.linspace(0, n - 1, min(most, n)).astype(int))
 
 
-def line(label: str, x: Array, y: Array) -> dict[str, Any]:
+def line(label: str, x: Array, y: Array) -> Curve:
     """Return a curve of a figure against time."""
-    return {"label": label, "x": x.tolist(), "y": y.tolist(), "phase": []}
+    return Curve(label, x.tolist(), y.tolist())
 
 
 def trace(
@@ -73,7 +68,7 @@ def over_time(
         drawn[label] = line(label, t[pick], y[pick])
     first = drawn[compared or next(iter(drawn))]
     return Response(
-        name, "time", caption or f"{name[:1].upper()}{name[1:]} over time.", first["x"], "time", x_unit, first["y"],
+        name, "time", caption or f"{name[:1].upper()}{name[1:]} over time.", first.x, "time", x_unit, first.y,
         y_name or name, unit, curves=[*drawn.values()],
     )  # fmt: skip
 
@@ -88,7 +83,7 @@ def _envelope(y: Array, shown: int) -> NDArray[np.int_]:
 
 
 def bode(
-    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[dict[str, Any]], y_name: str, unit: str
+    name: str, kind: str, caption: str, points: Sequence[Point], curves: list[Curve], y_name: str, unit: str
 ) -> Response:
     """Return the Bode plot of measured points with the curves of models."""
     return Response(

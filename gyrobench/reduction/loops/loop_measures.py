@@ -25,7 +25,7 @@ from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Table
+from gyrobench.result import AllanDeviation, Table
 
 SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
@@ -357,7 +357,7 @@ class Drift:
 
     rate: float
     u: float
-    allan: dict[str, Any]
+    allan: AllanDeviation | None
     walk: tuple[float, float] | None
 
 
@@ -380,11 +380,11 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
     dt = float(t[1] - t[0])
     allan = residual_series.allan([(dt, np.diff(angle) / dt)])
     walk = None
-    falls = [abs(s["slope"] + 0.5) < 0.1 for s in allan.get("slopes", [])]
-    if True in falls:
+    falls = [abs(s.slope + 0.5) < 0.1 for s in allan.slopes] if allan is not None else []
+    if allan is not None and True in falls:
         first = falls.index(True)
         last = falls.index(False, first) if False in falls[first:] else len(falls)
-        tau, dev, low, high = (allan[n][last] for n in ("tau", "dev", "lo", "hi"))
+        tau, dev, low, high = (x[last] for x in (allan.tau, allan.dev, allan.lo, allan.hi))
         walk = (dev * math.sqrt(tau), (high - low) / (2.0 * NORMAL) * math.sqrt(tau))
     return Drift(mean, u, allan, walk)
 

@@ -46,7 +46,7 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
-from gyrobench.result import LoopResult, Reason, Table
+from gyrobench.result import AllanDeviation, LoopResult, Reason, Table
 from gyrobench.units import DPH
 
 AGREEMENT = "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
@@ -71,7 +71,7 @@ class LoopFindings(MeasureFindings):
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
         self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
         self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
-        self.allan: dict[str, Any] = {}
+        self.allan: AllanDeviation | None = None
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
         if self.linear.missing and linearized:
@@ -296,9 +296,9 @@ class LoopFindings(MeasureFindings):
 
     def show_allan(self, measures: Drift) -> None:
         """Take the Allan deviation of a drift, °/h, for the report."""
-        allan = measures.allan
-        scaled: dict[str, Any] = {k: [x / DPH for x in allan[k]] for k in ("dev", "lo", "hi") if k in allan}
-        self.allan = {**allan, **scaled, "unit": "°/h"} if allan else {}
+        if (a := measures.allan) is not None:
+            dev, lo, hi = ([x / DPH for x in values] for values in (a.dev, a.lo, a.hi))
+            self.allan = replace(a, dev=dev, lo=lo, hi=hi, unit="°/h")
 
     def result(self, account: Account, summary: Sequence[str] = (), ranked_by: str = "") -> LoopResult:
         """Return what was found, with what the test says of itself."""
@@ -306,8 +306,7 @@ class LoopFindings(MeasureFindings):
         if self.agreement:
             title = "Linear models and measured loop"
             self.tables.append(Table("margins.agreement", title, AGREEMENT, AGREEMENT_COLUMNS, self.agreement))
-        if self.allan:
-            self.facts["allan"] = self.allan
+        self.facts["allan"] = self.allan
         return super().result(replace(account, reasons=()), summary, ranked_by)
 
 

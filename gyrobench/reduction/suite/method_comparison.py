@@ -9,6 +9,7 @@ gyrobench.reduction.suite.consistency]
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,6 +25,15 @@ from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
 from gyrobench.reduction.suite.ranking import adjusted
 from gyrobench.result import Coefficient, DriftTestResult, Reason, SuiteComparison, SuiteResult, Test
+from gyrobench.result_suite import (
+    FailedMember,
+    MethodPair,
+    ReportedEstimate,
+    SuiteMember,
+    SuiteQuantity,
+    SuiteValue,
+    WeightedMean,
+)
 
 FAMILIES = {
     "single-degree-of-freedom gyro": drift.NAMES,
@@ -66,6 +76,11 @@ class MeasurandComparison:
         low, high = min(t for t in known if t is not None), max(t for t in known if t is not None)
         return low if high - low <= 1e-6 * max(abs(low), abs(high), 1e-3) else None
 
+    @functools.cached_property
+    def outlier(self) -> tuple[str, float] | None:
+        """The method without which the others agree, with the p of these; None where they agree, or there is none."""
+        return consistency.outlier(self.values) if self.disagree else None
+
     def words(self) -> str:
         """Return which methods disagree, and by how much."""
         if self.found is None:
@@ -75,13 +90,12 @@ class MeasurandComparison:
         ]
         if not self.disagree:
             return f"consistent; E_n > 1: {', '.join(significant)}" if significant else "consistent"
-        outlier = consistency.outlier(self.values)
-        if outlier is not None:
-            others = consistency.combine_values([v for v in self.values if v.label != outlier[0]])
-            deviating = next(v for v in self.values if v.label == outlier[0])
-            deviation = deviating.estimate - others.mean
+        if self.outlier is not None:
+            label, p = self.outlier
+            others = consistency.combine_values([v for v in self.values if v.label != label])
+            deviation = next(v for v in self.values if v.label == label).estimate - others.mean
             size = f"{deviation:+.2g} {self.quantity.unit}".replace("-", "−")
-            return f"{outlier[0]} deviates by {size}; the others are consistent (p = {outlier[1]:.2g})"
+            return f"{label} deviates by {size}; the others are consistent (p = {p:.2g})"
         which = "; the deviating method cannot be identified" if len(self.values) < 3 or len(significant) < 2 else ""
         return f"inconsistent: {', '.join(f'E_n of {x}' for x in significant) or 'no single pair'}{which}"
 
@@ -176,12 +190,13 @@ def combine_methods(
         rule=RULE,
         shared=list(dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in alike)),
         members=[_member(label, m) for label, m in members.items()],
-        failed=[{"label": n, "reason": why} for n, why in (failed or {}).items()],
-        quantities=[_row(c) for c in compared],
+        failed=[FailedMember(n, why) for n, why in (failed or {}).items()],
+        quantities=[_quantity(c) for c in compared],
         pairs=[
-            {"quantity": c.quantity.name, "unit": c.quantity.unit,
-             **{n: getattr(p, n) for n in ("a", "b", "difference", "U", "E_n")}}
-            for c in compared if c.found is not None for p in c.found.pairs
+            MethodPair(c.quantity.name, c.quantity.unit, p.a, p.b, p.difference, p.U, p.E_n)
+            for c in compared
+            if c.found is not None
+            for p in c.found.pairs
         ],
         **_consistency(compared),
     )  # fmt: skip
@@ -229,23 +244,23 @@ def _coefficient(c: MeasurandComparison) -> Coefficient:
     return replace(measured, u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth, z=z)
 
 
-def _row(c: MeasurandComparison) -> dict[str, Any]:
-    a = c.found
+def _quantity(c: MeasurandComparison) -> SuiteQuantity:
+    q, a = c.quantity, c.found
     weights = a.weights.tolist() if a is not None else [None] * len(c.values)
-    return {
-        "name": c.quantity.name, "unit": c.quantity.unit, "meaning": c.quantity.meaning,
-        "combination": dict(c.quantity.combination), "truth": c.truth,
-        "values": [
-            {"label": v.label, "estimate": v.estimate, "u": v.u, "U": v.U,
-             "u_a": v.u_a, "u_b": v.u_b, "u_shared": v.u_shared, "dof": v.dof if math.isfinite(v.dof) else None,
-             "weight": w, "truth": v.truth, "how": _how(v.reported, c.quantity.name)}
-            for v, w in zip(c.values, weights, strict=True)
-        ],
-        "mean": None if a is None else {"estimate": a.mean, "u": a.u, "U": a.U},
-        "Q": a.Q if a else None, "dof": len(c.values) - 1 if a else None, "birge": a.birge if a else None,
-        "p": a.p if a else None, "p_adjusted": c.p, "largest E_n": max(p.E_n for p in a.pairs) if a else None,
-        "verdict": "disagree" if c.disagree else "agree" if a else "–", "words": c.words(),
-    }  # fmt: skip
+    values = [
+        SuiteValue(v.label, v.estimate, v.u, v.U, v.u_a, v.u_b, v.u_shared, v.dof if math.isfinite(v.dof) else None, w,
+                   v.truth, _how(v.reported, q.name))
+        for v, w in zip(c.values, weights, strict=True)
+    ]  # fmt: skip
+    found: dict[str, Any] = dict.fromkeys(("mean", "Q", "dof", "birge", "p", "largest_E_n"))
+    if a is not None:
+        found = {"mean": WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1, "birge": a.birge, "p": a.p,
+                 "largest_E_n": max(p.E_n for p in a.pairs)}  # fmt: skip
+    return SuiteQuantity(
+        name=q.name, unit=q.unit, meaning=q.meaning, combination=dict(q.combination), truth=c.truth, values=values,
+        p_adjusted=c.p, verdict="disagree" if c.disagree else "agree" if a else "–", words=c.words(),
+        deviating=c.outlier[0] if c.outlier else "", **found,
+    )  # fmt: skip
 
 
 def _how(reported: str, name: str) -> str:
@@ -254,18 +269,17 @@ def _how(reported: str, name: str) -> str:
     return "as reported" if reported == name else f"reported as {reported}"
 
 
-def _member(label: str, m: Member) -> dict[str, Any]:
+def _member(label: str, m: Member) -> SuiteMember:
     r = m.result
-    return {
-        "label": label, "system": r.system, "title": r.title, "method": r.method, "verdict": r.verdict,
-        "summary": list(r.summary), "warnings": list(r.warnings), "site": dict(r.site), "instrument": r.instrument,
-        "residual_std": r.residual_std, "unit": r.residual_unit, "condition": r.condition, "rank": r.rank,
-        "windows": sum(len(s.y) for s in r.series), **m.test.as_dict(),
-        "estimates": [
-            {k: getattr(c, k) for k in ("name", "unit", "estimate", "u", "k", "interval", "truth", "z")}
-            for c in r.coefficients
+    return SuiteMember(
+        label=label, system=r.system, title=r.title, method=r.method, verdict=r.verdict, summary=list(r.summary),
+        warnings=list(r.warnings), site=dict(r.site), instrument=r.instrument, residual_std=r.residual_std,
+        unit=r.residual_unit, condition=r.condition, rank=r.rank, windows=sum(len(s.y) for s in r.series),
+        estimates=[
+            ReportedEstimate(c.name, c.unit, c.estimate, c.u, c.k, c.interval, c.truth, c.z) for c in r.coefficients
         ],
-    }  # fmt: skip
+        test=m.test.as_dict(),
+    )  # fmt: skip
 
 
 def _consistency(compared: Sequence[MeasurandComparison]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import os
 import time
 
 from gyrobench.errors import GyrobenchError
-from gyrobench.result import Coefficient, LoopResult
+from gyrobench.result import Coefficient, LoopResult, Reason
 
 
 def from_record(record, specification):
@@ -54,5 +54,5 @@ def from_record(record, specification):
         coefficients=[Coefficient("mean", "mean", "V", mean, u, 1.96, (mean - 1.96 * u, mean + 1.96 * u), truth=truth)],
         responses=[],
         verdict=verdict,
-        warnings=["cold"] if options.get("temperature", 300.0) < 273.15 else [],
+        reasons=[Reason("cold", "cold")] if options.get("temperature", 300.0) < 273.15 else [],
     )
