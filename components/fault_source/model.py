@@ -26,6 +26,8 @@ class FaultSource(Component):
     """
 
     version = "1.0.0"
+    SUPPLY, TEMPERATURE, PRESSURE, RATE = 24.0, 308.0, 6e5, 0.5  # V, K, Pa, rad/s: nominal
+    FALL, RISE = 4e5, 75.0  # Pa, K: of pressure and temperature in the end
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
     quiet = Parameter(60.0, "s", "time without faults at the start", min=1.0)
@@ -110,11 +112,11 @@ class FaultSource(Component):
 
     def outputs(self) -> None:
         settled = 1.0 - exp(-self.age / self.tau)
-        self.pressure = 6e5 - 4e5 * settled * self.on(1.0)
-        self.temperature = 308.0 + 75.0 * settled * self.on(3.0)
-        self.target = 15.0 if self.on(2.0) > 0.0 else 0.5
+        self.pressure = self.PRESSURE - self.FALL * settled * self.on(1.0)
+        self.temperature = self.TEMPERATURE + self.RISE * settled * self.on(3.0)
+        self.target = 15.0 if self.on(2.0) > 0.0 else self.RATE
         self.lost = self.on(4.0)
-        self.x[0] = 20.0 if self.on(5.0) > 0.0 else 24.0
+        self.x[0] = 20.0 if self.on(5.0) > 0.0 else self.SUPPLY
         self.x[1] = self.temperature
         self.x[2] = self.pressure
         self.x[3] = self.rate

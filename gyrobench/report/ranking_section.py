@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.suite.ranking import Candidate, rank
+from gyrobench.reduction.suite.ranking import RankedValue, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 from gyrobench.report.replicates import ComparedRun, Draws
 from gyrobench.result import Coefficient
@@ -69,9 +69,9 @@ def ranking_by(runs: Sequence[ComparedRun], name: str) -> Json:
     return {"name": name, "unit": best.unit, "meaning": best.meaning, "order": order, "void": void}
 
 
-def candidate(c: Coefficient, draws: Draws) -> Candidate:
+def candidate(c: Coefficient, draws: Draws) -> RankedValue:
     """Return a coefficient as a candidate of a ranking."""
-    return Candidate(c.estimate, c.u if math.isfinite(c.u) else None, c.k or NORMAL, draws)
+    return RankedValue(c.estimate, c.u if math.isfinite(c.u) else None, c.k or NORMAL, draws)
 
 
 def place_text(ranked: Json, entry: Json) -> str:

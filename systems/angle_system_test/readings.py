@@ -19,30 +19,41 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.window_checks import ReductionError
 
-from .harmonics import waves
+from .harmonics import LEAST, POLE_PAIRS, meanings, separation, waves
 
 Mask = NDArray[np.bool_]
 POSITIONS, MEANS, FIRST, TURNED = "two readings", "mean less reference", "first turn", "scale turned"
 RATES, GATES, DEGREES = "at rates", "gates", "degrees"
+SHOWN = {
+    POSITIONS: "first minus second reading of the scale",
+    MEANS: "mean of both readings minus reference",
+    FIRST: "reader minus reference, first turn",
+    TURNED: "reader minus reference, scale turned",
+}
+CLOCKS = {"clock_gate": GATES, "clock_inverse": DEGREES}
+QUANTUM = 2.0 * math.pi / 7.2e6
 OTHER = ("c", "h", "delay", "ripple", "clock_gate", "clock_inverse")
 
 
-@dataclass(frozen=True)
-class Arrangement:
+@dataclass(frozen=True, kw_only=True)
+class AngleSystemSetup(Setup):
     """What the reduction knows of the set-up; angles in rad, rates in rad/s.
 
-    target, rate: of the phases, 1-based; rate 0 at positions.  turned: phases with the scale turned on its shaft.
-    quanta: of reader and reference.  lsb, interval: of the inverse rate.
+    parameters: of the parts.  target, rate: of the phases, 1-based; rate 0 at positions.  turned: phases with the scale
+    turned on its shaft.  quanta: of reader and reference.  lsb, interval: of the inverse rate.  u_rate: relative.
     """
 
+    parameters: Mapping[str, Any]
     target: Mapping[int, float]
     rate: Mapping[int, float]
     turned: frozenset[int]
@@ -55,6 +66,45 @@ class Arrangement:
     orders: Sequence[int]  # those of them that the two readings separate
     reference_orders: Sequence[int]
     reversal: bool = False
+    u_rate: float = 0.0
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        p, head = run.parameters, float(run.options["head"])
+        causes = meanings(p, "reader")
+        return super().of(
+            run,
+            parameters=p,
+            target={row.phase: row.target for row in run.plan if row.mode == "index"},
+            rate={row.phase: row.target if row.mode == "rate" else 0.0 for row in run.plan},
+            turned=frozenset(row.phase for row in run.plan if row.label.startswith("turned")),
+            head=head,
+            pole_pairs=int(p.get("reader.pole_pairs", POLE_PAIRS)),
+            quanta=(float(p.get("reader.quantum", QUANTUM)), float(p.get("reference.quantum", QUANTUM))),
+            lsb=float(p.get("inverse.lsb", 1e-4)),
+            interval=float(p.get("inverse.interval", math.pi / 180.0)),
+            causes=causes,
+            orders=[k for k in causes if separation(k, head) >= LEAST],
+            reference_orders=sorted({*meanings(p, "reference"), *causes}),
+            reversal=run.options.get("method") == "reversal",
+            **own,
+        )
+
+    def shift(self, slot: str) -> float:
+        """Return mean lag and ripple (s) by the phase shifter of one-phase excitation.  Raises KeyError."""
+        p = {n: self.parameters[f"{slot}.{n}"] for n in ("phases", "shifter_slope", "f_0")}
+        return float(p["shifter_slope"]) / (4.0 * math.pi * float(p["f_0"])) if p["phases"] == 1 else 0.0
+
+    def delay_of(self, slot: str) -> float | None:
+        """Return the mean lag (s) of a simulated inductosyn, None where its parameters do not say it."""
+        p = self.parameters
+        try:
+            mode = p[f"{slot}.mode"]
+            lag = 1.0 / float(p[f"{slot}.loop_K_v"]) if mode == 1 and p[f"{slot}.loop_type"] == 1 else 0.0
+            late = mode == 2 or (mode == 0 and p[f"{slot}.stamp"] == 0)  # by an amount that changes with the angle
+            return None if late else lag + self.shift(slot)
+        except KeyError:
+            return None
 
 
 @dataclass(frozen=True)
@@ -83,7 +133,7 @@ class Rows:
     def at(self) -> At:
         return At(*(np.concatenate([getattr(p, n) for p in self.places]) for n in ("t", "angle", "rate")))
 
-    def add(self, a: Arrangement, kind: str, y: Array, variance: float, at: At, **columns: Array) -> None:
+    def add(self, a: AngleSystemSetup, kind: str, y: Array, variance: float, at: At, **columns: Array) -> None:
         """Add rows; columns: E (n, 2 orders), R (n, 2 orders of the reference), and those of OTHER."""
         n = y.size
         parts = [
@@ -126,7 +176,7 @@ def middle(difference: Array) -> float:
     return start + float(np.median(in_turn(difference - start)))
 
 
-def assemble(windows: Mapping[str, Array], a: Arrangement) -> tuple[Rows, Slips]:
+def assemble(windows: Mapping[str, Array], a: AngleSystemSetup) -> tuple[Rows, Slips]:
     """Return the rows of the model, and the readings that are off by whole cycles.
 
     Gates and degrees need an angle that does not slip and all orders of the reader: else they are left out.
@@ -157,7 +207,7 @@ def assemble(windows: Mapping[str, Array], a: Arrangement) -> tuple[Rows, Slips]
     return rows, slips
 
 
-def _positions(rows: Rows, a: Arrangement, at: At, d: Array, d_2: Array, first: Mask, turned: Mask) -> None:
+def _positions(rows: Rows, a: AngleSystemSetup, at: At, d: Array, d_2: Array, first: Mask, turned: Mask) -> None:
     q, q_ref = a.quanta
     angle, ones = at.angle[first], np.ones(np.count_nonzero(first))
     here, there, other = waves(a.orders, angle), waves(a.orders, angle + a.head), -waves(a.reference_orders, angle)
@@ -176,7 +226,7 @@ def _positions(rows: Rows, a: Arrangement, at: At, d: Array, d_2: Array, first: 
     )  # fmt: skip
 
 
-def _rates(rows: Rows, a: Arrangement, w: Mapping[str, Array], at: At, d: Array) -> None:
+def _rates(rows: Rows, a: AngleSystemSetup, w: Mapping[str, Array], at: At, d: Array) -> None:
     use = at.rate != 0.0
     if not np.any(use):
         return
@@ -189,7 +239,7 @@ def _rates(rows: Rows, a: Arrangement, w: Mapping[str, Array], at: At, d: Array)
     )  # fmt: skip
 
 
-def _readouts(rows: Rows, a: Arrangement, w: Mapping[str, Array], theta: Array, rate: float) -> None:
+def _readouts(rows: Rows, a: AngleSystemSetup, w: Mapping[str, Array], theta: Array, rate: float) -> None:
     """Add the gates and degrees that lie within a phase of constant rate.
 
     Neighbours share a reading, and so its error: those that follow one another are added up to one row.

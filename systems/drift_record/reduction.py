@@ -24,7 +24,6 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
@@ -34,7 +33,15 @@ from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
+from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason
+from gyrobench.result_entries import (
+    DeviationCurve,
+    NoiseModelCurves,
+    RateBand,
+    RateRecord,
+    SampleCorrelation,
+    SpectrumBand,
+)
 from gyrobench.units import DPH
 
 from . import description, model_tables
@@ -60,46 +67,40 @@ class Analysed:
     deviations: Mapping[str, Deviation]
 
 
-def from_record(record: Record, specification: Specification | None = None) -> DriftRecordResult:
-    """Return the result of a record.  Raises ReductionError where it is too short or cannot be analysed."""
+def from_record(record: Record) -> DriftRecordResult:
+    """Return what a record says.  Raises ReductionError where it is too short or cannot be analysed."""
     run = record.run
     columns = columns_of(record)
     remove = bool(run.options.get("remove_lines", True))
     analysed = [analyse(prepare(name, columns, remove), run.series) for name in columns.rates]
-    truth = truth_of(run)
-    relative = float(run.options.get("u_scale_factor", 0.0))
     several = len(analysed) > 1
-    coefficients = [
-        _coefficient(a, term, several, truth.get(term), relative) for a in analysed for term in TERMS
-    ]  # fmt: skip
-    for c in coefficients:
-        c.limit = (specification or {}).get(c.name)
-        c.verdict = _verdict(c)
-    of = {a.of.name: f"Column {a.of.name}: " if several else "" for a in analysed}
-    warnings = [of[a.of.name] + w for a in analysed for w in description.warnings(a.of, a.noise, run)]
-    result = DriftRecordResult(
-        system="drift_record",
-        title="Drift record",
+    return DriftRecordResult(
         method="Noise coefficients by restricted maximum likelihood, deviations, spectrum, model of the random drift",
         sources=["DRIFT-ALLAN; IEEE 952, annex C", "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
         equation='S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0), quad '
         'sigma_"A"^2 = N^2/tau + (2 ln 2)/pi B^2 + K^2 tau/3 + R^2 tau^2/2 + 3 Q^2/tau^2',
         conventions=[*columns.conventions, *description.conventions(run)],
-        coefficients=coefficients,
-        warnings=warnings,
+        coefficients=[c for a in analysed for c in _coefficients(a, run, several)],
+        reasons=[r for a in analysed for r in _reasons(a, run, several)],
         summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         instrument=run.instrument,
         site={} if run.measured else run_metadata.Site.of(run).shown(),
         simulated=not run.measured,
         columns=[_column(a, run, remove) for a in analysed],
     )  # fmt: skip
-    for a in analysed:
-        names = {c.name for c in coefficients if c.name.partition(" ")[2] in ("", a.of.name)}
-        reasons = [of[a.of.name] + text for text in description.doubts(a.of, a.noise, run)]
-        uncertainty.withhold(result, reasons, names=names)
-    return run_metadata.finish(result, record)
+
+
+def _named(term: str, a: Analysed, several: bool) -> str:
+    return f"{term} {a.of.name}" if several else term
+
+
+def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
+    """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
+    of = f"Column {a.of.name}: " if several else ""
+    said = [replace(r, text=of + r.text) for r in description.warnings(a.of, a.noise, run)]
+    names = tuple(_named(term, a, several) for term in TERMS)
+    against = description.doubts(a.of, a.noise, run).items()
+    return said + [Reason(id, of + text, ("pass", "fail"), names, severity="doubt") for id, text in against]
 
 
 def stretches(x: Array, least: int = 2) -> list[Array]:
@@ -153,10 +154,14 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
 MANY = 200  # stretches of a record that are fitted one by one
 
 
-def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, relative: float) -> Coefficient:
+def _coefficients(a: Analysed, run: RunDocument, several: bool) -> list[Coefficient]:
+    truth, relative = truth_of(run), float(run.options.get("u_scale_factor", 0.0))
+    return [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+
+
+def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
     unit, si, meaning = TERMS[term]
     e: Estimate = getattr(a.noise, term)
-    name = f"{term} {a.of.name}" if several else term
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not e.determined:
@@ -175,31 +180,21 @@ def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, rel
     )  # fmt: skip
 
 
-def _verdict(c: Coefficient) -> str:
-    """By the interval, which is not symmetric; of a coefficient that is not determined from zero to its bound."""
-    low, high = c.interval
-    return (
-        c.verdict if c.limit is None else uncertainty.assess_conformity(0.5 * (low + high), 0.5 * (high - low), c.limit)
-    )
-
-
 def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
     p, m = a.of, a.of.model
     tau = np.geomspace(p.step, max(d.tau[-1] for d in a.deviations.values()), 120)
     s, c = m.spectrum, m.correlation
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
-    density = {n: (v / DPH**2).tolist() for n, v in (("S", s.density), ("low", s.low), ("high", s.high))}
-    model = {"f": f.tolist(), "S": (2.0 * a.noise.spectrum(f, m.dt) / DPH**2).tolist()}
+    dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f, m.dt) / DPH**2
     lags = slice(0, SHOWN_LAGS + 1)
     return DriftColumn(
         name=p.name,
         unit="°/h",
-        record=_envelope(p) | _smoothed(p),
+        record=_envelope(p),
         deviations=[_deviation(kind, d) for kind, d in a.deviations.items()],
-        model={"tau": tau.tolist(), "dev": (a.noise.allan(tau) / DPH).tolist(), **model},
-        spectrum={"f": s.frequency.tolist(), **density},
-        correlation={"lag": c.lag[lags].tolist(), "rho": c.rho[lags].tolist(), "partial": c.partial[lags].tolist(),
-                     "bound": c.bound},
+        model=NoiseModelCurves(tau.tolist(), dev.tolist(), f.tolist(), density.tolist()),
+        spectrum=SpectrumBand(s.frequency.tolist(), *((v / DPH**2).tolist() for v in (s.density, s.low, s.high))),
+        correlation=SampleCorrelation(c.lag[lags].tolist(), c.rho[lags].tolist(), c.partial[lags].tolist(), c.bound),
         tables={
             "acquisition": [description.acquisition(p, run)],
             "regression": description.regression(p),
@@ -217,31 +212,30 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
     )  # fmt: skip
 
 
-def _smoothed(p: Prepared) -> dict[str, Any]:
+def _smoothed(p: Prepared) -> RateBand | None:
     """Gauss-Markov part of the longest stretch with its 95 % band, where Gauss-Markov and white noise describe it."""
     m, drift = p.model, p.model.gauss_markov
     if m.recommended not in ("ARMA(1,1)", "AR(1)") or drift is None or not drift.determined or not drift.density > 0.0:
-        return {}
+        return None
     y = block_means(p.stretch, m.factor)
     t = p.time[p.first] + m.model_dt * (np.arange(y.size) + 0.5)
     slope = m.trend.slope * (t - t.mean()) if m.trend is not None and m.detrended else np.zeros(y.size)
     value, sd = smooth_drift(y - slope, m.model_dt, drift)
     every = slice(None, None, max(1, y.size // SHOWN))
-    band = {"t": t, "mean": value + slope, "low": value + slope - NORMAL * sd, "high": value + slope + NORMAL * sd}
-    return {"smoothed": {n: (v[every] / (1.0 if n == "t" else DPH)).tolist() for n, v in band.items()}}
+    lines = (value + slope + side * NORMAL * sd for side in (-1.0, 0.0, 1.0))
+    return RateBand(t[every].tolist(), *((v[every] / DPH).tolist() for v in lines))
 
 
-def _deviation(kind: str, d: Deviation) -> dict[str, Any]:
-    scaled = {"dev": d.deviation, "low": d.low, "high": d.high}
-    return {"kind": KINDS[kind], "tau": d.tau.tolist(), **{n: (v / DPH).tolist() for n, v in scaled.items()},
-            "edf": d.edf.tolist()}  # fmt: skip
+def _deviation(kind: str, d: Deviation) -> DeviationCurve:
+    dev, low, high = ((v / DPH).tolist() for v in (d.deviation, d.low, d.high))
+    return DeviationCurve(KINDS[kind], d.tau.tolist(), dev, low, high, d.edf.tolist())
 
 
-def _envelope(p: Prepared) -> dict[str, Any]:
+def _envelope(p: Prepared) -> RateRecord:
     """Least and largest rate of each of SHOWN intervals, and its mean; gaps are left out."""
     edges = np.unique(np.linspace(0, p.rate.size, min(SHOWN, p.rate.size) + 1).astype(int))
     parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
     there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
     middle = 0.5 * (p.time[edges[:-1]] + p.time[edges[1:] - 1] + p.step)
     low, mean, high = ([float(f(parts[k])) / DPH for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
-    return {"t": middle[there].tolist(), "low": low, "mean": mean, "high": high}
+    return RateRecord(middle[there].tolist(), low, mean, high, _smoothed(p))

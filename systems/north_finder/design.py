@@ -42,7 +42,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
 
     def covariances(fits: Sequence[Findings], record: Record) -> list[Array]:
         (fit,) = fits
-        if "w_x" not in [q.name for q in fit.linear]:
+        if "w_x" not in fit.data.quantities:
             return [noise["y"].covariance(fit.t_start, fit.t_end)]
         half = fit.y.size // 2  # strapdown: x, then y
         V = np.zeros((fit.y.size, fit.y.size))

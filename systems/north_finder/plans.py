@@ -9,8 +9,8 @@ rest of the time is spent in moves and settling.  [NORTH-2POS, NORTH-4POS, NORTH
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from gyrobench import units
 from gyrobench.system.plan import Phase
@@ -32,15 +32,6 @@ PARTS = {
     "strapdown two": "northfinder_strapdown",
 }
 TURNING = ("continuous", "tilt")
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A method with its total time (s) and the standard deviation it reaches (rad)."""
-
-    method: str
-    time: float
-    sigma: float
 
 
 def move_time(angle: float) -> float:
@@ -104,15 +95,17 @@ def possible(level: bool, axes: int, rough: float) -> Iterator[str]:
         yield "strapdown two"
 
 
-def shortest(
-    sigma: float, density: float, latitude: float, rough: float, level: bool, axes: int, settle: float, step: float
-) -> Choice:
-    """Return the method that reaches sigma soonest."""
-    found = []
-    for m in possible(level, axes, rough):
-        lost = overhead(m, 12, False, settle, step)
-        found.append(Choice(m, total_time(m, sigma, density, latitude, rough, lost), sigma))
-    return min(found, key=lambda c: c.time)
+def shortest(options: Mapping[str, Any], step: float) -> tuple[float, str]:
+    """Return the total time (s) and the name of the method that reaches what is wanted soonest."""
+    wanted, density, latitude, rough, settle = (
+        float(options[n]) for n in ("wanted", "density", "latitude", "rough", "settle")
+    )
+
+    def time(method: str) -> float:
+        return total_time(method, wanted, density, latitude, rough, overhead(method, 12, False, settle, step))
+
+    best = min(possible(bool(options["level"]), int(options["axes"]), rough), key=time)
+    return time(best), best
 
 
 def phases(

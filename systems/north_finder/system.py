@@ -23,7 +23,7 @@ from .measured import MEASURED
 FACES = {plans.FACE: np.eye(3).tolist()}
 
 
-class NorthFinder(TableTest):
+class NorthFinding(TableTest):
     """The heading of a head from the horizontal Earth rate: two, four or several positions, continuous rotation, with
     the tilt measured, or strapdown.  The method is the estimator in the slot finder, and its plan.
 
@@ -117,25 +117,22 @@ class NorthFinder(TableTest):
             }
 
     @property
+    def auto(self) -> tuple[float, str] | None:
+        """Total time, s, and method, where the shortest is asked for; None otherwise, or without what it needs."""
+        if self["method"] != "auto" or not (self["wanted"] > 0.0 and self["density"] > 0.0):
+            return None
+        return plans.shortest(self.values, self.step)
+
+    @property
     def chosen(self) -> str:
         """The method; of auto the shortest."""
-        if self["method"] != "auto":
-            return str(self["method"])
-        if not self["wanted"] > 0.0 or not self["density"] > 0.0:
-            return "four"  # check() says what is missing
-        return self._shortest().method
-
-    def _shortest(self) -> plans.Choice:
-        return plans.shortest(
-            self["wanted"], self["density"], self["latitude"], self["rough"], self["level"], self["axes"],
-            self["settle"], self.step,
-        )  # fmt: skip
+        given = "four" if self["method"] == "auto" else str(self["method"])  # check() says what is missing
+        return self.auto[1] if self.auto else given
 
     @property
     def total(self) -> float:
         """Total time, s: the option, or what the method auto needs."""
-        auto = self["method"] == "auto" and self["wanted"] > 0.0 and self["density"] > 0.0
-        return self._shortest().time if auto else float(self["time"])
+        return self.auto[0] if self.auto else float(self["time"])
 
     def plan(self) -> Plan:
         if self.chosen not in plans.PARTS:
@@ -174,7 +171,7 @@ class NorthFinder(TableTest):
             return [*problems, f"method = {self['method']}: must be one of {', '.join(known)}"]
         if self["base"] not in BASES:
             problems.append(f"base = {self['base']}: must be one of {', '.join(BASES)}")
-        if self["method"] == "auto" and not (self["wanted"] > 0.0 and self["density"] > 0.0):
+        if self["method"] == "auto" and self.auto is None:
             problems.append("method = auto: give what is wanted and the noise of the gyro: wanted=1arcmin, "
                             "density=0.3deg/h/sqrt(Hz)")  # fmt: skip
         if abs(self["latitude"]) > math.radians(85.0):

@@ -26,6 +26,7 @@ from gyrobench import frames, units
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
+from gyrobench.reduction.estimation.fit_result import with_values
 from gyrobench.reduction.setup.sources import (
     ANGLE_ONCE,
     ANGLE_TWICE,
@@ -226,18 +227,10 @@ class Reduction(DriftTest[PickoffSetup]):
         )
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Return the result with zero, straightness and the readings; their correlation is not given."""
-        dense, n = np.linspace(self.angle.min(), self.angle.max(), 61), len(result.coefficients)
-        correlation = np.eye(n + 2)
-        correlation[:n, :n] = result.correlation
-        of_fit = tuple(result.names)  # what is said against the fit is not against the line through the readings
-        return replace(
-            result,
-            series=[self.levels.series(dense, float_angle(dense, self.setup.gain)), *result.series],
-            coefficients=[*result.coefficients, *self.levels.coefficients()],
-            correlation=correlation.tolist(),
-            reasons=[replace(r, names=r.names or of_fit) if r.blocks else r for r in result.reasons],
-        )
+        """Return the result with zero, straightness and the readings."""
+        dense = np.linspace(self.angle.min(), self.angle.max(), 61)
+        drawn = self.levels.series(dense, float_angle(dense, self.setup.gain))
+        return replace(with_values(result, self.levels.coefficients()), series=[drawn, *result.series])
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [

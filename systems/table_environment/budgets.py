@@ -19,9 +19,10 @@ import numpy as np
 from gyrobench import frames, units
 from gyrobench.arrays import Array
 
+ERU = units.EARTH_RATE
 KINDS = ("normal", "uniform", "fixed")
 DRAWS = 20_000
-SMALL = math.radians(1.0)
+SMALL = math.radians(1.0)  # largest misalignment
 #: Hu 1981, section 5.8: misalignments at ten times Earth rate
 ALIGN = (
     "table pointing 5arcsec; sensor mount 2arcsec; clamping 5arcsec; plate squareness 1arcsec; axis wobble 1arcsec; "
@@ -32,7 +33,7 @@ RATE_MODE = "zero 0.5arcsec; electrical 0.5arcsec; tracking 1arcsec; electronics
 
 
 @dataclass(frozen=True)
-class Line:
+class ErrorLine:
     """One line of a budget; size in SI."""
 
     name: str
@@ -42,17 +43,27 @@ class Line:
 
 @dataclass(frozen=True)
 class Total:
-    """rss: root of the squares of the effects of the sizes.  worst: their sum.  spread: standard deviation of the
-    draws.  within: bound of 95 % of them, from zero.
+    """each: effects of the sizes.  rss: root of their squares.  worst: their sum.  spread: standard deviation
+    of the draws.  within: bound of 95 % of them, from zero.
     """
 
+    each: list[float]
     rss: float
     worst: float
     spread: float
     within: float
 
+    def named(self) -> list[tuple[str, float]]:
+        """Return the totals as a table prints them."""
+        return [
+            ("root of squares", self.rss),
+            ("Monte Carlo, standard deviation", self.spread),
+            ("Monte Carlo, 95 % within", self.within),
+            ("worst case, sum", self.worst),
+        ]
 
-def parse(text: str, unit: str) -> list[Line]:
+
+def parse(text: str, unit: str) -> list[ErrorLine]:
     """Return the lines of an option value: "name 5arcsec uniform; ...".  Raises ValueError with what is wrong."""
     lines = []
     for entry in filter(None, (e.strip() for e in text.split(";"))):
@@ -68,13 +79,13 @@ def parse(text: str, unit: str) -> list[Line]:
             raise ValueError(f"'{entry}': the size needs its unit, all lines in units of one kind")
         if size < 0.0:
             raise ValueError(f"'{entry}': a size is not negative")
-        lines.append(Line(" ".join(words[:-1]), size, kind))
+        lines.append(ErrorLine(" ".join(words[:-1]), size, kind))
     if not lines:
         raise ValueError("no lines: at least one is needed, as in 'tracking 1arcsec'")
     return lines
 
 
-def draws(lines: Sequence[Line], seed: int, n: int = DRAWS) -> Array:
+def draws(lines: Sequence[ErrorLine], seed: int, n: int = DRAWS) -> Array:
     """Return errors (n, lines), drawn by their kinds."""
     rng = np.random.default_rng(seed)
 
@@ -87,7 +98,7 @@ def draws(lines: Sequence[Line], seed: int, n: int = DRAWS) -> Array:
 
 
 def combine(
-    lines: Sequence[Line], seed: int, effect: Callable[[Array], Array] = lambda e: np.asarray(e.sum(axis=1))
+    lines: Sequence[ErrorLine], seed: int, effect: Callable[[Array], Array] = lambda e: np.asarray(e.sum(axis=1))
 ) -> Total:
     """Return the totals of a budget.
 
@@ -97,31 +108,18 @@ def combine(
     scale = np.abs(effect(np.diag(sizes)))  # each alone
     found = effect(draws(lines, seed))
     within = float(np.quantile(np.abs(found), 0.95))
-    return Total(float(np.sqrt(np.sum(scale**2))), float(np.sum(scale)), float(np.std(found)), within)
+    return Total(scale.tolist(), float(np.sqrt(np.sum(scale**2))), float(np.sum(scale)), float(np.std(found)), within)
 
 
-def misalignment_rate(angle: Array | float, n: float, sense: int, earth_rate: float) -> Array:
-    """Return (n +- 1) W sin(angle): the rate on an input axis that leans towards the axis of a table on the pole.
+def misalignment_rate(angles: Array, n: float, sense: int) -> Array:
+    """Return (n +- 1) W sin(sum of the angles): the rates (draws,) on an input axis that leans towards the axis of a
+    table on the pole, by parts on one another (draws, lines).
 
-    n: table rate over Earth rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the
-    larger, n + 1.  Raises ValueError for an angle that is not small.  [ALIGN-ERRORS; Hu 1981, eq. 5-59]
+    All lean about the same axis, the worst that a stack of parts can do: their rotations add.  n: table rate over Earth
+    rate.  sense: +1 with the Earth (n + 1), -1 against it (n - 1), 0 not known: the larger, n + 1.
+    [ALIGN-ERRORS; Hu 1981, eq. 5-59]
     """
-    if np.any(np.abs(angle) > SMALL):
-        raise ValueError(f"an angle of {math.degrees(float(np.max(np.abs(angle)))):.3g}° is not small: 1° at most")
-    return np.asarray((n + (sense or 1)) * earth_rate * np.sin(angle))
-
-
-def rotated_rate(angles: Array, n: float, sense: int, earth_rate: float) -> Array:
-    """Return the rate (draws,) on an input axis that each line leans on towards the table axis, by rotations.
-
-    angles (draws, lines).  All lean about the same axis, the worst that a stack of parts can do.
-    """
-    axis = np.tile([1.0, 0.0, 0.0], (len(angles), 1))
-    for j in range(angles.shape[1]):
-        turn = angles[:, j]
-        c, s = np.cos(turn), np.sin(turn)
-        axis = np.column_stack([c * axis[:, 0] - s * axis[:, 2], axis[:, 1], s * axis[:, 0] + c * axis[:, 2]])
-    return np.asarray((n + (sense or 1)) * earth_rate * axis[:, 2])
+    return np.asarray((n + (sense or 1)) * ERU * np.sin(np.sum(angles, axis=1)))
 
 
 def latitude_problems(latitude: float) -> list[str]:

@@ -25,47 +25,40 @@ from scipy.interpolate import CubicSpline
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.run_metadata import Site
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, TORQUER_SCALE, TURNED, Source
+from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, RELATIVE, TORQUER_SCALE, TURNED, Source
 
-STATED = "relative, positive where the stated one is too large"
+RECORDED = Source(
+    "recorded.{cause}.scale", "scale of the {words}", RELATIVE, "u_scales", "relative, what is recorded"
+)  # fmt: skip
 
 
 def effects(
-    found: Findings, windows: Mapping[str, Array], k: float, site: Site, scales: Sequence[str],
-    sizes: Mapping[str, float],
-) -> list[Effect]:  # fmt: skip
-    """Return all sources; sizes: u_mount (rad), u_scale_factor (1), u_current (A), u_scales (1).
+    found: Findings, windows: Mapping[str, Array], s: SiteSetup, k: float, causes: Sequence[str]
+) -> list[Effect]:
+    """Return all sources; s: with u_mount (rad), u_scale_factor (1), u_current (A), u_scales (1).
 
-    scales: names of the recorded causes, in the order of the columns of the fit, which follow its constant and s_rate,
-    s_E, s_N among them.
+    k: torquer scale factor, rad/s/A.  causes: names of the recorded columns, in the order of the columns of the fit,
+    which follow its constant.
     """
     tilt_east, tilt_north = (np.asarray(windows[n], dtype=float) for n in ("tilt_east", "tilt_north"))
-    s_E, s_N = (float(found.est.beta[1 + scales.index(n)]) for n in ("tilt_east", "tilt_north"))
-    w, middle = site.earth_rate, (found.t_start + found.t_end) / 2.0
-    north, up = w * math.cos(site.latitude), w * math.sin(site.latitude)
+    s_E, s_N = (float(found.est.beta[1 + causes.index(n)]) for n in ("tilt_east", "tilt_north"))
+    w, middle = s.earth_rate, (found.t_start + found.t_end) / 2.0
+    north, up = w * math.cos(s.latitude), w * math.sin(s.latitude)
     turning = _rate(found.t_start, found.t_end, tilt_north)
     turned = {
         "input": np.full_like(middle, s_E),
         "output": -(north + tilt_east * up + turning) + s_E * tilt_north - s_N * tilt_east,
         "spin": -(up - tilt_east * north) - s_N,
     }
-
-    def scaled(column: int) -> Array:
-        dX = np.zeros_like(found.X)
-        dX[:, column] = found.X[:, column]
-        return found.error(dX=dX)
-
-    words = {n: n.replace("_", " ") for n in scales}
+    one = np.eye(found.X.shape[1])
     return [
-        *(TURNED[n].effect(sizes, found.error(e)) for n, e in turned.items()),
-        TORQUER_SCALE.effect(sizes, found.error(-k * windows["mean"]), note=STATED),
-        CURRENT_OFFSET.effect(sizes, found.error(-k)),
+        *(TURNED[n].effect(s, found.error(e)) for n, e in turned.items()),
+        TORQUER_SCALE.effect(s, found.error(-k * windows["mean"])),
+        CURRENT_OFFSET.effect(s, found.error(-k)),
         *(
-            Source(f"scale_of_the:{words[n]}", f"scale of the {words[n]}", "1", "u_scales").effect(
-                sizes, scaled(j), note="relative, what is recorded"
-            )
-            for j, n in enumerate(scales, 1)
+            RECORDED.of(cause=n, words=n.replace("_", " ")).effect(s, found.error(dX=found.X * one[j]))
+            for j, n in enumerate(causes, 1)
         ),
     ]
 

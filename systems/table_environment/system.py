@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from gyrobench import units
 from gyrobench.attitudes import parse
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
@@ -15,9 +15,9 @@ from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import OnRequest, Option, Slot, Windows
 
 from . import budgets
+from .budgets import ERU
 
 ATTITUDE = "E U"  # input axis east, output axis up, spin axis south
-ERU = units.EARTH_RATE
 HEAT = surroundings()["surroundings"]
 #: sensitivities of the test sensor of Hu 1981 (section 5.6), where the user gives no others
 SENSOR = {
@@ -141,10 +141,9 @@ class TableEnvironment(RebalanceTest):
         problems = super().check() + budgets.latitude_problems(self["latitude"])
         for name in ("align", "rate_mode"):
             try:
-                lines = budgets.parse(self[name], "rad")
-                if name == "align":
-                    for line in lines:
-                        budgets.misalignment_rate(line.size, self["turning"], self["sense"], ERU)
+                sizes = [line.size for line in budgets.parse(self[name], "rad")]
+                if name == "align" and max(sizes) > budgets.SMALL:
+                    problems.append(f"align: an angle of {math.degrees(max(sizes)):.3g}° is not small: 1° at most")
             except ValueError as error:
                 problems.append(f"{name}: {error}")
         if not self["averaging"] > 0.0:

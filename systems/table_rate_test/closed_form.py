@@ -54,6 +54,11 @@ class SampledLoop:
         b, g, a, scale = self.gains()
         return scale * (g - a) / (1 - b)
 
+    def count_torque(self, quantum: float) -> float:
+        """Return the torque that one count of the reader demands, N.m."""
+        _, g, _, scale = self.gains()
+        return scale * g * quantum
+
     def period(self, s: Array, reference: float, acc: float) -> Array:
         """Return the state one period after a sample with this reference, rad, and its acceleration over the period."""
         s = s.copy()

@@ -9,16 +9,6 @@ from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System, Windows
 
-KINDS = (
-    "air pressure low",
-    "over-rate",
-    "over-temperature",
-    "encoder lost",
-    "supply voltage low",
-    "pulse frequency high",
-    "pulse duty high",
-    "pulse amplitude low",
-)
 PAIRS = tuple(combinations(range(1, 9), 2))
 TURNS = 60
 GOLDEN = 0.6180339887498949

@@ -28,7 +28,7 @@ from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation import noise
 from gyrobench.system.system import load_system
 from systems.north_finder import plans
-from systems.north_finder.reduction import from_record
+from systems.north_finder.reduction import Reduction
 
 DPH = units.factor("deg/h")
 
@@ -71,7 +71,7 @@ def counted(job: tuple[str, int, int, float, bool, bool]) -> list[tuple[float, f
                 values |= coloured(windows, rng)
             record = session.run(values | {"nuisances": "auto" if trend else "none"}, seed=k)
             error = math.remainder(float(record.channels["finder.heading"][-1]) - values["heading"], 2.0 * math.pi)
-            psi = from_record(record)["ψ"]
+            psi = Reduction.from_record(record)["ψ"]
             held = psi.interval[0] <= float(psi.truth or 0.0) <= psi.interval[1]
             found.append((error, float(record.channels["finder.sigma"][-1]), held))
     return found

@@ -8,11 +8,12 @@ import pytest
 from scipy import stats
 
 from gyrobench.campaign.analysis.axis_effects import crossed_seeds, levels, main_effects, responses
-from gyrobench.campaign.analysis.intervals import clopper_pearson, normal_factor, order_trim, tolerance_interval
+from gyrobench.campaign.analysis.intervals import normal_factor, order_trim, tolerance_interval
 from gyrobench.campaign.analysis.lot_outliers import robust_outliers
 from gyrobench.campaign.analysis.lots import analyse_lot, control_limits
 from gyrobench.campaign.analysis.measures import CampaignMeasures, normalized_error
 from gyrobench.campaign.analysis.sobol_indices import factorial_indices, first_order, sobol_indices, values_as_bins
+from gyrobench.reduction.estimation.uncertainty import clopper_pearson
 
 
 # ------------------------------------------------------------------------------------------------ intervals

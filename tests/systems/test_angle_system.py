@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.system.system import System, load_system
+from systems.angle_system_test.reduction import Reduction
 
 NAME = "angle_system_test"
 ARCSEC = math.pi / 648000.0
@@ -116,15 +118,13 @@ def document(session: Session) -> Any:
     return session.run({}).run
 
 
-def reduction() -> Any:
-    import importlib
-
-    return importlib.import_module(".reduction", type(load()).__module__)
+def reduce(windows: Any, run: Any) -> Any:
+    return Reduction.reduce(windows, Reduction.setup_of(run))
 
 
 def test_ideal_readings_return_the_harmonics(document: Any) -> None:
     """Orders by hand: 3" sin(t + 0.4) is 3 sin 0.4 in the cosine, 3 cos 0.4 in the sine."""
-    result = reduction().reduce(Ideal().windows(load()), document)
+    result = reduce(Ideal().windows(load()), document)
     expected = {
         "cos_1": 3.0 * math.sin(0.4), "sin_1": 3.0 * math.cos(0.4), "cos_2": -0.7, "sin_2": 0.0, "sin_720": 0.2,
         "cos_360": -0.1, "cos_720": 0.0, "sin_1440": 0.0, "ref_cos_1": 1.1, "ref_sin_1": 0.0, "ref_sin_12": 0.5,
@@ -140,10 +140,10 @@ def test_ideal_readings_return_the_harmonics(document: Any) -> None:
 
 def test_a_reading_off_by_a_cycle_is_named_and_taken_out(document: Any) -> None:
     system = load()
-    clean = reduction().reduce(Ideal().windows(system), document)
-    result = reduction().reduce(Ideal(slip_at=(5,)).windows(system), document)
-    table = next(t for t in result.tables if t["title"] == "Readings off by whole fine cycles")
-    assert [(n, at) for _, n, at in table["rows"]] == [(1, "a rate")] * 6  # the sixth reading at each of six rates
+    clean = reduce(Ideal().windows(system), document)
+    result = reduce(Ideal(slip_at=(5,)).windows(system), document)
+    table = next(t for t in result.tables if t.id == "readings.slipped")
+    assert [(n, at) for _, n, at in table.rows] == [(1, "a rate")] * 6  # the sixth reading at each of six rates
     assert any("6 readings are off by whole fine cycles of 0.5°" in w for w in result.warnings)
     assert result["sin_1"].estimate == pytest.approx(clean["sin_1"].estimate, abs=2e-3)
     assert "clock_gate" not in result.names
@@ -152,12 +152,12 @@ def test_a_reading_off_by_a_cycle_is_named_and_taken_out(document: Any) -> None:
 def test_a_wrong_rate_of_the_table_is_in_the_budget(session: Session) -> None:
     """A table that is faster by 1e-5 than known makes both clocks look slow by that: the budget says so, with sign."""
     record = session.run({"u_rate": 1e-5})
-    result = reduction().reduce(record.windows, record.run)
+    result = reduce(record.windows, record.run)
     slower = [
         p.model_copy(update={"target": p.target / (1 + 1e-5)}) if p.mode == "rate" else p for p in record.run.plan
     ]
-    moved = reduction().reduce(record.windows, record.run.model_copy(update={"plan": slower}))
-    lines = {b.coefficient: b for b in result.budget if b.source == "rate of the table"}
+    moved = reduce(record.windows, record.run.model_copy(update={"plan": slower}))
+    lines = {b.coefficient: b for b in result.budget if b.id == "table.rate"}
     for name in ("clock_gate", "clock_inverse"):
         assert moved[name].estimate - result[name].estimate == pytest.approx(-10.0, rel=1e-2)
         assert lines[name].sensitivity == pytest.approx(-1e6, rel=1e-6)  # in 1e-6, for a relative error of 1
@@ -185,10 +185,10 @@ def test_random_systems_come_back(runs: list[Any]) -> None:
 def test_each_rate_is_read_within_its_u(runs: list[Any]) -> None:
     """Deviation of gates and degrees from the rate of the table: that of the clock drawn, within 4 u each."""
     for k, result in enumerate(runs):
-        table = next(t for t in result.tables if t["title"] == "Rate readouts")
-        assert len(table["rows"]) == 12  # two readouts, three rates, both ways
+        table = next(t for t in result.tables if t.id == "rate_readouts")
+        assert len(table.rows) == 12  # two readouts, three rates, both ways
         drawn = {"gates": random_system(k)["gate.clock"], "degrees": random_system(k)["inverse.clock"]}
-        for readout, rate, deviation, u, in_eru in table["rows"]:
+        for readout, rate, deviation, u, in_eru in table.rows:
             assert abs(deviation + drawn[readout] * 1e6) < 4.0 * u
             assert in_eru == pytest.approx(u * 1e-6 * abs(rate), rel=1e-9)
 
@@ -220,11 +220,14 @@ def test_coarse_errors_within_the_limit_never_slip_and_beyond_it_are_named(sessi
     good = measured(session, {"reader.mode": 0, "reader.coarse_zero": math.radians(0.199)})
     assert good.summary[-1] == "No reading is off by a fine cycle."
     bad = measured(session, {"reader.mode": 0, "reader.coarse_zero": math.radians(0.215)})
-    table = next(t for t in bad.tables if t["title"] == "Readings off by whole fine cycles")
+    table = next(t for t in bad.tables if t.id == "readings.slipped")
     n = sum(len(s.x) for s in bad.series) - 83  # a position has two rows
-    assert 0.06 < len(table["rows"]) / n < 0.25  # 0.15 of all angles, 0.015 deg of each 0.1 deg
-    assert all(abs(row[1]) == 1 for row in table["rows"])
+    assert 0.06 < len(table.rows) / n < 0.25  # 0.15 of all angles, 0.015 deg of each 0.1 deg
+    assert all(abs(row[1]) == 1 for row in table.rows)
     assert abs(bad["sin_1"].z) < 4.0  # and the calibration stands
+    limits = {"sin_1": (-10.0, 10.0)}
+    assert conclude(good, None, limits).verdict == "pass"
+    assert conclude(bad, None, limits).verdict == "inconclusive" and "ambiguous" in bad.withheld[-1]
 
 
 def test_a_diametral_head_separates_odd_orders_only(session: Session) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
+from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
 
@@ -72,8 +73,8 @@ def test_encoder_error_is_predicted_corrected_and_in_u(pwm: Session) -> None:
     plain, off = run(pwm, STILL), run(pwm, wrong)
     shift = value(off, "κ") - value(plain, "κ")
     assert shift == pytest.approx(85.1, rel=0.02)
-    predicted = next(t for t in off.tables if t["title"] == "Predicted shifts by simulated errors")
-    row = next(r for r in predicted["rows"] if r[0] == "κ")
+    predicted = next(t for t in off.tables if t.id == PREDICTED)
+    row = next(r for r in predicted.rows if r[0] == "κ")
     assert shift == pytest.approx(row[-3], rel=0.01) and row[-1] == "ppm"
 
     sine, cosine = 20.0 * math.cos(0.5), 20.0 * math.sin(0.5)
@@ -93,8 +94,8 @@ def test_tilt_of_the_table_is_a_bias(pwm: Session) -> None:
     plain, off = run(pwm, STILL), run(pwm, {**STILL, "table.tilt": [3000.0 * ARCSEC, 0.0]})
     shift = value(off, "I_0") - value(plain, "I_0")
     assert abs(shift) == pytest.approx(8.875, rel=0.02)
-    predicted = next(t for t in off.tables if t["title"] == "Predicted shifts by simulated errors")
-    assert shift == pytest.approx(next(r for r in predicted["rows"] if r[0] == "I_0")[-3], rel=0.02)
+    predicted = next(t for t in off.tables if t.id == PREDICTED)
+    assert shift == pytest.approx(next(r for r in predicted.rows if r[0] == "I_0")[-3], rel=0.02)
 
 
 def test_resolution_is_two_clocks(pwm: Session) -> None:

@@ -77,7 +77,8 @@ def test_rates_of_a_laboratory(tmp_path: Path) -> None:
         e = 0.3 * np.sin(a + 1.0) + 0.15 * np.sin(2.0 * a)
         variance += (0.1**2 + 0.18**2 / 12.0 + float(np.sum((e - np.polyval(np.polyfit(a, e, 1), a)) ** 2)) / 8.0) / 2.0
     assert clock.u == pytest.approx(math.sqrt(variance) / 0.4061, rel=0.25)  # of 16 degrees of freedom
-    assert "ppm (95 %) from 4 runs" in result.summary[0] and "1e" not in result.summary[0]
+    said = result.summary[0]
+    assert "from 4 runs" in said and said.endswith(" ppm (95 %).") and "1e" not in said
     for rate in (20, 500):  # both senses; the fast one over an angle of 125 deg
         c = result[f"error {rate} ERU"]
         assert abs(c.estimate - 8.0) < 4.0 * c.u and c.u < {20: 30.0, 500: 1.2}[rate]

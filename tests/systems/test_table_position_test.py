@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gyrobench as gb
+from gyrobench.reduction.loops.scale_errors import truth
 
 ARCSEC = math.pi / 648000
 QUICK = {"move_rate": "8deg/s", "settle": "0.5s", "dwell": "0.3s"}
@@ -47,10 +48,10 @@ def test_harmonics_come_back_in_spite_of_the_polygon(found: Any) -> None:
 
 
 def test_faces_of_the_polygon(found: Any) -> None:
-    rows = found.tables[0]["rows"]
+    rows = found.tables[0].rows
     assert rows[1][3] == pytest.approx(1.5 - (1.5 - 0.8) / 12)
-    for _, value, u, truth in rows:
-        assert abs(value - truth) < 4 * u
+    for _, value, u, true in rows:
+        assert abs(value - true) < 4 * u
     assert sum(row[1] for row in rows) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -70,6 +71,23 @@ def test_one_mount_separates_only_what_two_heads_do() -> None:
     for name in ("E2 cos", "E2 sin", "squareness x"):
         assert r[name].no_value and math.isnan(r[name].estimate)
     assert "order 2 is the same in all mounts" in r["E2 cos"].no_value
+
+
+def test_a_mount_that_is_taken_twice_is_one_mount() -> None:
+    r = position_run(mounts="0 0 60", positions=6, orders=2).result
+    for name in ("E1 cos", "E1 sin", "E2 cos", "E2 sin", "squareness x", "squareness y"):
+        assert abs(r[name].z) < 4.0, name
+
+
+def test_true_harmonics_are_those_at_the_head() -> None:
+    """0.7 sin(a + 0.4) of the scale's angle a = theta + 40 deg: 0.7 sin(0.698 + 0.4) cos theta and so on."""
+    names = ("eccentricity", "tilt", "pitch", "interpolation")
+    p = {f"reader.encoder_{n}": 0.0 for n in (*names, "d0", "de", "e3", "e5", *(f"{n}_phase" for n in names))}
+    p |= {"reader.pole_pairs": 360, "reader.head": math.radians(40.0), "reader.encoder_pitch_order": 12}
+    p |= {"reader.encoder_eccentricity": 0.7, "reader.encoder_eccentricity_phase": 0.4}
+    phase = math.radians(40.0) + 0.4
+    assert truth(p, "reader")[1] == pytest.approx((0.7 * math.sin(phase), 0.7 * math.cos(phase)))
+    assert truth(p, "reader")[2] == (0.0, 0.0) and truth({}, "reader") == {}
 
 
 def test_friction_loses_motion() -> None:

@@ -57,7 +57,7 @@ def test_time_base_and_rates_come_back(found: Any) -> None:
 def test_three_readouts_agree(found: Any) -> None:
     """By gates of 10 s one count is 1.2e-3 of 1 ERU, by 1 deg marks the clock's 1e-4 s is 8e-4 of 1999.9 ERU."""
     table = found.result.tables[0]
-    rows = {row[0]: row for row in table["rows"]}
+    rows = {row[0]: row for row in table.rows}
     assert sum(row[3] is not None for row in rows.values()) >= 1  # a gate that began in the phase and ended in it
     for eru, row in rows.items():
         assert row[3] is None or abs(row[3]) < 1.3e3 / min(abs(eru), 100.0) + 50
@@ -70,7 +70,7 @@ def test_three_readouts_agree(found: Any) -> None:
 def test_tracking_is_a_fraction_of_a_count(found: Any) -> None:
     for eru in ("1", "100", "1999.9"):
         assert 0.02 < found.result[f"ripple {eru} ERU"].estimate < 0.18
-    assert all(abs(row[5]) < 0.02 for row in found.result.tables[0]["rows"])  # mean of the error, arcsec
+    assert all(abs(row[5]) < 0.02 for row in found.result.tables[0].rows)  # mean of the error, arcsec
 
 
 def test_torque_of_the_largest_change_is_that_of_the_linear_loop(found: Any) -> None:
@@ -78,7 +78,7 @@ def test_torque_of_the_largest_change_is_that_of_the_linear_loop(found: Any) -> 
     assert c.closed == pytest.approx(2.94, abs=0.1)  # J a = 2.56 N.m and the correction of the feedback
     assert abs(c.estimate - c.closed) < 3 * c.u
     (step,) = [x for x in found.result.responses if x.kind == "step"]
-    exact = np.interp(step.x, step.curves[0]["x"], step.curves[0]["y"])
+    exact = np.interp(step.x, step.curves[0].x, step.curves[0].y)
     assert np.abs(np.array(step.y) - exact).max() < 0.55  # three counts
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.uncertainty import clopper_pearson, poisson_interval
 from gyrobench.result import LoopResult
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
@@ -43,7 +44,7 @@ def test_every_fault_and_every_pair_is_found_and_named(record: Record, found: Lo
     assert w["fault"].size == 1 + 24 + 28  # the quiet time and the turns
     pairs = {(int(a), int(b)) for a, b in zip(w["fault"], w["also"], strict=True) if b}
     assert pairs == set(combinations(range(1, 9), 2))
-    rows = found.tables[0]["rows"]
+    rows = found.tables[0].rows
     assert [r[1:4] for r in rows] == [[3, 3, 3]] * 8 + [[28, 28, 28]]
     assert found["missed"].estimate == 0.0
     assert found["missed"].interval[1] == pytest.approx(100.0 * (1.0 - 0.025 ** (1.0 / 52.0)))  # none of 52
@@ -74,7 +75,7 @@ def test_detection_times_are_those_of_the_sampling(found: LoopResult) -> None:
 def test_a_table_that_is_switched_off_stops(record: Record, found: LoopResult) -> None:
     off = record.windows["tripped"] > 0.0
     assert off.sum() >= 12 and np.all(np.abs(record.windows["rate"][off]) < 1e-9)
-    assert not found.warnings
+    assert not found.reasons
 
 
 def test_false_alarms_come_at_the_rate_of_their_noise(session: Session) -> None:
@@ -93,16 +94,16 @@ def test_false_alarms_come_at_the_rate_of_their_noise(session: Session) -> None:
 
 def test_intervals_of_counts() -> None:
     """Of 0 in n: 1 - 0.025^(1/n); of 5 counts: 1.62 to 11.67 (tables)."""
-    assert reduction.fraction_interval(0, 20) == pytest.approx((0.0, 1.0 - 0.025 ** (1.0 / 20.0)))
-    assert reduction.poisson_interval(5) == pytest.approx((1.62, 11.67), abs=0.01)
-    assert reduction.poisson_interval(0) == pytest.approx((0.0, -math.log(0.025)))
+    assert clopper_pearson(0, 20) == pytest.approx((0.0, 1.0 - 0.025 ** (1.0 / 20.0)))
+    assert poisson_interval(5) == pytest.approx((1.62, 11.67), abs=0.01)
+    assert poisson_interval(0) == pytest.approx((0.0, -math.log(0.025)))
 
 
 def test_a_fault_under_another_name_and_an_alarm_before_it_are_counted(session: Session, record: Record) -> None:
     windows = {n: v.copy() for n, v in record.windows.items()}
     windows["first"][5], windows["reason"][5] = 2.0, 0.0  # supply voltage called over-temperature
     windows["t_alarm"][13] = windows["t_fault"][13] - 0.1
-    result = reduction.from_record(Record(windows, {}, record.run))
+    result = reduction.Reduction.from_record(Record(windows, {}, record.run))
     assert result["misnamed"].estimate == pytest.approx(100.0 / 52.0)
     assert result["missed"].estimate == pytest.approx(100.0 / 52.0)
     assert "1 turns had an alarm before the fault" in result.warnings[0]

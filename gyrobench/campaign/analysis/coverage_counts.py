@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.campaign.analysis.intervals import clopper_pearson, effective_runs
+from gyrobench.campaign.analysis.intervals import effective_runs
 from gyrobench.campaign.analysis.lot_attention import DOUBTFUL
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, normalized_error, numbers, shared_seeds
+from gyrobench.reduction.estimation.uncertainty import clopper_pearson
 
 NOMINAL = 0.95
 

@@ -1,4 +1,4 @@
-"""Intervals of a share and of a population: Clopper-Pearson bounds, tolerance intervals."""
+"""Tolerance intervals of a population, and how many independent runs those of clusters are worth."""
 
 from __future__ import annotations
 
@@ -14,17 +14,6 @@ from gyrobench.arrays import Array
 CONTENT = 0.95  # share of the population inside a tolerance interval
 CONFIDENCE = 0.95
 NORMALITY = 0.05  # p of the Shapiro-Wilk test below which the normal interval is not used
-
-
-def clopper_pearson(hits: float, runs: float, level: float = 0.95) -> tuple[float, float]:
-    """Return the exact bounds of a share that was met ``hits`` times in ``runs``; (0, 1) for no run at all.
-
-    Numbers that are not whole are those of runs that count less, see :func:`effective_runs`.
-    """
-    tail = 0.5 * (1.0 - level)
-    low = float(stats.beta.ppf(tail, hits, runs - hits + 1)) if hits > 0 else 0.0
-    high = float(stats.beta.ppf(1.0 - tail, hits + 1, runs - hits)) if hits < runs else 1.0
-    return low, high
 
 
 def effective_runs(hit: NDArray[np.bool_], cluster: NDArray[np.intp]) -> float:

@@ -149,8 +149,9 @@ def window_problems(
 
 
 def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gain: float, limit: float) -> list[str]:
-    """Return where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and
-    std) and its gain, V/rad of the case, as far as both are known.
+    """Return where the table did not follow the gyro to ``limit`` (rad), as a sentence.
+
+    From the pickoff voltage (columns mean and std) and the gain of the gyro, as far as both are known.
     """
     if not gain or "mean" not in windows or not limit > 0.0:
         return []
@@ -170,11 +171,12 @@ def effects(
     held: HeldWindows, site: Site, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
     sizes: Any,
 ) -> list[Effect]:  # fmt: skip
-    """Return axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Return the effects of type B of the set-up of a held table.
 
-    sizes: a setup with u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time
-    (relative).  The axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the
-    angle errors.  columns: what is fitted.
+    Axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.  sizes: u_axis,
+    u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The axis is set up anew
+    in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
+    columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
 
@@ -239,8 +241,10 @@ def candidates(
     phase: NDArray[np.int_],
     windows: Mapping[str, Array],
 ) -> list[Candidate]:
-    """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
-    differ from phase to phase, each of which is set up by itself.
+    """Return the set-up effects that a held table may have.
+
+    Misalignment of the input axis, trend, temperature, constants that differ from phase to phase, each of which is set
+    up by itself.
 
     columns: what is fitted.  windows: the rows of ``held``, with the thermometers of a measured record.
     """
@@ -262,8 +266,9 @@ def candidates(
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
-    """Return the estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those
-    names.
+    """Return the table of the estimates in the notation and torque sign of Hu 1981.
+
+    combined: our name -> a combination in that notation.
     """
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):

@@ -17,14 +17,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift import drift_terms, harmonic, window_regressors
 from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
@@ -41,7 +39,6 @@ from gyrobench.reduction.setup import setups, sources
 from gyrobench.reduction.setup.sources import Source
 
 T = TypeVar("T", bound=setups.TurningSetup)
-SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 Formulas = tuple[dict[str, float], dict[str, Fit], str]
 
 
@@ -206,31 +203,24 @@ class TurningTest(DriftTest[T]):
         """Return all sources with their sensitivities; sizes come from the setup and may be 0."""
         s, t, X, rate = self.setup, self.turning, found.X, self.rate(self.turning)
 
-        def geometry(turned: window_regressors.Turning, base: Array = s.base) -> Array:
-            return found.error(self.rate(turned, base) - rate, self.design(turned, base) - X) / SMALL
+        def error(turned: window_regressors.Turning, base: Array) -> Array:
+            return found.error(self.rate(turned, base) - rate, self.design(turned, base) - X)
 
-        def axis(k: int) -> Array:  # the reduction believes the axis to be where it is not
-            return -geometry(t, s.base @ frames.rotation(s.base[k], SMALL).T)
-
-        def mount(direction: Array) -> Array:
-            return geometry(replace(t, face=frames.rotation(direction, SMALL) @ t.face))
-
-        def angles(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
-            return np.array([geometry(wrong) for wrong in window_regressors.misread(t, n, SMALL)])
+        believed = window_regressors.BelievedGeometry(t, s.base, error)
 
         def wobble() -> Array:  # at the phases 0 and 90 degrees
             errors = []
-            for rates, dX in window_regressors.wobbles(t, s.base, s.place, self.terms, SMALL):
-                believed = np.column_stack([dX, rates[:, self.across]]) if s.tilt else dX
-                errors.append(found.error(-rates[:, self.axis], believed))
+            for rates, dX in window_regressors.wobbles(t, s.base, s.place, self.terms):
+                wrong = np.column_stack([dX, rates[:, self.across]]) if s.tilt else dX
+                errors.append(found.error(-rates[:, self.axis], wrong))
             return np.array(errors)
 
         return [
-            sources.AXIS_POLE_EAST.effect(s, axis(0)),
-            sources.AXIS_POLE_NORMAL.effect(s, axis(1)),
-            *(source.effect(s, mount(sense * np.eye(3)[k])) for source, k, sense in self.mounting),
+            sources.AXIS_POLE_EAST.effect(s, believed.axis(0)),
+            sources.AXIS_POLE_NORMAL.effect(s, believed.axis(1)),
+            *(source.effect(s, believed.mount(k, sense)) for source, k, sense in self.mounting),
             sources.WOBBLE.effect(s, wobble()),
-            sources.ANGLE_ONCE.effect(s, angles(1)),
-            sources.ANGLE_TWICE.effect(s, angles(2)),
+            sources.ANGLE_ONCE.effect(s, believed.angles(1)),
+            sources.ANGLE_TWICE.effect(s, believed.angles(2)),
             *drift_terms.torquer_effects(s, found, self.k, self.read, self.quantum, self.pulses, self.torquer),
         ]

@@ -1,5 +1,4 @@
-"""What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rates along its
-axes.
+"""Window means of what a gyro on a turning table senses: regressors of the drift model, rates along its axes.
 
 During a window a driven table turns evenly from angle_start to angle_end, one that its gyro holds along a curve through
 the readings.  Averages are Gauss-Legendre sums over the time, exact to rounding for windows up to a radian; no harmonic
@@ -9,13 +8,14 @@ rate of a driven table inside a window.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from gyrobench import drift
+from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.frames import G0, pole
 from gyrobench.reduction.setup.run_metadata import Site
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 NODES, _WEIGHTS = leggauss(12)
 _WEIGHTS = _WEIGHTS / 2.0
+SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,33 @@ def held_nodes(angle_start: Array, angle_end: Array, t_start: Array, t_end: Arra
     return out
 
 
-def misread(turning: Turning, n: int, size: float) -> list[Turning]:
-    """Return the windows of an encoder that reads too much by ``size`` (rad) times sin n theta, and cos n theta."""
-    cases = []
-    for wave in (np.sin, np.cos):
-        start, end = (a + size * wave(n * a) for a in (turning.angle_start, turning.angle_end))
-        cases.append(replace(turning, angle_start=start, angle_end=end))
-    return cases
+@dataclass(frozen=True)
+class BelievedGeometry:
+    """Errors of the data (n,), per rad, of windows whose geometry is not what the reduction believes.
+
+    base: table axes at angle 0 in (E, N, U).  error: of the data where turning and base are these instead.
+    """
+
+    turning: Turning
+    base: Array
+    error: Callable[[Turning, Array], Array]
+
+    def axis(self, k: int) -> Array:
+        """Return the error of a table axis that is turned about the k-th axis of the table."""
+        return -self.error(self.turning, self.base @ frames.rotation(self.base[k], SMALL).T) / SMALL
+
+    def mount(self, k: int, sense: float = 1.0) -> Array:
+        """Return the error of a gyro that is turned about its k-th axis, in a sense of 1 or -1."""
+        turn = frames.rotation(sense * np.eye(3)[k], SMALL)
+        return self.error(replace(self.turning, face=turn @ self.turning.face), self.base) / SMALL
+
+    def angles(self, n: int) -> Array:
+        """Return the errors (2, n) of an encoder that reads too much by sin n theta, and by cos n theta."""
+        errors = []
+        for wave in (np.sin, np.cos):
+            start, end = (a + SMALL * wave(n * a) for a in (self.turning.angle_start, self.turning.angle_end))
+            errors.append(self.error(replace(self.turning, angle_start=start, angle_end=end), self.base) / SMALL)
+        return np.array(errors)
 
 
 def average(values: Array) -> Array:
@@ -93,19 +114,19 @@ def average(values: Array) -> Array:
     return out
 
 
-def _in_face(local: Array, turning: Turning, base: Array) -> Array:
-    """Return a local vector (3,) in face axes at every node: (n, 12, 3)."""
-    x, y, z = base @ local
+def _in_face(vector: Array, turning: Turning) -> Array:
+    """Return a vector in table axes at angle 0, (3,) or (n, 12, 3) of each node, in face axes at every node."""
+    x, y, z = np.moveaxis(vector, -1, 0)
     a = turning.nodes()
     c, s = np.cos(a), np.sin(a)
-    table = np.stack([c * x + s * y, -s * x + c * y, np.full_like(a, z)], axis=-1)
+    table = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, a.shape)], axis=-1)
     out: Array = np.einsum("nij,nkj->nki", turning.face, table)
     return out
 
 
 def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names`` at local gravity ``gravity`` (m/s2)."""
-    xyz = _in_face(np.array([0.0, 0.0, -gravity / G0]), turning, base)
+    xyz = _in_face(base @ np.array([0.0, 0.0, -gravity / G0]), turning)
     return average(drift.regressors(xyz, names))
 
 
@@ -113,15 +134,13 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     """Return the window means (n,) of the inertial rate along a gyro axis (0 input, 1 output, 2 spin), rad/s: Earth and
     table.
     """
-    earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, axis])
+    earth = average(_in_face(base @ (earth_rate * pole(latitude)), turning)[:, :, axis])
     table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
     out: Array = earth + turning.face[:, axis, 2] * table
     return out
 
 
-def wobbles(
-    turning: Turning, base: Array, site: Site, names: tuple[str, ...], size: float
-) -> list[tuple[Array, Array]]:  # fmt: skip
+def wobbles(turning: Turning, base: Array, site: Site, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
     """Return what a table axis that goes round a cone twice a turn does, per rad, at the phases 0 and 90 degrees.
 
     Rates (n, 3) along the gyro axes that are there beside those of a true axis, and means (n, p) of the regressors of a
@@ -130,21 +149,15 @@ def wobbles(
     besides.
     """
     theta = turning.nodes()
-    c, s = np.cos(theta), np.sin(theta)
     turn = ((turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start))[:, None]
-
-    def seen(v: Array) -> Array:  # along the gyro axes, of (n, 12, 3) in table axes at angle 0
-        x, y, z = (v[..., k] for k in range(3))
-        return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
-
-    up = np.broadcast_to(base @ np.array([0.0, 0.0, -site.g]), (*theta.shape, 3))
+    up = base @ np.array([0.0, 0.0, -site.g])
     earth = base @ (site.earth_rate * pole(site.latitude))
-    still = drift.regressors(seen(up), names)
+    still = drift.regressors(_in_face(up, turning), names)
     found = []
     for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
         q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
         going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
-        rate = average(seen(going - np.cross(q, earth)))
-        dX = average(still - drift.regressors(seen(up - size * np.cross(q, up)), names)) / size
+        rate = average(_in_face(going - np.cross(q, earth), turning))
+        dX = average(still - drift.regressors(_in_face(up - SMALL * np.cross(q, up), turning), names)) / SMALL
         found.append((rate, dX))
     return found

@@ -10,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -134,6 +134,22 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         site=setup.shown,
         instrument=setup.instrument,
         simulated=setup.truth is not None or any(q.truth is not None for q in fit.quantities),
+    )
+
+
+def with_values(result: DriftTestResult, more: Sequence[Coefficient]) -> DriftTestResult:
+    """Return the result with values that are not unknowns of its fit behind its coefficients.
+
+    Their correlation with them is not given, and what is said against the fit is not against them.
+    """
+    n, m, of_fit = len(result.coefficients), len(more), tuple(result.names)
+    correlation = np.eye(n + m)
+    correlation[:n, :n] = result.correlation
+    return replace(
+        result,
+        coefficients=[*result.coefficients, *more],
+        correlation=correlation.tolist(),
+        reasons=[replace(r, names=r.names or of_fit) if r.blocks else r for r in result.reasons],
     )
 
 

@@ -16,6 +16,7 @@ from dataclasses import replace
 from gyrobench.result import Coefficient, Result
 
 ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
+SAID = {"arcsec": "″", "1e-6": "ppm"}  # units as a sentence has them
 FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 
 
@@ -60,7 +61,8 @@ class Sentence(str):
 def with_u(c: Coefficient, negated: bool = False) -> str:
     """Return "10.151 ± 0.046 Hz"; six digits of an estimate without u; whether it may be zero."""
     zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
-    text = plus_minus(replace(c, estimate=-c.estimate) if negated else c).removesuffix(" (95 %)")
+    shown = replace(c, estimate=-c.estimate if negated else c.estimate, unit=SAID.get(c.unit, c.unit))
+    text = plus_minus(shown).removesuffix(" (95 %)")
     return re.sub(r" (?=[°″′]$)| 1$", "", text) + zero
 
 

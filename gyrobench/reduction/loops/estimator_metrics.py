@@ -1,4 +1,4 @@
-"""How good an estimator is, where the truth is known: error, delay, noise against distortion, consistency.
+"""Quality of an estimator where the truth is known: error, delay, noise against distortion, consistency.
 
 Less noise alone proves nothing (an estimate that is always 0 has none): every measure of noise has one of distortion
 beside it, the gain and phase with which a known signal comes through.  [EST-KF-AR, BENCH-DYN-SINE]
@@ -82,7 +82,7 @@ class Consistency:
 
 # ------------------------------------------------------------------------------------ mean squares
 def independent_squares(x: Array) -> float:
-    """Return how many of the n squares of a series about zero count as independent, n/(1 + 2 sum rho_k^2).
+    """Return the number of independent ones among the n squares of a series about zero, n/(1 + 2 sum rho_k^2).
 
     Lags up to n/20; each squared correlation is taken less 1/n, which is what white noise leaves of it.
     """
@@ -90,9 +90,7 @@ def independent_squares(x: Array) -> float:
     power = float(x @ x)
     if n < 40 or power == 0.0:
         return float(max(n, 1))
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(x, size)
-    rho = np.fft.irfft(spectrum * spectrum.conj(), size)[1 : n // 20 + 1] / power
+    rho = _products(x)[1 : n // 20 + 1] / power
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum(rho * rho - 1.0 / n))))
 
 
@@ -105,11 +103,16 @@ def lasting_squares(x: Array) -> float:
     power = float(x @ x) / n
     if n < 40 or power == 0.0:
         return 1.0
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(x, size)
     lags = np.arange(1, n)
-    rho = np.fft.irfft(spectrum * spectrum.conj(), size)[lags] / (n - lags) / power
+    rho = _products(x)[lags] / (n - lags) / power
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum((1.0 - lags / n) * (rho * rho - 1.0 / (n - lags))))))
+
+
+def _products(x: Array) -> Array:
+    """Return the sums of x_j x_(j+k) over all j, k = 0, 1, ... (n - 1 at least)."""
+    size = 1 << (2 * x.size - 1).bit_length()
+    spectrum = np.fft.rfft(x, size)
+    return np.asarray(np.fft.irfft(spectrum * spectrum.conj(), size))
 
 
 def rms(x: Array) -> UncertainValue:
@@ -163,7 +166,7 @@ def _scatter(values: list[float]) -> float:
 
 @dataclass(frozen=True)
 class SignalResponse:
-    """How a known signal comes through: gain, phase (rad, negative: late), and what else the estimate holds."""
+    """Response to a known signal: gain, phase (rad, negative: late), and what else the estimate holds."""
 
     gain: UncertainValue
     phase: UncertainValue | None
@@ -265,7 +268,7 @@ def nees(error: Array, variance: Array, level: float = 0.999) -> Consistency:
 
 
 def nis(values: Array, level: float = 0.999) -> Consistency:
-    """Return the normalized innovation squared, scalar readings; they are white if the filter is right: dof = n."""
+    """Return the normalized innovation squared of scalar readings; white innovations of a right filter: dof = n."""
     return _consistency(float(np.mean(values)), float(values.size), level)
 
 

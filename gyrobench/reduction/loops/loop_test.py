@@ -26,7 +26,7 @@ class MeasureTest:
     """One reduction of one record; see the module."""
 
     part: ClassVar[str] = ""  # slot of the part that the test is of; "": the instrument that the record names
-    ranked_by: ClassVar[str] = ""  # the coefficient that ranks runs in a comparison, smallest first
+    ranked_by: str = ""  # the coefficient that ranks runs in a comparison, smallest first
     said: ClassVar[tuple[str, ...]] = ()  # the numbers that matter, as sentences with coefficients in braces
     found: MeasureFindings
 
@@ -34,9 +34,8 @@ class MeasureTest:
         self.record, self.run = record, record.run
         self.found = self.findings()
         if self.part:
-            self.found.facts["instrument"] = self.name = (
-                self.run.parts[self.part].name if self.part in self.run.parts else ""
-            )
+            self.name = self.run.parts[self.part].name if self.part in self.run.parts else ""
+            self.found.facts["instrument"] = self.name or self.run.instrument
 
     def findings(self) -> MeasureFindings:
         """Return what collects the figures, empty."""
@@ -55,7 +54,7 @@ class MeasureTest:
         """Return what a record says.  Raises ReductionError."""
         test = cls(record)
         account = test.measure()
-        return test.found.result(account, [] if test.found.unstable else test.summary(), cls.ranked_by)
+        return test.found.result(account, [] if test.found.unstable else test.summary(), test.ranked_by)
 
 
 class LoopTest(MeasureTest):

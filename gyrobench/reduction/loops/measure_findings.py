@@ -52,14 +52,16 @@ class MeasureFindings:
     def measure(
         self, name: str, meaning: str, unit: str, estimate: float | None, u: float | None = None, *,
         scale: float = 1.0, closed: float | None = None, truth: float | None = None, no_value: str = "",
-        unsettled: str = "", dof: float = math.inf, limit: Limit | None = None,
+        unsettled: str = "", dof: float = math.inf, k: float | None = None, limit: Limit | None = None,
+        interval: tuple[float, float] | None = None,
     ) -> None:  # fmt: skip
         """Add a row of the table of coefficients; nothing for an estimate of None without a reason.
 
         scale: SI of all numbers per printed unit; 1: they are in that unit.  u: standard uncertainty, None or 0 where
-        the data leave none; dof: its degrees of freedom.  closed: the closed form.  no_value: why there is no estimate;
-        without a limit such a row says no more than that.  unsettled: the same, with the verdict void.  limit: printed
-        unit, what the test itself requires.
+        the data leave none; dof: its degrees of freedom; k: its coverage factor, if not by these; interval: of 95 %,
+        printed unit, if not estimate +- k u.  closed: the closed form.  no_value: why there is no estimate; without a
+        limit such a row says no more than that.  unsettled: the same, with the verdict void.  limit: printed unit, what
+        the test itself requires.
         """
         no_value = unsettled or no_value
         if no_value:
@@ -71,11 +73,14 @@ class MeasureFindings:
         assert value is not None
         if unsettled:
             self.reasons.append(Reason("unsettled", unsettled, EVERY, (name,), "void", "condition"))
-        k = float(special.stdtrit(dof, 0.975)) if math.isfinite(dof) else NORMAL
+        if interval is not None and size > 0.0:
+            k = 0.5 * (interval[1] - interval[0]) / size
+        if k is None:
+            k = float(special.stdtrit(dof, 0.975)) if math.isfinite(dof) else NORMAL
         self.coefficients.append(
             Coefficient(
                 name=name, meaning=meaning, unit=unit, estimate=value, u=size, k=k, u_a=size, closed=known, truth=true,
-                interval=(value - k * size, value + k * size), dof=dof if math.isfinite(dof) else None,
+                interval=interval or (value - k * size, value + k * size), dof=dof if math.isfinite(dof) else None,
                 z=(value - true) / size if true is not None and size > 0.0 else None, no_value=no_value,
                 limit=limit,
             )

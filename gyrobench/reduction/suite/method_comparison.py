@@ -23,6 +23,7 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
+from gyrobench.reduction.suite.ranking import adjusted
 from gyrobench.result import Coefficient, DriftTestResult, Reason, SuiteComparison, SuiteResult, Test
 from gyrobench.result_suite import (
     FailedMember,
@@ -56,7 +57,7 @@ class Member:
 
 @dataclass(frozen=True)
 class MeasurandComparison:
-    """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
+    """Values of one quantity by all methods.  found: None where one alone sees it, or nothing can be weighed."""
 
     quantity: Measurand
     values: tuple[MethodValue, ...]
@@ -81,7 +82,7 @@ class MeasurandComparison:
         return consistency.outlier(self.values) if self.disagree else None
 
     def words(self) -> str:
-        """Which methods disagree, and by how much."""
+        """Return which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
         significant = [
@@ -100,7 +101,7 @@ class MeasurandComparison:
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[MeasurandComparison]:
-    """Every quantity that the results report, by every one that sees it."""
+    """Return every quantity that the results report, by every one that determines it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
     out = []
@@ -110,9 +111,8 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
         out.append(MeasurandComparison(q, values, consistency.combine_values(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
-    adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
-    for k, p in zip(tested, adjusted, strict=True):
-        out[k] = MeasurandComparison(out[k].quantity, out[k].values, out[k].found, p)
+    for k, p in zip(tested, adjusted([out[k].found.p for k in tested]), strict=True):  # type: ignore[union-attr]
+        out[k] = replace(out[k], p=p)
     return out
 
 
@@ -175,7 +175,7 @@ def combine_methods(
     conventions: Sequence[str] = (), shared: Collection[str] = (), failed: Mapping[str, str] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> SuiteResult:  # fmt: skip
-    """Return what several tests say together.  shared: ids of sources that are one and the same error in all tests.
+    """Return one result of several tests.  shared: ids of sources of type B that are one error in all tests.
 
     failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
     """
@@ -185,46 +185,43 @@ def combine_methods(
     if reasons := problems(results):
         raise ReductionError(reasons)
     compared = compare(results, shared)
-    coefficients = [_coefficient(c) for c in compared]
-    first = next(iter(results.values()))
-    tests = [
-        Test(
-            f"consistency:{c.quantity.name}",
-            f"consistency, {c.quantity.name}",
-            c.found.Q,
-            c.found.p,
-            "differences beyond the u of the methods",
-            c.words(),
-        )
-        for c in compared
-        if c.found is not None
-    ]
-    sites = [r.site for r in results.values()]
+    alike = common(results, shared)
     comparison = SuiteComparison(
         rule=RULE,
-        shared=list(
-            dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in common(results, shared))
-        ),
+        shared=list(dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in alike)),
         members=[_member(label, m) for label, m in members.items()],
         failed=[FailedMember(n, why) for n, why in (failed or {}).items()],
         quantities=[_quantity(c) for c in compared],
         pairs=[
             MethodPair(c.quantity.name, c.quantity.unit, p.a, p.b, p.difference, p.U, p.E_n)
-            for c in compared
-            if c.found is not None
-            for p in c.found.pairs
+            for c in compared if c.found is not None for p in c.found.pairs
         ],
         **_consistency(compared),
-    )
-    return SuiteResult(
+    )  # fmt: skip
+    first, *others = results.values()
+    said_alike = [s for s in first.conventions if all(s in r.conventions for r in others)]
+    found = SuiteResult(
         system=system, title=title, method=method, sources=list(sources),
-        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
-        coefficients=coefficients, tests=tests,
-        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
-        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
-        simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
+        conventions=list(dict.fromkeys([*conventions, *said_alike])), coefficients=[_coefficient(c) for c in compared],
+        provenance=dict(provenance or {}), suite=comparison, **_facts(results),
+    )  # fmt: skip
+    return replace(
+        found, tests=[_test(c, c.found) for c in compared if c.found is not None],
         summary=_summary(comparison, compared), reasons=_reasons(results, compared, failed or {}),
     )  # fmt: skip
+
+
+def _facts(results: Mapping[str, DriftTestResult]) -> dict[str, Any]:
+    """Return the site of all tests ({} where it differs), the names of the instruments, whether they are simulated."""
+    first, *others = results.values()
+    names = dict.fromkeys(r.instrument for r in results.values() if r.instrument)
+    site = dict(first.site) if all(r.site == first.site for r in others) else {}
+    return {"site": site, "instrument": ", ".join(names), "simulated": first.simulated}
+
+
+def _test(c: MeasurandComparison, found: consistency.Agreement) -> Test:
+    name, what = c.quantity.name, "differences beyond the u of the methods"
+    return Test(f"consistency:{name}", f"consistency, {name}", found.Q, found.p, what, c.words())
 
 
 def _coefficient(c: MeasurandComparison) -> Coefficient:
@@ -238,12 +235,11 @@ def _coefficient(c: MeasurandComparison) -> Coefficient:
         estimate, u, U, u_a, dof = v.estimate, v.u, v.U, v.u_a, v.dof
         meaning = f"{q.meaning}; {v.label} only" if len(c.values) == 1 else q.meaning
     truth = c.truth
-    return Coefficient(
-        name=q.name, meaning=meaning, unit=q.unit, estimate=estimate, u=u, k=U / u if u > 0.0 else NORMAL,
-        interval=(estimate - U, estimate + U), u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
-        z=(estimate - truth) / u if truth is not None and u > 0.0 and (a is not None or len(c.values) == 1) else None,
-        combination=dict(q.combination),
-    )  # fmt: skip
+    k, interval = U / u if u > 0.0 else NORMAL, (estimate - U, estimate + U)
+    measured = Coefficient(q.name, meaning, q.unit, estimate, u, k, interval, combination=dict(q.combination))
+    one = a is not None or len(c.values) == 1
+    z = (estimate - truth) / u if truth is not None and u > 0.0 and one else None
+    return replace(measured, u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth, z=z)
 
 
 def _quantity(c: MeasurandComparison) -> SuiteQuantity:
@@ -345,8 +341,3 @@ def _reasons(
     if apart := tuple(c.quantity.name for c in compared if c.disagree):
         doubts.append(Reason("suite.inconsistent", "The methods are inconsistent.", both, apart, severity="condition"))
     return [*doubts, *(Reason(*one) for one in said)]
-
-
-def _shared(result: DriftTestResult, results: Mapping[str, DriftTestResult]) -> list[str]:
-    """Conventions that all tests state alike."""
-    return [s for s in result.conventions if all(s in r.conventions for r in results.values())]
