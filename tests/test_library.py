@@ -24,7 +24,7 @@ from gyrobench.commands.catalog import init_bench
 from gyrobench.commands.cli import main
 from gyrobench.engine.session import RunError, Session
 from gyrobench.notebook import MissingPackageError
-from gyrobench.result import Coefficient, LoopResult
+from gyrobench.result import Coefficient, LoopResult, Reason
 from gyrobench.workflow.user_errors import PostRunError
 
 NAME = "tumble_single_axis"
@@ -335,7 +335,8 @@ def test_a_verdict_is_shown_and_text_is_escaped(run: gb.Run) -> None:
     judged = gb.load(NAME, TINY).set("gyro.D_I", "3deg/h/g").run(seed=3, spec="floated_gyro")
     assert judged.result.verdict == "fail" and "Verdict: fail." in shown(judged) and "✗ fail" in shown(judged)
     evil = LoopResult(
-        system="s", title="<b>title</b>", method="m", sources=[], conventions=[], responses=[], warnings=["a < b & c"],
+        system="s", title="<b>title</b>", method="m", sources=[], conventions=[], responses=[],
+        reasons=[Reason("escaped", "a < b & c")],
         coefficients=[Coefficient("<i>x</i>", "</td>", "V", 1.0, 0.1, 2.0, (0.8, 1.2))],
     )  # fmt: skip
     text = shown(evil)

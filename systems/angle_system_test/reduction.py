@@ -122,7 +122,7 @@ class Reduction(DriftTest[AngleSystemSetup]):
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         """Return the result without Allan deviation and spectrum: several rows to an instant, and long gaps."""
-        return replace(result, allan={}, psd={})
+        return replace(result, allan=None, psd=None)
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         high, low, local = self.around

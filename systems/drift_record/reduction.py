@@ -34,6 +34,14 @@ from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason
+from gyrobench.result_entries import (
+    DeviationCurve,
+    NoiseModelCurves,
+    RateBand,
+    RateRecord,
+    SampleCorrelation,
+    SpectrumBand,
+)
 from gyrobench.units import DPH
 
 from . import description, model_tables
@@ -177,18 +185,16 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
     tau = np.geomspace(p.step, max(d.tau[-1] for d in a.deviations.values()), 120)
     s, c = m.spectrum, m.correlation
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
-    density = {n: (v / DPH**2).tolist() for n, v in (("S", s.density), ("low", s.low), ("high", s.high))}
-    model = {"f": f.tolist(), "S": (2.0 * a.noise.spectrum(f, m.dt) / DPH**2).tolist()}
+    dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f, m.dt) / DPH**2
     lags = slice(0, SHOWN_LAGS + 1)
     return DriftColumn(
         name=p.name,
         unit="°/h",
-        record=_envelope(p) | _smoothed(p),
+        record=_envelope(p),
         deviations=[_deviation(kind, d) for kind, d in a.deviations.items()],
-        model={"tau": tau.tolist(), "dev": (a.noise.allan(tau) / DPH).tolist(), **model},
-        spectrum={"f": s.frequency.tolist(), **density},
-        correlation={"lag": c.lag[lags].tolist(), "rho": c.rho[lags].tolist(), "partial": c.partial[lags].tolist(),
-                     "bound": c.bound},
+        model=NoiseModelCurves(tau.tolist(), dev.tolist(), f.tolist(), density.tolist()),
+        spectrum=SpectrumBand(s.frequency.tolist(), *((v / DPH**2).tolist() for v in (s.density, s.low, s.high))),
+        correlation=SampleCorrelation(c.lag[lags].tolist(), c.rho[lags].tolist(), c.partial[lags].tolist(), c.bound),
         tables={
             "acquisition": [description.acquisition(p, run)],
             "regression": description.regression(p),
@@ -206,31 +212,30 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
     )  # fmt: skip
 
 
-def _smoothed(p: Prepared) -> dict[str, Any]:
+def _smoothed(p: Prepared) -> RateBand | None:
     """Gauss-Markov part of the longest stretch with its 95 % band, where Gauss-Markov and white noise describe it."""
     m, drift = p.model, p.model.gauss_markov
     if m.recommended not in ("ARMA(1,1)", "AR(1)") or drift is None or not drift.determined or not drift.density > 0.0:
-        return {}
+        return None
     y = block_means(p.stretch, m.factor)
     t = p.time[p.first] + m.model_dt * (np.arange(y.size) + 0.5)
     slope = m.trend.slope * (t - t.mean()) if m.trend is not None and m.detrended else np.zeros(y.size)
     value, sd = smooth_drift(y - slope, m.model_dt, drift)
     every = slice(None, None, max(1, y.size // SHOWN))
-    band = {"t": t, "mean": value + slope, "low": value + slope - NORMAL * sd, "high": value + slope + NORMAL * sd}
-    return {"smoothed": {n: (v[every] / (1.0 if n == "t" else DPH)).tolist() for n, v in band.items()}}
+    lines = (value + slope + side * NORMAL * sd for side in (-1.0, 0.0, 1.0))
+    return RateBand(t[every].tolist(), *((v[every] / DPH).tolist() for v in lines))
 
 
-def _deviation(kind: str, d: Deviation) -> dict[str, Any]:
-    scaled = {"dev": d.deviation, "low": d.low, "high": d.high}
-    return {"kind": KINDS[kind], "tau": d.tau.tolist(), **{n: (v / DPH).tolist() for n, v in scaled.items()},
-            "edf": d.edf.tolist()}  # fmt: skip
+def _deviation(kind: str, d: Deviation) -> DeviationCurve:
+    dev, low, high = ((v / DPH).tolist() for v in (d.deviation, d.low, d.high))
+    return DeviationCurve(KINDS[kind], d.tau.tolist(), dev, low, high, d.edf.tolist())
 
 
-def _envelope(p: Prepared) -> dict[str, Any]:
+def _envelope(p: Prepared) -> RateRecord:
     """Least and largest rate of each of SHOWN intervals, and its mean; gaps are left out."""
     edges = np.unique(np.linspace(0, p.rate.size, min(SHOWN, p.rate.size) + 1).astype(int))
     parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
     there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
     middle = 0.5 * (p.time[edges[:-1]] + p.time[edges[1:] - 1] + p.step)
     low, mean, high = ([float(f(parts[k])) / DPH for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
-    return {"t": middle[there].tolist(), "low": low, "mean": mean, "high": high}
+    return RateRecord(middle[there].tolist(), low, mean, high, _smoothed(p))

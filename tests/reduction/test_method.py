@@ -79,7 +79,7 @@ def test_truth_and_closed(noise: str) -> None:
     assert [row[0] for row in r.tables[0].rows] == ["a"]
     assert r.series[0].shown_fit_y == pytest.approx([0.5, 0.4, 0.3, 0.2, 0.1], abs=0.01)
     assert ("whitened" in r.tests[1].name) == (noise == "estimated")
-    assert r.allan["unit"] == "°/h" and r.psd["unit"] == "(°/h)²/Hz"
+    assert r.allan.unit == "°/h" and r.psd.unit == "(°/h)²/Hz"
 
 
 def test_effects_and_verdicts() -> None:

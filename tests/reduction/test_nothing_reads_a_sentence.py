@@ -17,7 +17,7 @@ from gyrobench.frames import rotation
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.report import render, result_page
-from gyrobench.report.result_json import document
+from gyrobench.report.result_json import Report
 from gyrobench.result import BudgetLine, Reason, Result, Table, Test
 from gyrobench.result_entries import TypeB
 from gyrobench.system.system import System, load_system
@@ -71,7 +71,7 @@ def figures(result: Result) -> dict[str, Any]:
 
 def colours(result: Result) -> list[str]:
     """Classes of the cells and boxes of its page, in their order."""
-    return re.findall(r'class="([^"]*)"', render.html(result_page.page(document(result), None), None))
+    return re.findall(r'class="([^"]*)"', render.html(result_page.page(Report.of(result), None), None))
 
 
 def runs() -> list[tuple[str, dict[str, Any], dict[str, tuple[float, float]]]]:

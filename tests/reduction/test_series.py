@@ -184,7 +184,7 @@ def test_allan_agrees_with_allantools() -> None:
     x = rng.normal(size=500)
     found = residual_series.allan([(2.0, x)])
     _, dev, _, _ = allantools.oadev(x, rate=0.5, data_type="freq", taus=[2.0, 16.0])
-    assert [found["dev"][0], found["dev"][3]] == pytest.approx(dev.tolist())
+    assert [found.dev[0], found.dev[3]] == pytest.approx(dev.tolist())
 
 
 def test_spectrum_of_white_noise() -> None:

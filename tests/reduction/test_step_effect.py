@@ -14,7 +14,7 @@ from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.estimation.step_effect import step_effects, step_text, with_step
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.estimation.verdict import conclude
-from gyrobench.result import Coefficient, DriftTestResult, LoopResult
+from gyrobench.result import Coefficient, DriftTestResult, LoopResult, StepChange, StepCheck
 from gyrobench.system.system import load_system
 
 PLATFORM = "platform_single_axis"
@@ -27,7 +27,7 @@ def coefficient(estimate: float, u: float = 0.0, name: str = "m", unit: str = "1
 
 def effect(law: Any, factor: float, unit: str = "1") -> float:
     (row,) = step_effects([coefficient(law(1.0), unit=unit)], [coefficient(law(factor), unit=unit)], factor)
-    return float(row["change"])
+    return float(row.change)
 
 
 @pytest.mark.parametrize(("factor", "second"), [(0.5, 1.5), (2.0, 3.0)])
@@ -59,7 +59,7 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     found, limits = loop_result(coefficient(10.0, 0.3, truth=9.0, z=1.0 / 0.3)), {"m": (None, 10.8)}
     assert conclude(found, None, limits).verdict == "pass"
     change = 0.4 * math.sqrt(3.0)
-    check = {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": change}]}
+    check = StepCheck(1e-3, [StepChange("m", "1", change)], 2e-3)
     r = conclude(found, None, limits, check)
     c = r["m"]
     assert c.u == pytest.approx(0.5) and c.k * c.u == pytest.approx(NORMAL * 0.5)
@@ -68,23 +68,23 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     assert math.hypot(*(b.contribution for b in r.budget)) == pytest.approx(c.u)
     assert r.summary == []  # nothing was said before
     assert [b.source for b in r.budget] == ["noise and evaluation", "coupling step"]
-    assert r.step_check["rows"][0]["ratio"] == pytest.approx(change / 0.3) == r.step_check["worst"]
+    assert r.step_check.rows[0].ratio == pytest.approx(change / 0.3) == r.step_check.worst
 
 
 def test_sentences_that_are_renewed_need_no_note() -> None:
     """u = 0.3 and a part of 0.4: the sentence has U = 0.98 as the table, and nothing is said of a missing effect."""
     r = loop_result(coefficient(10.0, 0.3))
     r = replace(r, summary=told(r.coefficients, "It is {m}."))
-    check = {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": 0.4 * math.sqrt(3.0)}]}
+    check = StepCheck(1e-3, [StepChange("m", "1", 0.4 * math.sqrt(3.0))], 2e-3)
     r = conclude(r, None, None, check)
     assert r.summary == ["It is 10.00 ± 0.98 (95 %)."]
 
 
 def test_the_warning_says_what_to_do() -> None:
     """Above u it speaks; an effect of a thousandth of the estimate is in u without a word."""
-    rows = [{"name": "isolation", "unit": "dB", "change": 3.2}, {"name": "S", "unit": "N·m/rad", "change": 5.0}]
+    rows = [StepChange("isolation", "dB", 3.2), StepChange("S", "N·m/rad", 5.0)]
     r = loop_result(coefficient(-72.56, 0.01, "isolation", "dB"), coefficient(16000.0, 0.1, "S", "N·m/rad"))
-    r = with_step(r, {"step": 1e-4, "rows": rows})
+    r = with_step(r, StepCheck(1e-4, rows))
     (text,) = r.warnings
     assert text.startswith(
         "The communication step of 0.1 ms moves isolation by 3.2 dB (u without it 0.01 dB): more than"
@@ -102,8 +102,8 @@ def test_the_covariance_of_a_drift_test_gets_the_signed_product() -> None:
         correlation=[[1.0, 0.5], [0.5, 1.0]], dof=1.0, noise={}, residual_std=0.0, residual_unit="1",
     )  # fmt: skip
     before = r.covariance()
-    rows = [{"name": n, "unit": "1", "change": x} for n, x in (("a", 0.6), ("b", -0.9))]
-    r = with_step(r, {"step": 1e-3, "rows": rows})
+    rows = [StepChange("a", "1", 0.6), StepChange("b", "1", -0.9)]
+    r = with_step(r, StepCheck(1e-3, rows))
     s = np.array([0.6, -0.9]) / math.sqrt(3.0)
     np.testing.assert_allclose(r.covariance(), before + np.outer(s, s), rtol=1e-12)
 
@@ -140,7 +140,7 @@ def test_the_effect_stated_by_default_is_that_of_much_smaller_steps(command: Any
 def test_an_effect_of_either_sign_has_its_share_of_the_variance(sign: float) -> None:
     """|c| u(x): the figure of the budget shows no bar for a contribution below 0, although it is in u."""
     r = loop_result(coefficient(10.0, 0.3))
-    rows = [{"name": "m", "unit": "1", "change": sign * 0.4 * math.sqrt(3.0)}]
-    r = with_step(r, {"step": 1e-3, "other": 2e-3, "rows": rows})
+    rows = [StepChange("m", "1", sign * 0.4 * math.sqrt(3.0))]
+    r = with_step(r, StepCheck(1e-3, rows, 2e-3))
     assert [b.contribution for b in r.budget] == pytest.approx([0.3, 0.4])
     assert r.budget[1].sensitivity == pytest.approx(sign * 400.0)

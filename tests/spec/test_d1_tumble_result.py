@@ -113,7 +113,7 @@ def test_result_is_whole_and_json() -> None:
         and len(r.series[1].shown_fit_x) == len(r.series[1].shown_fit_y)
     )
     assert {t.name for t in r.tests} >= {"Ljung-Box, residuals", "turn to turn", "harmonics 3 and higher"}
-    assert r.allan["tau"] and r.psd["f"] and r.acf["rho"][0] == pytest.approx(1.0)
+    assert r.allan.tau and r.psd.f and r.acf.rho[0] == pytest.approx(1.0)
     assert r.repeatability["p"] > 1e-3
     assert len(r.tables) == 2 and r.tables[1].rows[0][:2] == ["mount 1", 1]
     assert len(r.summary) == 3

@@ -58,7 +58,7 @@ def test_the_two_filters_are_complementary(quiet: Any) -> None:
     assert np.abs(magnetic - k / (s + k)).max() < 3e-3
     assert np.abs(magnetic + s * drift - 1.0).max() < 3e-3
     (r,) = [r for r in quiet.responses if r.name == "magnetic path"]
-    assert any("linear" in c["label"] for c in r.curves)
+    assert any("linear" in c.label for c in r.curves)
 
 
 def test_cut_off_is_k_over_two_pi_measured_and_computed(quiet: Any) -> None:

@@ -86,7 +86,7 @@ def test_the_report_finds_the_noise_of_the_gyro(run: Record, result: DriftRecord
     assert [d["kind"] for d in column.deviations] == ["Allan", "modified Allan", "Hadamard"]
     # 1/2 <(difference of neighbours)^2> of the windows in deg/h, Earth rate along the input axis left out: no effect
     y = -p["gyro.k"] * run.windows["mean"] / DPH
-    assert column.deviations[0]["dev"][0] == pytest.approx(math.sqrt(0.5 * np.mean(np.diff(y) ** 2)))
+    assert column.deviations[0].dev[0] == pytest.approx(math.sqrt(0.5 * np.mean(np.diff(y) ** 2)))
     assert not result.warnings
     assert [result[n].verdict for n in ("N", "B", "K")] == ["inconclusive", "pass", "fail"], "by the interval"
 
@@ -144,9 +144,9 @@ def test_lines_are_taken_out_where_they_are(tmp_path: Path) -> None:
     x = 0.01 * walk_and_white(n, 1.0, 0.0, 3) + np.sin(2 * np.pi * 0.03 * t + 1.0)
     file = write(tmp_path / "r.csv", {"time [s]": t[keep], "rate [deg/h]": x[keep]})
     out = reduce(file)
-    k = out.columns[0].deviations[0]["tau"].index(16.0)
+    k = out.columns[0].deviations[0].tau.index(16.0)
     assert deviations(x, 1.0)["allan"].deviation[k] > 0.2
-    assert out.columns[0].deviations[0]["dev"][k] == pytest.approx(0.01 / 4.0, rel=0.2)
+    assert out.columns[0].deviations[0].dev[k] == pytest.approx(0.01 / 4.0, rel=0.2)
     assert out["N"].interval[0] < 0.01 / 60.0 < out["N"].interval[1]
 
 
@@ -165,8 +165,8 @@ def test_means_of_a_long_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     means = load().reduce(Record.load(tmp_path / "run"))
     assert isinstance(means, DriftRecordResult)
     expected = deviations(x, 1.0)["allan"]
-    assert np.allclose(means.columns[0].deviations[0]["tau"], expected.tau)
-    assert np.allclose(means.columns[0].deviations[0]["dev"], expected.deviation, rtol=1e-6)
+    assert np.allclose(means.columns[0].deviations[0].tau, expected.tau)
+    assert np.allclose(means.columns[0].deviations[0].dev, expected.deviation, rtol=1e-6)
     assert means["N"].interval[0] < whole.N.value / 60.0 < means["N"].interval[1]
     assert means["K"].interval[0] < whole.K.value * 60.0 < means["K"].interval[1]
     assert means["N"].interval[0] < 0.02 / 60.0 < means["N"].interval[1]

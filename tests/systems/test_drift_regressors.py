@@ -98,7 +98,7 @@ def test_harmonics_over_the_angle(turning: DriftRecordResult) -> None:
     assert found[3][-1] > 0.05 / 3.0 and rows(turning)["cos3θ"][-1] == "not significant, left in"
     # what is left is the noise of 1 deg/h in 1 s: N = 1/60 deg/sqrt(h)
     assert turning["N"].interval[0] < 1.0 / 60.0 < turning["N"].interval[1]
-    page = drift_record_page.page(result_json.document(turning))
+    page = drift_record_page.page(result_json.Report.of(turning))
     assert "Harmonics over the angle" in str(page)
 
 
@@ -130,4 +130,4 @@ def test_the_smoothed_drift_follows_the_true_one(tmp_path: Path) -> None:
     true = np.interp(s["t"], np.arange(n) + 0.5, drift)
     assert 0.9 < np.mean((s["low"] < true) & (true < s["high"])) < 0.99
     assert np.std(s["mean"] - true) < 0.6 * np.std(drift)
-    assert "smoothed from all samples" in str(drift_record_page.page(result_json.document(result)))
+    assert "smoothed from all samples" in str(drift_record_page.page(result_json.Report.of(result)))

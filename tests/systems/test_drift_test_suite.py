@@ -104,14 +104,14 @@ def test_tumble_and_polar_servo_agree(sessions: dict[str, Session], seed: int) -
     chosen, true = floated(seed, "tumble_single_axis servo_polar")
     found = report(results(sessions, chosen, seed), chosen)
     assert found.suite.consistency == "consistent"
-    names = [q["name"] for q in found.suite.quantities]
-    assert names == [p["quantity"] for p in found.suite.pairs] and set(names) == set(true)
-    assert sum(p["E_n"] > 1.0 for p in found.suite.pairs) <= 2  # 9 pairs, 5 % each
+    names = [q.name for q in found.suite.quantities]
+    assert names == [p.quantity for p in found.suite.pairs] and set(names) == set(true)
+    assert sum(p.E_n > 1.0 for p in found.suite.pairs) <= 2  # 9 pairs, 5 % each
     for c in found.coefficients:
         assert c.truth == pytest.approx(true[c.name] / DPH, rel=1e-9)
         assert abs(c.estimate - c.truth) < 4.0 * c.u
     for p in found.suite.pairs:
-        assert abs(p["difference"]) < 2.0 * p["U"]
+        assert abs(p.difference) < 2.0 * p.U
 
 
 def test_noise_off_leaves_what_the_loops_leave(sessions: dict[str, Session]) -> None:
@@ -134,13 +134,13 @@ def test_composite_drift_and_three_more_methods(sessions: dict[str, Session]) ->
         **{"fixed_position.attitude": "N -E"},
     )  # fmt: skip
     found = report(results(sessions, chosen, 8), chosen)
-    by_name = {q["name"]: [v["label"] for v in q["values"]] for q in found.suite.quantities}
+    by_name = {q.name: [v.label for v in q.values] for q in found.suite.quantities}
     assert by_name["D_IS"] == ["tumble_single_axis", "tumble_two_axis"]  # six attitudes with one axis vertical
     assert by_name["D_II"] == ["tumble_single_axis", "tumble_two_axis", "servo_vertical_level"]
     assert by_name["ω_d"] == [*by_name["D_F"][:2], "fixed_position", "servo_vertical_level"]
-    drift = next(q for q in found.suite.quantities if q["name"] == "ω_d")
+    drift = next(q for q in found.suite.quantities if q.name == "ω_d")
     # input axis north, output axis west, spin axis up: X = Y = 0, Z = -f/g0 = -gamma
-    assert drift["combination"]["D_S"] == pytest.approx(-1.0, abs=1e-3) and "D_IS" not in drift["combination"]
+    assert drift.combination["D_S"] == pytest.approx(-1.0, abs=1e-3) and "D_IS" not in drift.combination
     assert found.suite.consistency == "consistent"
 
 
@@ -164,7 +164,7 @@ def test_both_channels_by_tumble_and_two_axis_servo(sessions: dict[str, Session]
     chosen = suite("tumble_two_channel servo_two_axis", **true, **{"gyro.markov_tau": 3.0})
     found = report(results(sessions, chosen, 6), chosen)
     assert found.suite.consistency == "consistent"
-    assert len(found.suite.pairs) == 18 and sum(p["E_n"] > 1.0 for p in found.suite.pairs) <= 3
+    assert len(found.suite.pairs) == 18 and sum(p.E_n > 1.0 for p in found.suite.pairs) <= 3
     for c in found.coefficients:
         assert c.truth == pytest.approx(true[f"gyro.{c.name}"] / DPH, rel=1e-9, abs=1e-15)
         assert abs(c.estimate - c.truth) < 4.0 * c.u
@@ -190,7 +190,7 @@ def test_a_gyro_that_changed_in_one_test_is_found(
     found = report({**unchanged, **results(sessions, chosen, 3, only=culprit)}, chosen)
     assert found.suite.consistency == "inconsistent"
     assert name in found.suite.disagreeing
-    words = next(q["words"] for q in found.suite.quantities if q["name"] == name)
+    words = next(q.words for q in found.suite.quantities if q.name == name)
     assert words.startswith(f"{culprit} deviates by +0.5 °/h/g; the others are consistent")
     assert any(f"gyro.{name} = " in w and "Not the same in all tests" in w for w in found.warnings)
 
@@ -207,18 +207,18 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     together = report(found, chosen)
     assert together.suite.consistency == "consistent" and together.suite.shared == ["torquer scale factor"]
     name = max(("D_I", "D_S"), key=lambda n: abs(true[n]))
-    row = next(q for q in together.suite.quantities if q["name"] == name)
-    for v in row["values"][:2]:
-        assert v["estimate"] == pytest.approx(1.1 * true[name] / DPH, rel=0.02)
-        assert v["u_shared"] == pytest.approx(0.1 * abs(v["estimate"]), rel=0.02)
-    assert row["values"][2]["weight"] > 0.95
+    row = next(q for q in together.suite.quantities if q.name == name)
+    for v in row.values[:2]:
+        assert v.estimate == pytest.approx(1.1 * true[name] / DPH, rel=0.02)
+        assert v.u_shared == pytest.approx(0.1 * abs(v.estimate), rel=0.02)
+    assert row.values[2].weight > 0.95
     mean = next(c for c in together.coefficients if c.name == name)
     assert abs(mean.estimate - true[name] / DPH) < 3.0 * mean.u < 0.03 * abs(mean.estimate)
 
     blind, _ = floated(4, tests, k=1.1 * right)
     apart = report(results(sessions, blind, 4), blind)
     assert name in apart.suite.disagreeing
-    words = next(q["words"] for q in apart.suite.quantities if q["name"] == name)
+    words = next(q.words for q in apart.suite.quantities if q.name == name)
     assert words.startswith("servo_polar deviates by")  # what an unstated common error does
 
 
@@ -226,7 +226,7 @@ def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> N
     chosen, true = floated(3, "tumble_single_axis servo_polar")
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)
     found = report(results(sessions, chosen, 3), chosen)
-    words = next(q["words"] for q in found.suite.quantities if q["name"] == "D_I")
+    words = next(q.words for q in found.suite.quantities if q.name == "D_I")
     assert "inconsistent: E_n of tumble_single_axis and servo_polar" in words and "cannot be identified" in words
     assert next(c for c in found.coefficients if c.name == "D_I").truth is None  # there are two
 

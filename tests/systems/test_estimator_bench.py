@@ -268,8 +268,8 @@ def test_errors_and_innovations_stand_under_their_names_over_the_whole_time(tmp_
         figure = figures[name]
         assert figure.kind == "time" and figure.x[0] < 3.2 and figure.x[-1] > 59.9
         assert max(figure.y) == values.max() and min(figure.y) == values.min()
-        upper, lower = (np.array(curve["y"]) for curve in figure.curves[1:])
-        share = np.mean(np.abs(values) < np.interp(record.channels["time"][late], figure.curves[1]["x"], upper))
+        upper, lower = (np.array(curve.y) for curve in figure.curves[1:])
+        share = np.mean(np.abs(values) < np.interp(record.channels["time"][late], figure.curves[1].x, upper))
         assert np.all(upper == -lower) and 0.94 < share < 0.985  # it overstates its variance
     assert r.series == []
     html = report.write(r, tmp_path, ("html",))["html"].read_text(encoding="utf-8")

@@ -142,11 +142,11 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
     assert c["platform error"] < 2e-4
     figures = {r.name: r for r in result.responses if r.kind == "time"}
     assert list(figures) == ["platform error", "ring angles", "inner roll"]
-    assert [x["label"] for x in figures["ring angles"].curves] == [
+    assert [x.label for x in figures["ring angles"].curves] == [
         "g4 outer roll", "g3 pitch", "g2 inner roll", "g1 azimuth"
     ]  # fmt: skip
     g3 = figures["ring angles"].curves[1]
-    assert g3["y"][-1] == pytest.approx(-180.0, abs=2.0) and g3["x"][-1] - g3["x"][0] == pytest.approx(10.0, abs=0.05)
+    assert g3.y[-1] == pytest.approx(-180.0, abs=2.0) and g3.x[-1] - g3.x[0] == pytest.approx(10.0, abs=0.05)
     assert result.ranked_by == "platform error"
 
 

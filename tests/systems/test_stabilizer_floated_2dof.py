@@ -224,7 +224,7 @@ def test_measures_of_the_whole_run(whole: Any) -> None:
     assert c["isolation"].estimate == pytest.approx(c["isolation"].closed, abs=0.4)
     assert [r.kind for r in result.responses] == ["step", "step", "loop", "ratio"]
     for r in result.responses[:2]:
-        worst = np.max(np.abs(np.array(r.curves[0]["y"]) - np.array(r.y)))
+        worst = np.max(np.abs(np.array(r.curves[0].y) - np.array(r.y)))
         assert worst < 5e-3 * np.ptp(r.y), r.name  # the rate is noisy
     assert any("conditionally stable" in w and "0.0443" in w for w in result.warnings)
 
@@ -238,7 +238,7 @@ def test_isolation_is_friction_and_with_a_real_motor_its_back_emf() -> None:
             r = next(r for r in result.responses if r.name == "isolation")
             wanted = np.abs(closed.LagLeadLoop(**DEFAULT).isolation(2j * np.pi * np.array(r.x), drag))
             np.testing.assert_allclose(r.y, wanted, rtol=0.03)
-            linear = next(c for c in r.curves if c["label"].startswith("linear, with step"))
+            linear = next(c for c in r.curves if c.label.startswith("linear, with step"))
             there = np.interp(np.log(r.x), np.log(linear["x"]), linear["y"])
             np.testing.assert_allclose(r.y, there, rtol=2e-3)
 

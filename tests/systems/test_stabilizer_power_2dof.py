@@ -200,7 +200,7 @@ def test_measures_of_the_whole_run(whole: Any) -> None:
     for r in result.responses:
         assert r.curves, r.name
     for r in result.responses[:2]:  # the linear step lies on the measured one
-        worst = np.max(np.abs(np.array(r.curves[0]["y"]) - np.array(r.y)))
+        worst = np.max(np.abs(np.array(r.curves[0].y) - np.array(r.y)))
         assert worst < 1e-3 * np.ptp(r.y)
     assert not result.warnings
 

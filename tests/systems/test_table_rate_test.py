@@ -78,7 +78,7 @@ def test_torque_of_the_largest_change_is_that_of_the_linear_loop(found: Any) -> 
     assert c.closed == pytest.approx(2.94, abs=0.1)  # J a = 2.56 N.m and the correction of the feedback
     assert abs(c.estimate - c.closed) < 3 * c.u
     (step,) = [x for x in found.result.responses if x.kind == "step"]
-    exact = np.interp(step.x, step.curves[0]["x"], step.curves[0]["y"])
+    exact = np.interp(step.x, step.curves[0].x, step.curves[0].y)
     assert np.abs(np.array(step.y) - exact).max() < 0.55  # three counts
 
 

@@ -194,9 +194,7 @@ def combine_methods(
         quantities=[_quantity(c) for c in compared],
         pairs=[
             MethodPair(c.quantity.name, c.quantity.unit, p.a, p.b, p.difference, p.U, p.E_n)
-            for c in compared
-            if c.found is not None
-            for p in c.found.pairs
+            for c in compared if c.found is not None for p in c.found.pairs
         ],
         **_consistency(compared),
     )  # fmt: skip
