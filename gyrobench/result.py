@@ -131,12 +131,12 @@ class Result(Displayed):
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must know, as sentences, the most serious first."""
+        """Sentences for the reader, the most serious first."""
         return [r.text for r in self.reasons if r.severity in ("error", "warning")]
 
     @property
     def withheld(self) -> list[str]:
-        """Why no "pass" (or "fail") is stated, as sentences."""
+        """Sentences on why no "pass" (or "fail") is stated."""
         return [r.text for r in self.reasons if r.severity == "doubt"]
 
     @property

@@ -16,10 +16,16 @@ from dataclasses import Field, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from gyrobench.errors import GyrobenchError
+
 #: texts that files of version 0.1.0 do not have, or need not have
 OLDER = {"id": "", "title": "", "caption": ""}
 #: of an entry that may be missing: None in Python, {} in the file
 EMPTY = {"empty": True}
+
+
+class ResultError(GyrobenchError, ValueError):
+    """Raised for a result.json that cannot be read; the text says why."""
 
 
 def content(value: Any) -> Any:

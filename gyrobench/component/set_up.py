@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.units import G0
-
 if TYPE_CHECKING:
     from gyrobench.component.component import Component
 
@@ -25,6 +23,7 @@ Simulated = Callable[[Mapping[str, Any]], Errors]
 GYRO_MOUNT = ("mount.1", "mount.2", "mount.3")  # about input, output and spin reference axis; x, y and z
 #: turned about its output axis, a gyro leans its input axis away from the spin axis
 LEANS = {"mount.input_to_spin": ("mount.2", -1.0)}
+G0 = 9.80665  # m/s2
 SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
 
 

@@ -6,8 +6,7 @@ Each name is explained where it is defined; docs/guides/write_a_system.md leads 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.drift_test import DriftTest
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.linear_fit import Regression
@@ -16,7 +15,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import Sentence, plus_minus, told
 from gyrobench.reduction.setup.run_metadata import Site, number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, Setup, SiteSetup, attitude_of
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import Effect, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 
@@ -25,7 +24,7 @@ __all__ = [
     "Array",
     "Candidate",
     "Coefficient",
-    "DriftTest",
+    "DriftReduction",
     "DriftTestResult",
     "Effect",
     "Findings",

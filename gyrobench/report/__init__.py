@@ -7,8 +7,9 @@ imported before a report is written.
 
 from gyrobench.report.assets import content_dir
 from gyrobench.report.report_files import FORMATS, NAMES, ReportError, compare, write
-from gyrobench.report.result_json import ResultError, load, report_id
+from gyrobench.report.result_json import load, report_id
 from gyrobench.report.specification import SpecificationError, check_units, load_specification
+from gyrobench.result_content import ResultError
 
 __all__ = [
     "FORMATS",

@@ -7,8 +7,8 @@ from typing import TypeVar
 from pydantic import Field, ValidationError
 
 from gyrobench.record.run_document import Document, RunDocument
-from gyrobench.report.result_json import ResultError
 from gyrobench.result import Result
+from gyrobench.result_content import ResultError
 
 D = TypeVar("D", bound=Document)
 

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from gyrobench import reading
-from gyrobench.errors import GyrobenchError
 from gyrobench.result import DriftTestResult, LoopResult, Result, Series, SuiteResult
-from gyrobench.result_content import content
+from gyrobench.result_content import ResultError, content
 
 if TYPE_CHECKING:
     from gyrobench.record.run_document import Document, PlanRow, SuiteDocument
@@ -27,10 +26,6 @@ R = TypeVar("R", bound=Result, covariant=True)
 S = TypeVar("S", bound=Result)
 SCHEMA = "gyrobench-result-1"
 DEGREE = 180.0 / math.pi
-
-
-class ResultError(GyrobenchError, ValueError):
-    """A result.json that cannot be read; the text says why."""
 
 
 def plain(value: Any) -> Any:
@@ -133,7 +128,7 @@ class Report(Generic[R]):
 
     @property
     def about(self) -> Document:
-        """What the run.json of a record or a suite says of its circumstances."""
+        """The circumstances of a record or a suite, as its run.json states them."""
         return self.suite if isinstance(self.result, SuiteResult) else self.run
 
 

@@ -272,7 +272,7 @@ class System(Configurable):
         beside those of the findings.
         """
         from gyrobench.reduction.estimation.verdict import conclude
-        from gyrobench.system.wiring import parse_wires
+        from gyrobench.system.wire_text import parse_wires
 
         found = self.findings(record)
         wires = [] if record.run.measured else [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(self.wires)]

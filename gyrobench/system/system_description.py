@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.system.wiring import Assembly, parse_wires
+from gyrobench.system.wire_text import parse_wires
+from gyrobench.system.wiring import Assembly
 
 
 def describe(assembly: Assembly) -> dict[str, Any]:

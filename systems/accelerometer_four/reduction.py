@@ -25,7 +25,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     Effect,
     Findings,
     Group,
@@ -77,7 +77,7 @@ class FourSetup(Setup):
         return self.gravity / frames.G0
 
 
-class Reduction(DriftTest[FourSetup]):
+class Reduction(DriftReduction[FourSetup]):
     """Coefficients of four sensors from windows: t_start, t_end (s), angle_start, angle_end (rad, nominal), mean,
     mean_2, mean_3, mean_4 (V).
     """

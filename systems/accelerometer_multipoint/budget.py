@@ -19,10 +19,9 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup import sources
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import Effect, Source
 
 from . import closed
 from .geometry import specific_force

@@ -27,7 +27,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -75,7 +75,7 @@ WRONG_SIGN = (
 )
 
 
-class Reduction(DriftTest[MultipointSetup]):
+class Reduction(DriftReduction[MultipointSetup]):
     """The polynomial of an accelerometer from the windows of a record (columns as in setup.window_checks)."""
 
     handling = staticmethod(handling_candidates.head)

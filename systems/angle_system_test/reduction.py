@@ -21,7 +21,7 @@ from gyrobench.reduction.setup.sources import RELATIVE
 from gyrobench.reduction.toolkit import (
     Account,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -50,7 +50,7 @@ LISTED = 8  # slips that are listed by angle
 TABLE_RATE = Source("table.rate", "rate of the table", RELATIVE, "u_rate", "relative")
 
 
-class Reduction(DriftTest[AngleSystemSetup]):
+class Reduction(DriftReduction[AngleSystemSetup]):
     """Errors of two scales on an axis, lag, ripple and clocks, from readings at rest and at constant rates."""
 
     @classmethod

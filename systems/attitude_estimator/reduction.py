@@ -14,7 +14,15 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.toolkit import Account, Array, LoopTest, ReductionError, Table, over_time, thinned
+from gyrobench.reduction.loops.loop_toolkit import (
+    Account,
+    Array,
+    LoopReduction,
+    ReductionError,
+    Table,
+    over_time,
+    thinned,
+)
 from gyrobench.units import DEG, DPH
 
 SHOWN = 800  # points of a drawn line
@@ -22,7 +30,7 @@ CALM = ("rest", "rocking")  # phases in which the models of the filters hold: no
 LEVEL = 1e-3  # p below which a filter is called inconsistent
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Estimated attitude and gyro biases against the true ones, in rest, rocking, acceleration and turn."""
 
     part = "estimator"

@@ -11,7 +11,14 @@ from scipy import special
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, RunDocument, over_time
+from gyrobench.reduction.loops.loop_toolkit import (
+    Account,
+    Array,
+    MeasureReduction,
+    ReductionError,
+    RunDocument,
+    over_time,
+)
 from gyrobench.units import ARCSEC, DPH
 
 from .closed_form import CompensatedDrift, ExpectedErrors, expected
@@ -20,7 +27,7 @@ SHOWN = 400  # points of a drawn line
 ENOUGH = 1e-3  # p below which a filter is called inconsistent
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Rms of residual rate and angle over records that each begin with the table at zero."""
 
     part = "compensator"

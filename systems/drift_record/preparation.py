@@ -21,7 +21,7 @@ from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 
-from .regressors import Regression, block_means_of, regress
+from .regressors import RegressionSlope, block_means_of, regress
 
 WHOLE = 0.5  # part of the samples that a stretch without a gap must hold
 LEAST = 512  # samples of it
@@ -41,7 +41,7 @@ class Prepared:
     step: float
     rate: Array
     clean: Array
-    regressions: tuple[Regression, ...]
+    regressions: tuple[RegressionSlope, ...]
     model: DriftModel  # of the stretch
     stretch: Array
     stretch_step: float

@@ -39,7 +39,7 @@ SHORTEST = 8  # means of a stretch
 
 
 @dataclass(frozen=True)
-class Regression:
+class RegressionSlope:
     """Slope of the rate over another column, SI: of the fit of what is kept, or with all columns where it is not."""
 
     name: str
@@ -52,7 +52,7 @@ class Regression:
     kept: bool
 
 
-def regress(rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]) -> tuple[Regression, ...]:
+def regress(rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]) -> tuple[RegressionSlope, ...]:
     """Return the slopes of an evenly sampled rate (n,), NaN in gaps, over the other columns.
 
     Raises ReductionError for columns that are combinations of others, and too few samples for them.
@@ -82,8 +82,9 @@ def regress(rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]
     for k, n in enumerate(names):
         of = fit if n in fit.names else full
         at, beta, half = of.names.index(n), float(full.beta[k]), float(full.half_width[k])
-        out.append(Regression(n, unit_of.get(n, "1"), float(of.beta[at]), float(of.u[at]), (beta - half, beta + half),
-                              p[n], float(share[k]), n in fit.names))  # fmt: skip
+        ends = beta - half, beta + half
+        slope, u = float(of.beta[at]), float(of.u[at])
+        out.append(RegressionSlope(n, unit_of.get(n, "1"), slope, u, ends, p[n], float(share[k]), n in fit.names))
     return tuple(out)
 
 

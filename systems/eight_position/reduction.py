@@ -33,7 +33,7 @@ from gyrobench.reduction.toolkit import (
     Array,
     Candidate,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -69,7 +69,7 @@ SHORT = (
 LONG = {"x": " - q_y gamma_y^2 - s_y gamma_x", "y": " - q_x gamma_x^2 - s_x gamma_y"}
 
 
-class CurrentChannel(DriftTest[EightPositionSetup]):
+class CurrentChannel(DriftReduction[EightPositionSetup]):
     """One current, of the torquer about ``channel``, which measures the drift about the other axis."""
 
     def __init__(self, windows: Mapping[str, Array], setup: EightPositionSetup, channel: str) -> None:

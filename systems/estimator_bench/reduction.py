@@ -10,14 +10,23 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.estimator_result import RANKED, Signals, measure
-from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, Response, line, told, trace
+from gyrobench.reduction.loops.loop_toolkit import (
+    Account,
+    Array,
+    MeasureReduction,
+    ReductionError,
+    Response,
+    line,
+    told,
+    trace,
+)
 
 from .benchmarks import BENCHMARKS
 
 SHOWN, COMPARED = 1000, 1000  # intervals of the whole time, and readings of the close-up
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency."""
 
     part = "estimator"

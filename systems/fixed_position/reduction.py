@@ -28,7 +28,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -76,7 +76,7 @@ class FixedPositionSetup(SiteSetup):
         return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
-class Reduction(DriftTest[FixedPositionSetup]):
+class Reduction(DriftReduction[FixedPositionSetup]):
     """Composite drift of one attitude, of one day or of several."""
 
     handling = staticmethod(handling_candidates.at_rest)

@@ -8,14 +8,14 @@ import numpy as np
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.estimator_metrics import rms
-from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Table, trace, wrapped
+from gyrobench.reduction.loops.loop_toolkit import DEG, Account, Array, Gate, LoopReduction, Table, trace, wrapped
 
 from .field import FieldError, field_at
 
 SHOWN = "heading shown"
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Heading of a slaved gyro against the true one: alignment, rest, sines, turn, disturbed field."""
 
     said = (

@@ -8,7 +8,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.toolkit import DEG, Gate, LoopFindings, wrapped
+from gyrobench.reduction.loops.loop_toolkit import DEG, Gate, LoopFindings, wrapped
 
 from .linear import LinearCompass, Steaming
 from .oscillation import Oscillation, fit

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gyrobench.reduction.loops.toolkit import DEG, Account, Array, Gate, LoopTest, Response, line, wrapped
+from gyrobench.reduction.loops.loop_toolkit import DEG, Account, Array, Gate, LoopReduction, Response, line, wrapped
 
 from .findings import KNOWN, CompassFindings, error, means, steaming, wrap
 from .linear import LinearCompass, Steaming
@@ -26,7 +26,7 @@ NAMES = {
 }
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Heading shown less the ship's: settling, free oscillation, change of speed, turn, rolling."""
 
     said = (

@@ -26,7 +26,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -94,7 +94,7 @@ class NorthFinderSetup(SiteSetup):
         return LocalEarth(float(north), float(up), self.gravity, self.rough)
 
 
-class Reduction(DriftTest[NorthFinderSetup]):
+class Reduction(DriftReduction[NorthFinderSetup]):
     """Heading from windows: those of a drift test, mean along y, and, by method, mean_x (rad/s), f_x, f_y (m/s2)."""
 
     @classmethod

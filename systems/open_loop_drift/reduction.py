@@ -34,7 +34,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     Effect,
     Findings,
     Group,
@@ -139,7 +139,7 @@ def null_angles(
     return null, G, cross
 
 
-class Reduction(DriftTest[OpenLoopSetup]):
+class Reduction(DriftReduction[OpenLoopSetup]):
     """Drift from readings: t_start, t_end (s), angle_start, angle_end (rad), mean (V; pickoff), flagged (optional)."""
 
     handling = staticmethod(handling_candidates.followed)

@@ -38,7 +38,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -101,7 +101,7 @@ def float_angle(angle: Array, gain: float) -> Array:
     return out
 
 
-class Reduction(DriftTest[PickoffSetup]):
+class Reduction(DriftReduction[PickoffSetup]):
     """Scale factor, zero, straightness and drift from pickoff voltages at angles of the case."""
 
     handling = staticmethod(handling_candidates.readings)

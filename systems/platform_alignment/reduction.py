@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from gyrobench import units
-from gyrobench.reduction.loops.toolkit import ARCMIN, Account, MeasureTest, told
+from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, MeasureReduction, told
 from gyrobench.reduction.setup.run_metadata import Site
 
 from . import plans, shown
@@ -31,7 +31,7 @@ WRONG_RATES = (
 )
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Heading, tilt and time to be ready of a platform that aligns itself."""
 
     ranked_by = "ready time"

@@ -9,7 +9,7 @@ import numpy as np
 from gyrobench.reduction.loops.gimbal_test import GimbalTest
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, spans
 from gyrobench.reduction.loops.loop_measures import Step
-from gyrobench.reduction.loops.toolkit import ARCSEC, DPH, Account, Array, Gate, drift, over_time
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, DPH, Account, Array, Gate, drift, over_time
 
 STEEP = math.sin(5.0 * DEG)  # |cos(pitch)| below which the fourth gimbal has no authority
 KEPT = 0.01  # deg: up to this the inner element counts as kept

@@ -7,8 +7,17 @@ import math
 import numpy as np
 
 from gyrobench.reduction.loops.estimator_metrics import rms
+from gyrobench.reduction.loops.loop_toolkit import (
+    ARCSEC,
+    DRIFTS,
+    Account,
+    Gate,
+    LoopReduction,
+    isolation,
+    margins,
+    told,
+)
 from gyrobench.reduction.loops.platform_measures import command_step, late_noise, level_drift
-from gyrobench.reduction.loops.toolkit import ARCSEC, DRIFTS, Account, Gate, LoopTest, isolation, margins, told
 
 from .budget import ride_budget
 from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, period
@@ -19,7 +28,7 @@ SETTLING = "settling", "time until the rate stays within 5 %"
 LIMITS = {"platform.saturated": "the motor", "rebalance.saturated": "the torquer of the gyro"}
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Disturbance step, command step, sweeps, ride and drift of a loop with a floated gyro in rebalance."""
 
     ranked_by = "platform error"

@@ -12,9 +12,9 @@ from gyrobench.frames import G0
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import cross_axis, response
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Gate, LoopReduction, Point, margins, told
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.reduction.loops.rides import share, still
-from gyrobench.reduction.loops.toolkit import ARCSEC, Account, Gate, LoopTest, Point, margins, told
 
 from .budget import budget
 
@@ -28,7 +28,7 @@ LIMITS = {
 }
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Loads, commands, motion of the base, loops and drift of a platform of three gimbals."""
 
     def measure(self) -> Account:

@@ -9,8 +9,8 @@ import numpy as np
 from gyrobench.reduction.loops.gimbal_test import AXES, GimbalTest
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, spans
 from gyrobench.reduction.loops.loop_measures import Step, cross_axis, response
+from gyrobench.reduction.loops.loop_toolkit import DPH, Account, Array, Gate, Table, drift, over_time
 from gyrobench.reduction.loops.platform_measures import settling
-from gyrobench.reduction.loops.toolkit import DPH, Account, Array, Gate, Table, drift, over_time
 
 COUPLING = 4.0  # Hz, where the coupling between the axes is shown
 DRIFTS = ("gyro_b.drift_y", "gyro_a.drift_x", "gyro_a.drift_y")  # about x, y, z of the platform

@@ -37,7 +37,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -101,7 +101,7 @@ class RebalanceLoopSetup(SiteSetup):
         return self.largest / self.k
 
 
-class Reduction(DriftTest[RebalanceLoopSetup]):
+class Reduction(DriftReduction[RebalanceLoopSetup]):
     """Bias, scale factor and linearity of a loop from all readings; resolution, noise and ripple from those at rest."""
 
     @classmethod

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.held_test import HeldSetup
-from gyrobench.reduction.estimation.effects import Effect, one_by_one
+from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.sources import ANGLE_OF, INNER_SQUARE, TIME_BASE, TURNED, WOBBLE_OF, Source
+from gyrobench.reduction.setup.sources import ANGLE_OF, INNER_SQUARE, TIME_BASE, TURNED, WOBBLE_OF, Effect, Source
 
 from .windows import Track
 

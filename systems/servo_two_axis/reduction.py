@@ -28,7 +28,7 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     Effect,
     Findings,
     Group,
@@ -68,7 +68,7 @@ class TwoAxisServoSetup(HeldSetup):
         return drift.terms_2dof(channel, self.terms)
 
 
-class ServoChannel(DriftTest[TwoAxisServoSetup]):
+class ServoChannel(DriftReduction[TwoAxisServoSetup]):
     """One channel of the windows that both share."""
 
     def __init__(self, whole: Reduction, channel: str) -> None:

@@ -14,8 +14,18 @@ import numpy as np
 
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import platform_measures as common
+from gyrobench.reduction.loops.loop_toolkit import (
+    DRIFTS,
+    Account,
+    Gate,
+    LoopReduction,
+    Point,
+    drift,
+    isolation,
+    margins,
+    told,
+)
 from gyrobench.reduction.loops.margins import interpolate_response, measured_values
-from gyrobench.reduction.loops.toolkit import DRIFTS, Account, Gate, LoopTest, Point, drift, isolation, margins, told
 from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
@@ -27,7 +37,7 @@ ENOUGH = 45.0  # degrees of phase margin that GSP ch. 5 asks for
 NO_CLOSED = "The closed forms are those of the lag-lead network: the figures stand alone."
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Load step, command, sine sweeps, drift hold and a blow of an axis with a floated gyro as sensor."""
 
     def measure(self) -> Account:

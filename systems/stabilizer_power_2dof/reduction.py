@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
+from gyrobench.reduction.loops.loop_toolkit import DRIFTS, Account, LoopReduction, isolation, margins, told
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import isolation_near, stiffness
-from gyrobench.reduction.loops.toolkit import DRIFTS, Account, LoopTest, isolation, margins, told
 from gyrobench.units import ARCSEC, DPH
 
 ALPHA, BASE = "gyro.alpha", "motion.angle[1]"  # platform against the base, and the base, to be added
@@ -59,7 +59,7 @@ def steady(M: float, H: float, K_m: float, C_y: float) -> float:
     return C_y * M / (H * K_m)
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Load step, sine sweeps of loop and base, servo torque and drift of a power gyro stabilizer."""
 
     def measure(self) -> Account:

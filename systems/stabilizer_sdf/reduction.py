@@ -9,8 +9,17 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.loops.loop_toolkit import (
+    Account,
+    Gate,
+    LoopFindings,
+    LoopReduction,
+    isolation,
+    margins,
+    told,
+    trace,
+)
 from gyrobench.reduction.loops.platform_measures import level_drift
-from gyrobench.reduction.loops.toolkit import Account, Gate, LoopFindings, LoopTest, isolation, margins, told, trace
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 from gyrobench.units import ARCMIN, DPH
@@ -29,7 +38,7 @@ EQUATIONS = {
 }
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Load, drift, command, margins and isolation of an axis that its gyro stabilizes."""
 
     def measure(self) -> Account:

@@ -7,14 +7,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.reduction.loops.toolkit import ARCSEC, Account, Array, LoopTest, ReductionError, told, trace
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Array, LoopReduction, ReductionError, told, trace
 
 SERVO = 2.0  # phase of the plan
 LATE = 0.2  # share of the servo phase that must be at null
 NEAR = 60.0 * ARCSEC  # from here on the angle is drawn in arcsec
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Servo mode from an offset of the float, capture law and fine loop."""
 
     slot = "sequencer"

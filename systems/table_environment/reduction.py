@@ -23,7 +23,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.toolkit import (
     Account,
     Coefficient,
-    DriftTest,
+    DriftReduction,
     DriftTestResult,
     Effect,
     Findings,
@@ -83,7 +83,7 @@ class EnvironmentSetup(SiteSetup):
     u_scales: float = 0.0
 
 
-class Reduction(DriftTest[EnvironmentSetup]):
+class Reduction(DriftReduction[EnvironmentSetup]):
     """Sensitivities of a drift test to its surroundings, and the budgets of a table."""
 
     @classmethod

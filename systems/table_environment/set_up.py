@@ -23,10 +23,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.setups import SiteSetup
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, RELATIVE, TORQUER_SCALE, TURNED, Source
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, RELATIVE, TORQUER_SCALE, TURNED, Effect, Source
 
 RECORDED = Source(
     "recorded.{cause}.scale", "scale of the {words}", RELATIVE, "u_scales", "relative, what is recorded"

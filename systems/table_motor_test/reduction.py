@@ -25,7 +25,16 @@ import numpy as np
 from scipy import integrate, linalg, optimize, special
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.toolkit import ARCSEC, Account, Array, Gate, LoopTest, ReductionError, Table, told
+from gyrobench.reduction.loops.loop_toolkit import (
+    ARCSEC,
+    Account,
+    Array,
+    Gate,
+    LoopReduction,
+    ReductionError,
+    Table,
+    told,
+)
 
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
@@ -68,7 +77,7 @@ class Solution:
         return self.of(lambda v: float(v[j] / v[k]))
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Runs of a free table by the motor and by a known torque, coasting, steps of torque."""
 
     linearized = False

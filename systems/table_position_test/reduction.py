@@ -22,8 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.reduction.loops.loop_toolkit import (
+    ARCSEC,
+    Account,
+    Array,
+    MeasureReduction,
+    ReductionError,
+    RunDocument,
+    told,
+)
 from gyrobench.reduction.loops.scale_errors import truth, waves
-from gyrobench.reduction.loops.toolkit import ARCSEC, Account, Array, MeasureTest, ReductionError, RunDocument, told
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import Series, Table
 
@@ -198,7 +206,7 @@ TILTS = {
 UNKNOWN = (None, None)
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Harmonics of the position error told from the polygon's, then tilt, wobble and squareness by the level."""
 
     part = "body"

@@ -13,7 +13,16 @@ from gyrobench.arrays import Array
 from gyrobench.frames import EARTH_RATE as ERU
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.loops.toolkit import ARCSEC, Account, MeasureTest, ReductionError, line, over_time, told, trace
+from gyrobench.reduction.loops.loop_toolkit import (
+    ARCSEC,
+    Account,
+    MeasureReduction,
+    ReductionError,
+    line,
+    over_time,
+    told,
+    trace,
+)
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import BudgetLine, Response, Table
@@ -127,7 +136,7 @@ def time_base(pairs: Mapping[float, Sequence[AtRate]], quantum: float) -> tuple[
     return error / weight, 1.0 / math.sqrt(weight), float(special.stdtrit(weight**2 / doubt, 0.975))
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Each rate in both senses by the counts; torque of the largest change of rate beside the linear loop's."""
 
     part = "controller"

@@ -9,9 +9,20 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.record import Record
+from gyrobench.reduction.loops.loop_toolkit import (
+    Account,
+    Array,
+    Drift,
+    Gate,
+    LoopReduction,
+    Point,
+    Table,
+    drift,
+    margins,
+    told,
+)
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import lower_limit
-from gyrobench.reduction.loops.toolkit import Account, Array, Drift, Gate, LoopTest, Point, Table, drift, margins, told
 from gyrobench.units import ARCSEC
 
 from .closed import GCM, ServoLoop, loop_of, sense_torque
@@ -27,7 +38,7 @@ NO_SHAPER = (
 )
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Hung torques, sines of rate through the torquer of the gyro, sines of torque, turning both ways."""
 
     by_neighbours = True

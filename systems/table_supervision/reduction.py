@@ -17,7 +17,7 @@ from scipy import special
 
 from gyrobench.packaging.loading import load_part
 from gyrobench.reduction.estimation.uncertainty import clopper_pearson, poisson_interval
-from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, Table, told
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, ReductionError, Table, told
 
 from .system import TableSupervision
 
@@ -35,7 +35,7 @@ KINDS = (
 HOUR = 3600.0
 
 
-class Reduction(MeasureTest):
+class Reduction(MeasureReduction):
     """Faults found and named, how soon, and alarms without a fault."""
 
     part, ranked_by = "monitor", "false alarms"

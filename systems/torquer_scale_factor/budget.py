@@ -19,7 +19,6 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.sources import (
@@ -29,6 +28,7 @@ from gyrobench.reduction.setup.sources import (
     INPUT_TO_OUTPUT,
     INPUT_TO_SPIN,
     TIME_BASE,
+    Effect,
     Source,
 )
 

@@ -21,12 +21,13 @@ from scipy import special
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import Effect, with_set_up
+from gyrobench.reduction.estimation.effects import with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.mixture import equivalent_dof
 from gyrobench.reduction.estimation.noise_estimate import Estimate
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.setup.sources import Effect
 
 from .budget import TorquerSetup, effects
 

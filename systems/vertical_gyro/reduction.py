@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.toolkit import ARCMIN, DEG, Account, Array, Gate, LoopTest, Table, trace
+from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DEG, Account, Array, Gate, LoopReduction, Table, trace
 from gyrobench.units import G0
 
 SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks
@@ -48,7 +48,7 @@ def erection_time(tilt: float, zone: float, law: str, rate: float, gain: float) 
     return (tilt - bend) / rate + math.log(bend / zone) / gain
 
 
-class Reduction(LoopTest):
+class Reduction(LoopReduction):
     """Pitch and roll of the gyro against those of the vehicle, in erection, rest and manoeuvre."""
 
     said = (

@@ -30,8 +30,9 @@ from estimation_coverage import plan
 
 from gyrobench import drift, frames
 from gyrobench.reduction.estimation import noise, nuisances, outliers, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, Remount, remounts, standard_changes, with_set_up
+from gyrobench.reduction.estimation.effects import Remount, remounts, standard_changes, with_set_up
 from gyrobench.reduction.estimation.linear_fit import fit
+from gyrobench.reduction.setup.sources import Effect
 
 SIGMA = 0.0022  # deg/h, of a window
 ARCSEC = np.pi / 180.0 / 3600.0

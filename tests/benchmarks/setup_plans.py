@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gyrobench import frames, units
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation import fit_result, nuisances
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.system.system import load_system
 
 Array = NDArray[np.float64]

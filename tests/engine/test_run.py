@@ -18,7 +18,7 @@ from gyrobench.system.parameters import slot_seed
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
 from gyrobench.system.system_description import describe
 from gyrobench.system.values import InvalidValueError
-from gyrobench.system.wiring import WiringError
+from gyrobench.system.wire_text import WiringError
 
 Foreign = Callable[[str], Path]
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}

@@ -12,12 +12,13 @@ from scipy import optimize
 
 from gyrobench import units
 from gyrobench.reduction.estimation import noise, noise_mixture_fit, outliers
-from gyrobench.reduction.estimation.effects import Effect, standard_changes, with_set_up
+from gyrobench.reduction.estimation.effects import standard_changes, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.run_metadata import Remount
+from gyrobench.reduction.setup.sources import Effect
 
 DPH = units.factor("deg/h")
 N = 120

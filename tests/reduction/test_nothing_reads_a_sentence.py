@@ -15,7 +15,7 @@ import pytest
 
 from gyrobench.frames import rotation
 from gyrobench.record.record import Record
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.report import render, result_page
 from gyrobench.report.result_json import Report
 from gyrobench.result import BudgetLine, Reason, Result, Table, Test

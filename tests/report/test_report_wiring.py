@@ -7,7 +7,7 @@ import pytest
 from gyrobench.report.style import MM, WIDE, styled
 from gyrobench.report.wiring_figure import LABEL, LINE, NAME, Layout, broken_name, layout, text_width
 from gyrobench.system.system import load_system
-from gyrobench.system.wiring import parse_wires
+from gyrobench.system.wire_text import parse_wires
 
 
 def wiring(name: str) -> tuple[list[str], list[tuple[str, str, str, str]]]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import Account, fit_result
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import Effect, Source
 from gyrobench.result import DriftTestResult, Specification
 
 ACCOUNT: dict[str, Any] = {

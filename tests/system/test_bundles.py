@@ -6,7 +6,8 @@ import pytest
 
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.system import Slot, System, load_system
-from gyrobench.system.wiring import Assembly, WiringError, assemble, parse_wires
+from gyrobench.system.wire_text import WiringError, parse_wires
+from gyrobench.system.wiring import Assembly, assemble
 
 SINGLE = """
     site.f -> table.f_local

@@ -12,7 +12,7 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.frequency_response import unstable
 from gyrobench.reduction.loops import margins as m
 from gyrobench.system.system import load_system
-from gyrobench.system.wiring import WiringError
+from gyrobench.system.wire_text import WiringError
 
 NAME = "platform_three_axis"
 GYROS = ("gyro_x", "gyro_y", "gyro_z")

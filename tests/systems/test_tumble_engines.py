@@ -15,7 +15,7 @@ from gyrobench import frames
 from gyrobench.engine.reference_engine import initial_state, initialize
 from gyrobench.engine.session import Session, run
 from gyrobench.system.parameters import resolve
-from gyrobench.system.wiring import parse_wires
+from gyrobench.system.wire_text import parse_wires
 
 Command = Callable[..., tuple[int, str, str]]
 

@@ -15,7 +15,6 @@ from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import pulses as pulse_sources
 from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup.run_metadata import number, truth_of
@@ -30,6 +29,7 @@ from gyrobench.reduction.setup.sources import (
     TORQUER_SCALE,
     TORQUER_SCALE_OF,
     TURNED,
+    Effect,
     Source,
 )
 from gyrobench.result import Reason

@@ -23,14 +23,14 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import composite, drift_terms, servo_regression
-from gyrobench.reduction.estimation.drift_test import DriftTest
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup.run_metadata import remount_of, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.result import DriftTestResult, Table
 from gyrobench.units import DPH
 
@@ -77,7 +77,7 @@ class HeldSetup(SiteSetup):
 H = TypeVar("H", bound=HeldSetup)
 
 
-class HeldTest(DriftTest[H]):
+class HeldTest(DriftReduction[H]):
     """A floated gyro that holds a table with one axis; see the module.  attitudes: that a phase may have."""
 
     handling = staticmethod(handling_candidates.servo)

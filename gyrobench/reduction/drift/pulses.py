@@ -22,9 +22,8 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import Effect, Source
 
 ASYMMETRY = Source(
     "pulse.asymmetry", "asymmetry of the pulse currents", "A", "u_pulse", "positive less negative current"

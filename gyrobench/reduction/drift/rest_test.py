@@ -28,13 +28,12 @@ from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.pulses import CurrentWindows
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.drift_test import DriftTest
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup.run_metadata import Site
-from gyrobench.reduction.setup.sources import TURNED
+from gyrobench.reduction.setup.sources import TURNED, Effect
 from gyrobench.reduction.setup.window_checks import window_problems
 
 SMALL = 1e-5  # rad, step of the geometric perturbations (they are linear to 1e-10)
@@ -56,7 +55,7 @@ class RestSetup(OneLoopSetup):
 S = TypeVar("S", bound=OneLoopSetup)
 
 
-class RestTest(DriftTest[S]):
+class RestTest(DriftReduction[S]):
     """Coefficients ``names`` from averages at rest; see the module."""
 
     handling = staticmethod(handling_candidates.positions)

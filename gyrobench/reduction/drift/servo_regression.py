@@ -27,7 +27,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import Effect, one_by_one
+from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup import window_checks
@@ -42,6 +42,7 @@ from gyrobench.reduction.setup.sources import (
     TIME_BASE,
     UNBALANCE,
     WOBBLE,
+    Effect,
 )
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table

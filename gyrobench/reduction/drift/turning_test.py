@@ -28,21 +28,20 @@ from gyrobench.reduction.drift import drift_terms, harmonic, window_regressors
 from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.drift_test import DriftTest
-from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.setup import setups, sources
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import Effect, Source
 
 T = TypeVar("T", bound=setups.TurningSetup)
 Formulas = tuple[dict[str, float], dict[str, Fit], str]
 
 
-class TurningTest(DriftTest[T]):
+class TurningTest(DriftReduction[T]):
     """A tumble about the pole, of one measuring axis; see the module.
 
     axis: of the gyro, that is measured.  across: towards which it may lean, by an angle called ``tilt``.  held: highest

@@ -1,6 +1,6 @@
 """The skeleton of a test with two channels: each is a drift test of its own, and both are reported as one.
 
-    class MyChannel(DriftTest[MySetup]): ...            # made with windows, setup, "x" or "y"
+    class MyChannel(DriftReduction[MySetup]): ...            # made with windows, setup, "x" or "y"
     class Reduction(ChannelTests[MySetup]):
         channel = MyChannel
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
-from gyrobench.reduction.estimation.drift_test import DriftTest
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.setup.setups import Setup
@@ -21,15 +21,15 @@ from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 S = TypeVar("S", bound=Setup)
 
 
-class ChannelTests(DriftTest[S]):
+class ChannelTests(DriftReduction[S]):
     """Both channels of a gyro of two degrees of freedom; see the module.  label: of a channel in the report."""
 
     channel: ClassVar[Any]  # windows, setup, "x" or "y" -> the test of a channel
     label: ClassVar[str] = "{} channel"
 
-    def of_channel(self, name: str) -> DriftTest[S]:
+    def of_channel(self, name: str) -> DriftReduction[S]:
         """Return the test of a channel, "x" or "y"."""
-        test: DriftTest[S] = type(self).channel(self.windows, self.setup, name)
+        test: DriftReduction[S] = type(self).channel(self.windows, self.setup, name)
         return test
 
     def equation(self) -> str | None:

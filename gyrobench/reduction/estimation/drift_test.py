@@ -1,6 +1,6 @@
 """The skeleton of a drift or calibration test: a test states its data and its errors, this runs the rest.
 
-    class Tumble(DriftTest[TumbleSetup]):
+    class Tumble(DriftReduction[TumbleSetup]):
         def problems(self): ...                # what makes setup or record impossible
         def regression(self): ...              # data, design matrix, quantities, what they are drawn against
         def effects(self, found): ...          # sources of error of the set-up, with what they do to the data
@@ -24,19 +24,20 @@ from typing import Any, ClassVar, Generic, TypeVar
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
+from gyrobench.reduction.estimation.effects import remounts, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import Account, fit_result
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftTestResult
 
 S = TypeVar("S", bound=Setup)
 
 
-class DriftTest(Generic[S]):
+class DriftReduction(Generic[S]):
     """One reduction of one record; see the module.  windows: columns of the record, SI."""
 
     #: record -> mistakes in taking or labelling it that make sense in this test (diagnosis.handling_candidates)

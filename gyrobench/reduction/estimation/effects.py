@@ -25,7 +25,7 @@ from gyrobench.component.set_up import Errors
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.setup.run_metadata import Remount
-from gyrobench.reduction.setup.sources import RELATIVE, REMOUNT, Source
+from gyrobench.reduction.setup.sources import RELATIVE, REMOUNT, Effect
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 
@@ -39,72 +39,6 @@ TOUCHED = 0.1  # of what the mounts differ by: least change of a coefficient tha
 PREDICTED = "budget.predicted"  # id of the table of shifts by simulated errors
 CORRECTIONS = "budget.corrections"
 APART = 2  # parts of a source up to which each has a line of its own
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What one source does to the data of a test: its standard uncertainty, and the error of the data for one unit.
-
-    error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
-    reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
-    (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
-    change of the reported values, of a source that is not in the data.  simulated: the error of each part that a
-    simulated set-up has, where no part of the bench declares it.  needed: why nothing passes without its size; "" where
-    it may be left out.
-    """
-
-    kind: Source
-    size: float
-    error: Array | None
-    note: str = ""
-    parts: tuple[str, ...] = ()
-    values: Array | None = None
-    simulated: tuple[float, ...] = ()
-    needed: str = ""
-
-    @property
-    def id(self) -> str:
-        return self.kind.id
-
-    @property
-    def source(self) -> str:
-        """Name of the source."""
-        return self.kind.name
-
-    @property
-    def unit(self) -> str:
-        return self.kind.unit
-
-    def changes(self, fit: Findings) -> Array:
-        """Return the change (m, q) of the reported values for one unit of each part, SI."""
-        if self.error is None:
-            return np.atleast_2d(np.zeros(fit.value.size) if self.values is None else self.values)
-        out: Array = np.atleast_2d(self.error) @ fit.gain.T
-        return out
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the parts, as a correction uses them; none for parts that have no name."""
-        return self._each(self.source, " ({})")
-
-    @property
-    def ids(self) -> list[str]:
-        """Return the ids of the parts, as :attr:`names`."""
-        return self._each(self.id, ".{}")
-
-    def _each(self, whole: str, part: str) -> list[str]:
-        if self.error is None:
-            return []
-        return [whole] if np.ndim(self.error) == 1 else [whole + part.format(p) for p in self.parts]
-
-    def errors(self, simulated: Errors) -> list[float]:
-        """Return the error of each part that is simulated, SI: by the effect itself, or by a part of the bench."""
-        if self.simulated:
-            return list(self.simulated)
-        given = simulated.get(self.id, 0.0)
-        if self.error is None or self.error.ndim == 1:
-            return [given if isinstance(given, float) else 0.0]
-        return [given.get(p, 0.0) if isinstance(given, dict) else given for p in self.parts]
 
 
 @dataclass(frozen=True)

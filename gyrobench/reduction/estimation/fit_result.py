@@ -19,7 +19,6 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked, outliers, regression, uncertainty
 from gyrobench.reduction.estimation.effects import (
     TOUCHED,
-    Effect,
     budget_rows,
     correction_table,
     simulated_table,
@@ -29,6 +28,7 @@ from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.verdict import DECISION_RULE, SLOW_RULE
 from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Harmonic, Reason, Table, TypeB
 
 CONDITION = 100.0  # above this a warning names the weakest direction

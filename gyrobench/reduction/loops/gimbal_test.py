@@ -19,8 +19,8 @@ from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.loops.gimbals import DEG, Flight, rate_servo_limits
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import Gate, Step, drift
+from gyrobench.reduction.loops.loop_reduction import LoopReduction
 from gyrobench.reduction.loops.loop_summary import margins
-from gyrobench.reduction.loops.loop_test import LoopTest
 from gyrobench.reduction.loops.platform_measures import stiffness
 from gyrobench.units import ARCSEC
 
@@ -28,7 +28,7 @@ AXES = ("pitch", "roll", "azimuth")
 DRIFTS = "At rest it drifts by {drift x}, {drift y} and {drift z} about x, y and z."
 
 
-class GimbalTest(LoopTest):
+class GimbalTest(LoopReduction):
     """One reduction of one record; phases without excitation beside the drift hold are legs of the flight."""
 
     ranked_by = "platform error"

@@ -1,4 +1,4 @@
-"""Names that the reduction of a loop test needs: ``from gyrobench.reduction.loops.toolkit import ...``."""
+"""Names that the reduction of a loop test needs: ``from gyrobench.reduction.loops.loop_toolkit import ...``."""
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
@@ -7,9 +7,9 @@ from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.sentences import Sentence, told
 from gyrobench.reduction.loops.loop_curves import line, over_time, thinned, trace
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift, wrapped
+from gyrobench.reduction.loops.loop_reduction import LoopReduction, MeasureReduction
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins
-from gyrobench.reduction.loops.loop_test import LoopTest, MeasureTest
 from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, LoopResult, Reason, Response, Table, Test
@@ -27,10 +27,10 @@ __all__ = [
     "Drift",
     "Gate",
     "LoopFindings",
+    "LoopReduction",
     "LoopResult",
-    "LoopTest",
     "MeasureFindings",
-    "MeasureTest",
+    "MeasureReduction",
     "Point",
     "Reason",
     "Record",

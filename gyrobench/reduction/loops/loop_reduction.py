@@ -1,6 +1,6 @@
 """The skeletons of tests whose figures are measured one by one: of a loop, and of anything else.
 
-    class Reduction(LoopTest):
+    class Reduction(LoopReduction):
         def measure(self):                         # phases -> coefficients, figures, reasons
             self.found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
             return Account(method=..., sources=[...], equation=..., conventions=[...])
@@ -22,7 +22,7 @@ from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.result import LoopResult
 
 
-class MeasureTest:
+class MeasureReduction:
     """One reduction of one record; see the module."""
 
     part: ClassVar[str] = ""  # slot of the part that the test is of; "": the instrument that the record names
@@ -57,7 +57,7 @@ class MeasureTest:
         return test.found.result(account, [] if test.found.unstable else test.summary(), test.ranked_by)
 
 
-class LoopTest(MeasureTest):
+class LoopReduction(MeasureReduction):
     """A test of phases that an exciter makes.  slot, by_neighbours, linearized: of :class:`LoopFindings`."""
 
     slot: ClassVar[str] = "exciter"
