@@ -62,7 +62,7 @@ def test_white_line_by_hand() -> None:
     assert b.interval == pytest.approx((1500.0 - 12.7062 * b.u, 1500.0 + 12.7062 * b.u), rel=1e-5)
     assert r.series[0].residual == pytest.approx([1 / 6, -1 / 3, 1 / 6])
     assert r.residual_std == pytest.approx(math.sqrt(1 / 6))
-    assert r.noise["model"] == "white (assumed)" and not r.simulated and r.allan == {}
+    assert r.noise["model"] == "white (assumed)" and not r.simulated and r.allan is None
     assert Result.from_dict(r.as_dict()) == r
 
 
@@ -244,7 +244,7 @@ def test_verdicts_hold_for_slow_drift_too() -> None:
 def test_ideal_data_claim_nothing() -> None:
     for noise in ("white", "estimated"):
         r = judged(line(60, 0.0, noise=noise))
-        assert r.noise["model"] == "none (ideal data)" and r.tests == [] and r.allan == {}
+        assert r.noise["model"] == "none (ideal data)" and r.tests == [] and r.allan is None
         assert all(c.z is None for c in r.coefficients)
         assert [c.estimate for c in r.coefficients] == pytest.approx([0.3, -0.2], abs=1e-12)
 
@@ -285,8 +285,8 @@ def test_turns() -> None:
     assert list(turns.repeatability())[3:] == [f"scatter of {n} / (°/h)" for n in ("A0", "A1", "B1")]
 
     found, turns = turning(0.02, 0.0)
-    third = next(h for h in turns.harmonics({}) if h["n"] == 3)
-    assert (third["a"], third["b"]) == pytest.approx((0.02, 0.0), abs=5 * third["u"]) and third["u"] < 1e-3
+    third = next(h for h in turns.harmonics({}) if h.n == 3)
+    assert (third.a, third.b) == pytest.approx((0.02, 0.0), abs=5 * third.u) and third.u < 1e-3
     assert (next(t for t in found.tests if t.name == "harmonics 2 and higher").p or 0.0) < 1e-6
 
     found, turns = turning(0.0, 0.02)  # two turns apart by 0.02: standard deviation of two values 0.02/sqrt(2)

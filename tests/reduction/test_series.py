@@ -92,8 +92,8 @@ def test_stretches_split_at_gaps_and_lengths() -> None:
 def test_autocorrelation_by_hand() -> None:
     """1, 2 | 3, 1: power 15, one pair in each stretch: (2 + 3)/15 times 4 values over 2 pairs."""
     found = residual_series.autocorrelation([np.array([1.0, 2.0]), np.array([3.0, 1.0])], 2)
-    assert found["rho"] == pytest.approx([1.0, 5 / 15 * 4 / 2, 0.0])
-    assert found["bound"][1] == pytest.approx(1.96 / math.sqrt(2), rel=1e-4)
+    assert found.rho == pytest.approx([1.0, 5 / 15 * 4 / 2, 0.0])
+    assert found.bound[1] == pytest.approx(1.96 / math.sqrt(2), rel=1e-4)
 
 
 def test_ljung_box_agrees_with_statsmodels() -> None:
@@ -170,12 +170,12 @@ def test_allan_of_white_noise() -> None:
     """
     x = 2.0 * rng.normal(size=1000)
     found = residual_series.allan([(10.0, x[:1500]), (10.0, x[1500:]), (33.0, np.ones(9))])
-    for tau, dev, lo, hi in zip(*(found[k] for k in ("tau", "dev", "lo", "hi")), strict=True):
+    for tau, dev, lo, hi in zip(found.tau, found.dev, found.lo, found.hi, strict=True):
         assert lo < dev < hi
         if tau < 1000:
             assert 0.8 * lo < 2.0 / math.sqrt(tau / 10) < 1.2 * hi
-    assert found["slopes"][0]["slope"] == pytest.approx(-0.5, abs=0.1)
-    assert residual_series.allan([(10.0, x[:5])]) == {}
+    assert found.slopes[0].slope == pytest.approx(-0.5, abs=0.1)
+    assert residual_series.allan([(10.0, x[:5])]) is None
 
 
 def test_allan_agrees_with_allantools() -> None:
@@ -191,9 +191,9 @@ def test_spectrum_of_white_noise() -> None:
     """One-sided density of white means s over windows T: 2 s^2 T."""
     x = 3.0 * rng.normal(size=(40, 256))
     found = residual_series.spectrum([(5.0, row) for row in x])
-    assert np.mean(found["S"][2:-2]) == pytest.approx(2 * 9.0 * 5.0, rel=0.06)
-    assert found["f"][-1] == pytest.approx(0.1)
-    assert residual_series.spectrum([(5.0, x[0][:9])]) == {}
+    assert np.mean(found.S[2:-2]) == pytest.approx(2 * 9.0 * 5.0, rel=0.06)
+    assert found.f[-1] == pytest.approx(0.1)
+    assert residual_series.spectrum([(5.0, x[0][:9])]) is None
 
 
 # ------------------------------------------------------------------------------------------ uncertainty

@@ -83,7 +83,7 @@ def test_the_report_finds_the_noise_of_the_gyro(run: Record, result: DriftRecord
     assert result["N"].u < 0.2 * truth["N"] and result["Q"].u < 0.1 * 0.02 and not result["K"].no_value
     assert result["B"].no_value and "not determined, below" in result["B"].no_value
     (column,) = result.columns
-    assert [d["kind"] for d in column.deviations] == ["Allan", "modified Allan", "Hadamard"]
+    assert [d.kind for d in column.deviations] == ["Allan", "modified Allan", "Hadamard"]
     # 1/2 <(difference of neighbours)^2> of the windows in deg/h, Earth rate along the input axis left out: no effect
     y = -p["gyro.k"] * run.windows["mean"] / DPH
     assert column.deviations[0].dev[0] == pytest.approx(math.sqrt(0.5 * np.mean(np.diff(y) ** 2)))
@@ -124,14 +124,14 @@ def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     assert result["N x"].interval[0] < 0.02 / 60.0 < result["N x"].interval[1] and result["N x"].u < 1e-5
     assert result["N y"].interval[0] < 0.1 / 60.0 < result["N y"].interval[1]
     a, b = result.columns
-    (slope,) = a.tables["regression"][0]["rows"]
+    (slope,) = a.tables["regression"][0].rows
     assert slope[0] == "temperature" and slope[1] == pytest.approx(0.03, abs=2.0 * slope[2]) and slope[2] < 0.003
-    (line,) = a.tables["spectrum"][0]["rows"]
+    (line,) = a.tables["spectrum"][0].rows
     assert line[1] == pytest.approx(0.3 / (2 * np.pi), abs=3 * line[2]) and line[3] == pytest.approx(
         0.05, abs=3 * line[4]
     )
-    assert not b.tables["spectrum"] and b.tables["regression"][0]["rows"][0][-1] == "not significant, left in"
-    facts = {row[0]: row[1] for row in b.tables["acquisition"][0]["rows"]}
+    assert not b.tables["spectrum"] and b.tables["regression"][0].rows[0][-1] == "not significant, left in"
+    facts = {row[0]: row[1] for row in b.tables["acquisition"][0].rows}
     assert facts["gaps"] == 1 and facts["samples missing in gaps"] == 101 and "sin(π f T)" in b.texts["acquisition"][0]
 
 
@@ -184,9 +184,9 @@ def test_noise_that_the_terms_do_not_describe(tmp_path: Path) -> None:
     result = reduce(write(tmp_path / "r.csv", {"time [s]": np.arange(n, dtype=float), "rate [deg/h]": x}))
     assert any("The spectrum is not that of the five terms" in w for w in result.warnings), result.warnings
     assert any("correlation time" in s for s in result.columns[0].texts["model"])
-    (others,) = [t for t in result.columns[0].tables["model"] if t["title"] == "Other models"]
-    assert [row[0] for row in others["rows"]] == ["MA(1)", "ARMA(1,1)", "ARMA(1,1)"] + ["ARIMA(3,1,0)"] * 3
-    assert all(row[4] < row[2] < row[5] for row in others["rows"])
+    (others,) = [t for t in result.columns[0].tables["model"] if t.id == "other_models"]
+    assert [row[0] for row in others.rows] == ["MA(1)", "ARMA(1,1)", "ARMA(1,1)"] + ["ARIMA(3,1,0)"] * 3
+    assert all(row[4] < row[2] < row[5] for row in others.rows)
 
 
 @pytest.mark.usefixtures("no_arma")
@@ -200,14 +200,14 @@ def test_a_coarse_counter(tmp_path: Path) -> None:
     columns = {"n": np.floor(angle) % 65536, "u [V]": np.ones(n), "case [degC]": 20.0 + np.arange(n) / n}
     file = write(tmp_path / "r.csv", columns, "# scale = 0.5arcsec\n# sampling = 2Hz")
     result = reduce(file, type_b="none")
-    facts = {row[0]: row[1] for row in result.columns[0].tables["acquisition"][0]["rows"]}
+    facts = {row[0]: row[1] for row in result.columns[0].tables["acquisition"][0].rows}
     assert facts["resets of the angle or counter"] == 0 and facts["turns or overflows unwrapped"] == 0
     assert facts["resolution of the values"] == pytest.approx(0.5) and facts["gaps"] == 0
     assert result["Q"].interval[0] < 0.5 / math.sqrt(12.0) < result["Q"].interval[1]
     assert not [w for w in result.warnings if "standard deviations from the median" in w]
     said = result.columns[0].texts["acquisition"]
     assert said[0].startswith("Columns of the file that were not used: u. ") and "sin(π f T)" in said[1]
-    (temperature,) = result.columns[0].tables["regression"][0]["rows"]
+    (temperature,) = result.columns[0].tables["regression"][0].rows
     assert temperature[0] == "case"  # by its unit
 
 
@@ -223,7 +223,9 @@ def test_what_is_just_determined_is_said_with_the_figure() -> None:
     none = np.zeros(600)
     quiet = SimpleNamespace(clean=none, rate=none, stretch=none, name="rate")
     (said,) = description.warnings(quiet, noise, SimpleNamespace(series=None, options={}))
-    assert said.startswith("B, Q: just determined, below 4 u: of such estimates at least one interval in four misses")
+    assert said.text.startswith(
+        "B, Q: just determined, below 4 u: of such estimates at least one interval in four misses"
+    )
 
 
 # ------------------------------------------------------------------------------------------- refusals, words
@@ -268,7 +270,7 @@ def test_what_is_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         record = load().read_measured(file, {})
         p = P.prepare("rate", P.columns_of(record), False)
         noise = fit(np.random.default_rng(9).normal(size=600), 0.1)
-        assert any(words in w for w in description.warnings(p, noise, record.run)), name
+        assert any(words in w.text for w in description.warnings(p, noise, record.run)), name
 
 
 def test_short_runs_are_refused(command: Command, tmp_path: Path) -> None:

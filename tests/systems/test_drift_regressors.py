@@ -29,7 +29,7 @@ def reduce(file: Path, columns: dict[str, np.ndarray], **values: str) -> DriftRe
 
 
 def rows(result: DriftRecordResult, table: int = 0) -> dict[Any, list[Any]]:
-    return {row[0]: row for row in result.columns[0].tables["regression"][table]["rows"]}
+    return {row[0]: row for row in result.columns[0].tables["regression"][table].rows}
 
 
 def regress(y: np.ndarray, **others: np.ndarray) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def test_the_smoothed_drift_follows_the_true_one(tmp_path: Path) -> None:
     for k, w in enumerate(rng.normal(scale=0.5 * math.sqrt(1.0 - phi**2), size=n - 1)):
         drift[k + 1] = phi * drift[k] + w
     result = reduce(tmp_path / "r.csv", {"time [s]": np.arange(float(n)), "rate [deg/h]": drift + rng.normal(size=n)})
-    s = {k: np.array(v) for k, v in result.columns[0].record["smoothed"].items()}
+    s = {k: np.array(v) for k, v in result.columns[0].record.smoothed.__dict__.items()}
     true = np.interp(s["t"], np.arange(n) + 0.5, drift)
     assert 0.9 < np.mean((s["low"] < true) & (true < s["high"])) < 0.99
     assert np.std(s["mean"] - true) < 0.6 * np.std(drift)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -81,8 +82,8 @@ def results(
         quiet = {} if noise else {n: 0.0 for n in system.noises}
         values = {**SHORT[name], **more.get(name, {}), **chosen.given_to(chosen.members())[name], **quiet}
         record = ran(sessions[name], values, chosen.seed_of(seed, name))
-        out[name] = system.with_values(values).reduce(record)
-        out[name].provenance = record.run.as_dict()
+        found = system.with_values(values).reduce(record)
+        out[name] = replace(found, provenance=record.run.as_dict())
     return out
 
 
