@@ -57,12 +57,12 @@ def _residuals(report: Report[RunResult], result: DriftTestResult) -> list[Any]:
     )  # fmt: skip
     acf = _acf(
         result.acf, "windows",
-        "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
+        "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
         "Autocorrelation of the residuals against lag, with bounds",
     )  # fmt: skip
     quantiles = Picture(
         "quantiles", plots.quantiles(values, "quantiles"),
-        "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
+        "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
         "distribution; points off it at the ends are outliers.",
         "Q-Q plot of the residuals against a normal distribution", half=True,
     )  # fmt: skip
@@ -109,7 +109,7 @@ def _stability(report: Report[RunResult]) -> list[Any]:
     psd = result.psd if isinstance(result, DriftTestResult) else None
     allan = Picture(
         "allan", plots.allan(result.allan, "allan") if result.allan else "",
-        "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
+        "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
         "bias instability; +½: random walk (of a rate: rate random walk). In the residuals of a fit the slow drift "
         "that its terms take up is missing: a fall at long averaging times is then the fit's.",
         "Allan deviation against averaging time, logarithmic axes", half=True,
@@ -134,7 +134,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
             f"{condition}. Above 100, errors of the model are amplified in the least-determined combination."
         )
         blocks.append(Text(text))
-    heads = ["name", "u, Type A", "dof", "k", "U (95 %)", "t", "p (t)", "closed form", "difference"]
+    heads = ["name", "u, Type A", "dof", "k", "U (95 %)", "t", "p (t)", "closed form", "difference"]
     groups = unit_groups(result.coefficients)
     if not groups:
         heads.insert(1, "unit")
@@ -154,7 +154,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
     )  # fmt: skip
     scores = Picture(
         "scores", plots.scores(result.coefficients, "scores"),
-        "Deviation of the estimates from the truth in units of u. Band: ±k, coverage probability 95 %.",
+        "Deviation of the estimates from the truth in units of u. Band: ±k, coverage probability 95 %.",
         "Estimate minus truth over standard uncertainty, one point per coefficient", half=True,
     )  # fmt: skip
     tables = [block for k, t in enumerate(result.tables) for block in method_table(doc, ("tables", k), t)]

@@ -125,7 +125,7 @@ def answer(report: Report[Result]) -> ResultSummary:
                 text_cell(c.verdict, c.verdict),
             ]
             rows.append(Row(cells))
-    heads = columns("requirement", "meaning", "estimate", "U (95 %)", "unit", "limit", "verdict", wide=("meaning",))
+    heads = columns("requirement", "meaning", "estimate", "U (95 %)", "unit", "limit", "verdict", wide=("meaning",))
     table = Table(heads, rows, "Conformity with each requirement.") if rows else None
     rule = result.decision_rule if rows or result.verdict != NO_VERDICT else ""
     return ResultSummary(result.verdict, rule, result.summary, result.warnings, table)
@@ -146,7 +146,7 @@ def coefficients(report: Report[Result]) -> list[Any]:
     result = report.result
     limits = any(c.limit is not None for c in result.coefficients)
     truth = any(c.truth is not None for c in result.coefficients)
-    heads = ["name", "meaning", "estimate", "u", "95 % from", "to"]
+    heads = ["name", "meaning", "estimate", "u", "95 % from", "to"]
     heads += [*(["truth", "z"] if truth else []), *(["limit", "verdict"] if limits else [])]
     groups = unit_groups(result.coefficients)
     if not groups:
