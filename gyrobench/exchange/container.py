@@ -11,7 +11,7 @@ from typing import Any
 
 from gyrobench.exchange.exposure import choose
 from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
-from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, slots_with_arrays, with_experiment
+from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, slots_with_arrays, for_system
 from gyrobench.system.system import System
 
 
@@ -67,7 +67,7 @@ def export_container(
         gain = gain_fmu(bench) if gains.parts or in_si else b""
         for part in (*gains.order, *in_si.values()):
             data = assembly.paths[part].read_bytes() if part in assembly.paths else gain
-            (folder / f"{part}.fmu").write_bytes(with_experiment(data, assembly.system))
+            (folder / f"{part}.fmu").write_bytes(for_system(data, assembly.system))
             node.add_fmu(f"{part}.fmu")
         links = [(c.source, c.output.variable, c.target, c.input.variable) for c in gains.links]
         links += [(*_end(outputs[port]), part, INPUT.variable) for port, part in in_si.items()]
