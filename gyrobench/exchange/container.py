@@ -11,7 +11,7 @@ from typing import Any
 
 from gyrobench.exchange.exposure import choose
 from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
-from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, slots_with_arrays, for_system
+from gyrobench.exchange.ssp_export import ExportError, for_system, prepare, recorded, slots_with_arrays
 from gyrobench.system.system import System
 
 

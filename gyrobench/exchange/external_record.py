@@ -43,8 +43,10 @@ def shortest_window(system: System) -> float:
 
 
 def row_steps(system: System) -> int:
-    """Return how many steps two rows of a result may be apart: a whole part of the channels' period, and a quarter of the
-    shortest window where samplers alone make the windows (they hold what they say until the next one ends), else 1.
+    """Return how many steps two rows of a result may be apart: a whole part of the channels' period.
+
+    At most a quarter of the shortest window where samplers alone make the windows, for they hold what they say until
+    the next one ends; 1 where other parts say something of a window.
     """
     channels = max(1, round(system.channel_period / system.step))
     if system.windows is None:

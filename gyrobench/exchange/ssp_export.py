@@ -4,9 +4,9 @@
                               interval of the results as annotations of OMSimulator (SSP has no other place for them)
 ``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
 ``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
-``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...); of the
-                              bench's own the description has step and end of the system, and no unit where the socket
-                              takes any: OMSimulator refuses a wire from "A" to "1", whatever the structure says
+``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...); in those
+                              of the bench the step and the end of the system, and no unit where the socket takes any:
+                              OMSimulator refuses a wire from "A" to "1", whatever the structure says
 
 What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 
@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import io
 import math
-import re
 import zipfile
 from collections.abc import Container, Iterable, Mapping
 from pathlib import Path

@@ -13,7 +13,6 @@ import pytest
 from fmpy import read_model_description
 from lxml import etree
 
-from gyrobench.units import same_dimension
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.exchange.external_record import row_steps
 from gyrobench.exchange.gains import Gains, gains_of
@@ -25,6 +24,7 @@ from gyrobench.system.fmu_variables import variables
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System, load_system
 from gyrobench.system.wiring import Assembly
+from gyrobench.units import same_dimension
 
 SYSTEMS = [n for n in sorted(Bench(standard_folder()).systems()) if n != "drift_test_suite"]
 
@@ -94,7 +94,7 @@ def same_units(assembly: Assembly, gains: Gains) -> None:
     """OMSimulator compares the dimensions that the FMUs of the archive declare themselves."""
     known = {}
     for name in gains.order:
-        description = assembly.descriptions[name] if name in assembly.descriptions else None
+        description = assembly.descriptions.get(name)
         lost = unitless(assembly, gains, name)
         for v in variables(description).values() if description is not None else ():
             known[name, v.name] = "" if v.array in lost else v.unit
