@@ -244,7 +244,7 @@ class Session:
         system, starts, document = self.prepare(values, seed, step)
         schedule = Schedule.of(system)
         if checkpoints is not None:
-            job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}
+            job = {k: getattr(document, k) for k in ("system", "seed", "step", "coupling", "options", "parameters")}
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
             job |= {"parts": parts, "stop": system.stop, "every": schedule.every}
             checkpoints.check(job, self.program, self.assembly.descriptions)
@@ -358,6 +358,7 @@ class Session:
             date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             seed=seed,
             step=system.step,
+            coupling=system.coupling,
             engine=self.engine,
             **self.assembly.order.as_dict(system.step),
             parts=parts,

@@ -4,8 +4,8 @@
                               interval of the results as annotations of OMSimulator (SSP has no other place for them)
 ``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
 ``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
-``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...); in those
-                              of the bench the step and the end of the system, and no unit where the socket takes any:
+``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...); those
+                              of the bench have the system's step and end, and no unit where the socket takes any:
                               OMSimulator refuses a wire from "A" to "1", whatever the structure says
 
 What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
@@ -95,6 +95,16 @@ def stop_time(system: System) -> float:
         plan = system.plan()
         steps = math.ceil(math.ceil(1.05 * plan.duration() + 60.0 * len(plan.phases)) / system.step - 1e-6)
     return float(f"{max(1, steps) * system.step:.15g}")
+
+
+def experiment(system: System, inputs: bool) -> dict[str, str]:
+    """Return the attributes of the DefaultExperiment of a system that is one FMU.
+
+    Its step is that between two rows of the result, which importers take for their output where they are not told
+    otherwise; with inputs that someone may feed it is the system's own.
+    """
+    step = system.step if inputs else float(f"{row_steps(system) * system.step:.15g}")
+    return {"startTime": "0.0", "stopTime": repr(stop_time(system)), "stepSize": repr(step)}
 
 
 def export_ssp(

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
@@ -31,7 +33,8 @@ class RunRequest:
 
     step: s, None for the system's own.  timeout: s, for one call of an FMU, None for the usual.  in_memory: nothing is
     written, ``out``, ``force`` and ``resume`` have no meaning.  formats: of the report.  check_step: whether what the
-    step does is found by two further runs; None: by two short ones for a system with loops, else not.
+    step does is found by further runs; None: by short ones for a system with loops or one that is coupled in parallel,
+    else not.
     """
 
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -138,11 +141,15 @@ def _report(
     stopped: PostRunError | None = None
     step = request.step or system.step
     with record_kept(folder, record):
-        if not system.has_reduction:
-            return RunOutcome(record, folder=folder)
         check: dict[str, Any] = {}
-        by_default = bool(system.loops) or system.closed_loop
+        by_default = bool(system.loops) or system.closed_loop or system.coupling == "parallel"
         wanted = by_default if request.check_step is None else request.check_step
+        if not system.has_reduction:
+            if wanted and record.complete:
+                record.run.notes += channel_step_effect(session, record, request.seed, step, feedback)
+                if folder is not None:
+                    record.save(folder)
+            return RunOutcome(record, folder=folder)
         if wanted and record.complete:
             try:
                 check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
@@ -157,6 +164,25 @@ def _report(
             stopped = None
         paths = write_report(result, folder, record, spec, request.formats)
         return RunOutcome(record, result, folder, paths, stopped)
+
+
+def channel_step_effect(
+    session: Session, record: Record, seed: int, step: float, feedback: Feedback = SILENT
+) -> list[str]:
+    """Return what half the step changes in the channels of a run without a reduction, as a sentence for each."""
+    with feedback.progress(f"step check, {0.5 * step:g} s") as progress:
+        other = session.run({}, seed, 0.5 * step, None, progress).channels
+    sentences = []
+    for name, values in record.channels.items():
+        if name == "time":
+            continue
+        rows = min(len(values), len(other[name]))
+        change = float(np.max(np.abs(other[name][:rows] - values[:rows]), initial=0.0))
+        span = float(np.ptp(values)) if len(values) else 0.0
+        share = f" ({change / span:.2g} of its range)" if span > 0.0 else ""
+        sentences.append(f"Half the step changes {name} by up to {change:.3g}{share}.")
+    feedback.notes(sentences)
+    return sentences
 
 
 def check_step(
