@@ -141,7 +141,7 @@ class Response:
 
 @dataclass(kw_only=True, repr=False)
 class Result(Displayed):
-    """What results of every kind hold; a reduction returns one of the kinds below.
+    """Content common to results of every kind; a reduction returns one of the kinds below.
 
         result["D_I"].estimate, result["D_I"].interval      a coefficient by its name
         result.array("estimate"), result.covariance()       numpy arrays, in the order of result.names
@@ -346,7 +346,7 @@ class DriftRecordResult(Result):
 
 @dataclass
 class SuiteComparison:
-    """What the methods of a suite say of each other, see gyrobench.reduction.suite.method_comparison."""
+    """Comparison of the methods of a suite, see gyrobench.reduction.suite.method_comparison."""
 
     rule: str
     shared: list[str]  # sources of type B that are one and the same error in all tests

@@ -1,4 +1,4 @@
-"""What a reduction will state for a plan, predicted from the fit that the same reduction made of one run of it.
+"""Uncertainty that a reduction will state for a plan, predicted from its fit of one run of that plan.
 
 The design matrix, the windows, the set-up effects that are weighed and the functions of the unknowns are those of that
 fit; its data are replaced by the fitted model plus noise drawn from the true noise model, and it is made again, a few
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import DataNoise
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise import mean_variance
@@ -32,7 +32,7 @@ EASY, FEWEST = 300.0, 12
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of one fit: names and printed units of its values, u, error and least (q,) in these units, and u of type B."""
+    """Prediction for a fit: names and printed units of its values; u, error, least (q,) in these units, u of type B."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -91,6 +91,6 @@ def _again(fit: Findings, y: Array, J: Array) -> tuple[Array, Array]:
     return np.minimum(sd, half / NORMAL), full @ est.gain
 
 
-def effective(noise: Noise, window: float) -> float:
+def effective(noise: DataNoise, window: float) -> float:
     """Return the density that white noise would have with the variance of this noise over a window (s)."""
     return math.sqrt(noise.white**2 + window * noise.markov**2 * float(mean_variance(np.array(window / noise.tau))))

@@ -31,7 +31,6 @@ from gyrobench.system.system import InvalidConfigurationError, Slot, System
 STRUCTURE = "SystemStructure.ssd"
 STOP = 1.0  # s, where an archive names no time
 ROWS = 1000  # of the channels, about
-ROWS = 1000  # of the channels, about
 
 
 def _unpack(path: Path) -> Path:
@@ -195,8 +194,6 @@ def _read(path: Path, step: float | None) -> System:
     system: System = type("Archive", (Archive,), members)()
     system.name, system.step = path.stem, _fixed_step(top) if step is None else step
     system.stop = float(stop) if stop else STOP
-    if system.step > 0.0:
-        system.channel_period = system.step * max(1, round(system.stop / system.step / ROWS))
     if system.step > 0.0:
         system.channel_period = system.step * max(1, round(system.stop / system.step / ROWS))
     return system

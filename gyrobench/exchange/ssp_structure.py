@@ -13,7 +13,7 @@ from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
 from gyrobench.exchange.gains import is_gain
-from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, Value, as_kind, transformation
+from gyrobench.exchange.ssp_values import NS, ArchiveError, SspValue, Units, as_kind, transformation
 from gyrobench.system.binding import Binding, Bound, fit
 from gyrobench.system.sockets import Socket
 
@@ -210,7 +210,7 @@ class Structure:
         return Feed(before.source, factor * before.factor, factor * before.offset + offset, unit or before.unit)
 
     # ------------------------------------------------------------------ parameters
-    def set_value(self, place: Place, name: str, value: Value, known: Units, raw: dict[str, Any]) -> None:
+    def set_value(self, place: Place, name: str, value: SspValue, known: Units, raw: dict[str, Any]) -> None:
         """Set a parameter or start value, named from ``place``.  Raises ArchiveError."""
         targets = self.targets(place, name)
         if targets is None:

@@ -84,7 +84,7 @@ class Units:
 
 
 @dataclass(frozen=True)
-class Value:
+class SspValue:
     """One value of a parameter set."""
 
     kind: str  # "Real", "Integer", "Boolean", "String", "Enumeration"
@@ -103,7 +103,7 @@ def transformation(element: ET.Element) -> tuple[float, float]:
     return 1.0, 0.0
 
 
-def _values(element: ET.Element) -> dict[str, Value]:
+def _values(element: ET.Element) -> dict[str, SspValue]:
     found = {}
     for p in element.findall("ssv:Parameters/ssv:Parameter", NS):
         child, name = next(iter(p), None), p.get("name", "")
@@ -123,7 +123,7 @@ def _values(element: ET.Element) -> dict[str, Value]:
                 value = text in ("true", "1")
         except ValueError:
             raise ArchiveError(f"parameter '{name}' = '{text}': not a value of the type {kind}") from None
-        found[name] = Value(kind, value, child.get("unit", ""))
+        found[name] = SspValue(kind, value, child.get("unit", ""))
     return found
 
 
@@ -167,7 +167,7 @@ def _read(binding: ET.Element, folder: Path, inline: str, what: str, schema: lis
 
 def bound_values(
     element: ET.Element, folder: Path, ssd_units: ET.Element | None, schema: list[str]
-) -> Iterator[tuple[str, Value, Units]]:
+) -> Iterator[tuple[str, SspValue, Units]]:
     """Yield name, value and units of all that is bound to a system or a component, after mappings.
 
     With a mapping only its entries are applied, those without a source to nothing.  schema: gets what the schemas
@@ -201,11 +201,11 @@ def bound_values(
             yield target, _mapped(entry, values[source]), known
 
 
-def _mapped(entry: ET.Element, value: Value) -> Value:
+def _mapped(entry: ET.Element, value: SspValue) -> SspValue:
     factor, offset = transformation(entry)
     suppressed = entry.get("suppressUnitConversion") == "true"
     if (factor, offset) == (1.0, 0.0):
-        return Value(value.kind, value.value, "" if suppressed else value.unit)
+        return SspValue(value.kind, value.value, "" if suppressed else value.unit)
     if value.kind not in ("Real", "Integer"):
         raise ArchiveError(f"parameter mapping: {entry.get('source')} is {value.kind}, which no factor applies to")
     if offset and value.unit and not suppressed:
@@ -213,10 +213,10 @@ def _mapped(entry: ET.Element, value: Value) -> Value:
             f"parameter mapping: {entry.get('source')}: an offset beside a unit conversion has no defined order; "
             "set suppressUnitConversion"
         )
-    return Value(value.kind, factor * value.value + offset, "" if suppressed else value.unit)
+    return SspValue(value.kind, factor * value.value + offset, "" if suppressed else value.unit)
 
 
-def as_kind(name: str, value: Value, kind: str, target_unit: str, known: Units) -> Any:
+def as_kind(name: str, value: SspValue, kind: str, target_unit: str, known: Units) -> Any:
     """Return a value as one of a variable of the FMU, in its unit.  Raises ArchiveError."""
     if kind == "Real" and value.kind in ("Real", "Integer"):
         factor, offset = known.convert(value.unit, target_unit)

@@ -201,7 +201,7 @@ class Record(Displayed):
 
     @property
     def complete(self) -> bool:
-        """Whether the run came to its end; False where it was interrupted or failed."""
+        """Return True if the run came to its end; False where it was interrupted or failed."""
         return self.run.complete
 
 

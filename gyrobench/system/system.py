@@ -1,4 +1,4 @@
-"""What a system is: slots, wires, options, plan and reduction, declared in ``systems/<name>/system.py``.
+"""Systems: slots, wires, options, plan and reduction, declared in ``systems/<name>/system.py``.
 
     class Tumble(System):
         \"\"\"Single-axis tumble of a floated gyro.\"\"\"
@@ -74,7 +74,7 @@ class Slot:
 
 @dataclass(frozen=True)
 class Windows:
-    """When ``watch`` changes, a row of the record is written: column name -> "slot.output"."""
+    """Windows of a record: a row is written when ``watch`` changes; column name -> "slot.output"."""
 
     watch: str
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -103,7 +103,7 @@ class OnRequest:
 
 @dataclass(frozen=True)
 class MeasuredData:
-    """How a laboratory's record of a test is written and read.
+    """Template and reader of a laboratory's record of a test.
 
     template: an empty record with its explanations, printed by ``gyrobench reduce SYSTEM --template``.
     read: (system, file, values) -> record; see gyrobench.system.lab_record for one that fits most tests.
@@ -227,15 +227,15 @@ class System(Configurable):
         return {}
 
     def check(self) -> list[str]:
-        """What makes a run with these values impossible or meaningless (the run is refused), as sentences."""
+        """Return what makes a run with these values impossible or meaningless (the run is refused), as sentences."""
         return []
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """As :meth:`check`, knowing every parameter of every part: {"slot.name": SI value, arrays nested}."""
+        """Return problems as :meth:`check` does, from all parameters: {"slot.name": SI value, arrays nested}."""
         return []
 
     def warnings(self) -> list[str]:
-        """What the user should know about these values, as sentences."""
+        """Return what the user should know about these values, as sentences."""
         return []
 
     def reduce(self, record: Record, specification: Specification | None = None) -> Result:

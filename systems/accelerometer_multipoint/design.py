@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.design.visit_protocol import Channel, Noise, VisitProtocol, phases_of
+from gyrobench.design.visit_protocol import Channel, DataNoise, VisitProtocol, phases_of
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.run_metadata import Site
@@ -41,7 +41,7 @@ def protocol_of(system: System, record: Record) -> VisitProtocol:
     white = math.hypot(
         float(p["accelerometer.white"]) / G0, float(p["accelerometer.meter"]) * p["accelerometer.scale"] / G0
     )
-    noise = Noise(white, float(p["accelerometer.markov"]) / G0, float(p["accelerometer.markov_tau"]))
+    noise = DataNoise(white, float(p["accelerometer.markov"]) / G0, float(p["accelerometer.markov_tau"]))
     channel = Channel(
         tuple(model.names),
         np.column_stack([model.columns(v, zeros, gamma), slopes]),

@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 import setup_plans
-from coverage import plan
+from estimation_coverage import plan
 
 from gyrobench import drift, frames
 from gyrobench.reduction.estimation import noise, nuisances, outliers, uncertainty

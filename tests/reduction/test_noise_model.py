@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import tracemalloc
-from pathlib import Path
-from typing import Any
 
 import counting
+import estimation_coverage as mc
 import numpy as np
 import pytest
 from scipy import stats
@@ -18,11 +16,6 @@ from gyrobench import drift
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
 from gyrobench.reduction.estimation.mixture import Mixture
 from gyrobench.reduction.estimation.regression import RegressionError, generalized_least_squares, least_squares
-
-_spec = importlib.util.spec_from_file_location("coverage_of_tumble", Path(__file__).with_name("coverage.py"))
-assert _spec is not None and _spec.loader is not None
-mc: Any = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(mc)
 
 T0 = np.array([0.0, 10.0, 31.0, 45.0, 45.5])
 T1 = np.array([10.0, 30.0, 40.0, 45.5, 60.0])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from coverage import plan as tumble_plan
+from estimation_coverage import plan as tumble_plan
 from scipy import stats
 
 from gyrobench import drift, frames

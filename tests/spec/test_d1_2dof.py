@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import tumble_2dof as T
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import harmonic
-
-sys.path.insert(0, str(Path(__file__).parent))
-import tumble_2dof as T
 
 DPH = T.DPH
 SIMPLE = tuple(n for c in "xy" for n in T.geometry.terms("simple", c))

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from multipoint import KS, estimates, module, polynomial, reading, reduced, windows
 
 from gyrobench.reduction.setup.window_checks import ReductionError

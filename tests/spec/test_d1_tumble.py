@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import tumble as T
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import harmonic
-
-sys.path.insert(0, str(Path(__file__).parent))
-import tumble as T
 
 DPH = T.DPH
 NAMES = T.NAMES

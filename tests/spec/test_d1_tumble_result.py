@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import tumble as T
 
 from gyrobench import drift, frames
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import noise
 from gyrobench.result import Result
-
-sys.path.insert(0, str(Path(__file__).parent))
-import tumble as T
 
 DPH = T.DPH
 NAMES = T.NAMES

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import two_axis as T
 
 from gyrobench import drift, frames
-
-sys.path.insert(0, str(Path(__file__).parent))
-import two_axis as T
 
 DPH = T.DPH
 NAMES = drift.terms(9)

@@ -20,7 +20,7 @@ from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.system import Slot, System
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 Command = Callable[..., tuple[int, str, str]]
 LAG_SOCKET = Socket("Lag", "a lag", (inp("u", "1", "in", whole=False), out("y", "1", "out")))
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
@@ -38,10 +38,10 @@ class Ring(System):
     channel_period = 0.01
 
 
-def test_every_part_takes_the_values_before_the_step(make: Make) -> None:
+def test_every_part_takes_the_values_before_the_step(foreign: Foreign) -> None:
     system = Ring()
     system.coupling = "parallel"
-    found = run(system, dict.fromkeys("abc", make("lag")), values={"a.y0": 20.0})
+    found = run(system, dict.fromkeys("abc", foreign("lag")), values={"a.y0": 20.0})
     e, y = -math.expm1(-0.01 / 0.1), np.array([20.0, 0.0, 0.0])
     rows = [y]
     for _ in range(50):
@@ -92,12 +92,12 @@ def test_the_report_of_a_loop_that_is_coupled_in_parallel(tmp_path: Path, comman
     assert gb.load("fixed_position", coupling="parallel").system.coupling == "parallel"
 
 
-def test_an_archive_says_what_its_step_does(make: Make, tmp_path: Path, command: Command) -> None:
+def test_an_archive_says_what_its_step_does(foreign: Foreign, tmp_path: Path, command: Command) -> None:
     """Two lags feed one another, the first from 1: half the step moves the second by what is written here by hand."""
     elements = LAG.format("a", bound(real("y0", 1.0))) + LAG.format("b", "")
     link = '<ssd:Connection startElement="a" startConnector="y" endElement="b" endConnector="u"/>'
     back = '<ssd:Connection startElement="b" startConnector="y" endElement="a" endConnector="u"/>'
-    path = write_archive(tmp_path / "x.ssp", {"resources/lag.fmu": make("lag")}, elements, link + back)
+    path = write_archive(tmp_path / "x.ssp", {"resources/lag.fmu": foreign("lag")}, elements, link + back)
     code, _, err = command(
         "run", path, "--step", "0.25", "--coupling", "parallel", "--out", tmp_path / "run", default_check=True
     )

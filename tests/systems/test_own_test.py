@@ -62,7 +62,7 @@ def test_what_comes_along_from_the_family(bench: Path, command: Command) -> None
     """Options, checks, order of execution and set-up errors, without a word of them in the file."""
     code, out, _ = command("show", NAME)
     assert code == 0
-    for text in ("latitude", "45.75°", "torquer scale factor for the reduction", "loops are cut at", "N -E"):
+    for text in ("latitude", "45.75°", "torquer scale factor for the reduction", "delayed wires", "N -E"):
         assert text in out
     code, _, err = command("run", NAME, "--set", "gravity=9.5m/s2")
     assert code == 2 and "gravity 9.5 m/s² lies outside 9.7..9.9 m/s²" in err
