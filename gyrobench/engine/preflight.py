@@ -1,4 +1,4 @@
-"""What the descriptions of foreign FMUs say of a run before it begins: what cannot be, and what is to be known.
+"""Problems and remarks of foreign FMUs before a run: why it cannot be, and what is to be known of it.
 
 Read are the libraries of the archive, ``fixedInternalStepSize``, ``canHandleVariableCommunicationStepSize`` with the
 step of the default experiment, ``needsExecutionTool``, ``canBeInstantiatedOnlyOncePerProcess``, and inputs of types
@@ -14,18 +14,15 @@ from typing import Any
 
 from gyrobench.system.wiring import Assembly
 
-FMI_3_PLATFORMS = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
 CLOSE = 1e-6  # of a step, by which a multiple may be off
 
 
 def binary_problem(path: Path, description: Any) -> str:
     """Return why the library of an FMU cannot be loaded on this platform; empty where it is there."""
-    from gyrobench.packaging.compiler import PLATFORMS, this_platform
+    from fmpy import platform, platform_tuple, sharedLibraryExtension
 
-    platform = this_platform()
-    suffix = PLATFORMS[platform][0]
-    folder = FMI_3_PLATFORMS.get(platform, platform) if description.fmiVersion.startswith("3.") else platform
-    wanted = f"{description.coSimulation.modelIdentifier}{suffix}"
+    folder = platform_tuple if description.fmiVersion.startswith("3.") else platform  # where FMPy looks
+    wanted = f"{description.coSimulation.modelIdentifier}{sharedLibraryExtension}"
     if Path(wanted).name != wanted or "\\" in wanted:
         return ""  # refused when it is loaded
     with zipfile.ZipFile(path) as archive:

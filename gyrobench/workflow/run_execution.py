@@ -144,24 +144,31 @@ def _report(
         check: dict[str, Any] = {}
         by_default = bool(system.loops) or system.closed_loop or system.coupling == "parallel"
         wanted = by_default if request.check_step is None else request.check_step
-        if not system.has_reduction:
-            if wanted and record.complete:
-                record.run.notes += channel_step_effect(session, record, request.seed, step, feedback)
-                if folder is not None:
-                    record.save(folder)
-            return RunOutcome(record, folder=folder)
+        kept = "report" if system.has_reduction else "record"
         if wanted and record.complete:
             try:
-                check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
+                if system.has_reduction:
+                    check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
+                else:
+                    record.run.notes += channel_step_effect(session, record, request.seed, step, feedback)
             except RunInterrupted as error:
-                stopped = CommandInterrupted(f"step check {error}; the report is without it")
+                stopped = CommandInterrupted(f"step check {error}; the {kept} is without it")
             except Exception as error:
-                stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
+                stopped = PostRunError(f"step check: {user_message(error)}\nthe {kept} is without it")
                 stopped.__cause__ = error
-        result = reduce_run(system, record, limits, check)
+        unknown = ""
         if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
-            result.warnings.append(f"The communication step is not in u: {stopped}.".replace("\n", "; "))
-            stopped = None
+            unknown, stopped = f"{stopped}.".replace(":\n  - ", ": ").replace("\n", "; "), None
+        if not system.has_reduction:
+            if unknown:
+                record.run.notes.append(f"The effect of the communication step is not known: {unknown}")
+                feedback.notes(record.run.notes[-1:])
+            if folder is not None and wanted:
+                record.save(folder)
+            return RunOutcome(record, folder=folder, stopped=stopped)
+        result = reduce_run(system, record, limits, check)
+        if unknown:
+            result.warnings.append(f"The communication step is not in u: {unknown}")
         paths = write_report(result, folder, record, spec, request.formats)
         return RunOutcome(record, result, folder, paths, stopped)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
+from archives import LAG, write_archive
 from fmpy import platform, platform_tuple
 
 from gyrobench.engine.session import Session, run
@@ -80,6 +81,22 @@ def test_a_fixed_internal_step(small: System, change: Change, command: Command) 
     assert code == 2 and "is no multiple; give --step" in err
     code, out, _ = command("show", *words, "--json")
     assert code == 0 and any("a run is refused: gyro: vendor_gyro3.fmu works at" in n for n in json.loads(out)["notes"])
+
+
+def test_half_of_a_fixed_internal_step(change: Change, tmp_path: Path, command: Command) -> None:
+    """The step check cannot run; the record stays and says so."""
+    kind = '<CoSimulation modelIdentifier="vendor_gyro3"'
+    part = change("vendor_gyro3", (kind, f'{kind} fixedInternalStepSize="1e-3"'))
+    component = LAG.format("g", "").replace("lag.fmu", "gyro.fmu")
+    link = '<ssd:Connection startElement="g" startConnector="V_PICKOFF" endElement="g" endConnector="I_TORQUE"/>'
+    path = write_archive(tmp_path / "x.ssp", {"resources/gyro.fmu": part}, component, link)
+    words = ("run", path, "--step", "1ms", "--coupling", "parallel", "--out", tmp_path / "run")
+    code, _, err = command(*words, default_check=True)
+    assert code == 0, err
+    said = "The effect of the communication step is not known: step check: x refuses to run: g: gyro.fmu works "
+    assert said in err
+    assert any(n.startswith(said) for n in json.loads((tmp_path / "run" / "run.json").read_text())["notes"])
+    assert command(*words, "--check-step", "--force")[0] == 3
 
 
 def test_an_execution_tool(small: System, change: Change) -> None:
