@@ -8,7 +8,7 @@ proposed where names and units speak for them.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,9 @@ from gyrobench.component.component import Component
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.connectors import Connector
 from gyrobench.system.fmu_variables import Variable, variables
-from gyrobench.system.mapping_proposal import ENOUGH, SAME_DIMENSION, dimension, likeness
+from gyrobench.system.mapping_proposal import ENOUGH, SAME_DIMENSION, likeness
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
-
-POWERS = 3  # of g in the unit of a coefficient, at most
 
 
 @dataclass(frozen=True)
@@ -76,27 +74,11 @@ def wanted_parameters(system: System, slot: str, part: type[Component]) -> list[
     return sorted(found, key=lambda w: not w.needed)
 
 
-def _per_g(unit: str, wanted: str, declared: Mapping[str, Any]) -> int:
-    """Return by how many powers of an acceleration a unit is smaller than the wanted one; the coefficient is per g."""
-    own, target = dimension(unit, declared), units.unit(wanted).exponents
-    meter, second = units.BASE.index("m"), units.BASE.index("s")
-    for n in range(1, POWERS + 1):
-        shifted = list(target)
-        shifted[meter] -= n
-        shifted[second] += 2 * n
-        if own is not None and list(own)[:-1] == shifted[:-1]:
-            return n
-    return 0
-
-
-def _line(w: WantedParameter, v: Variable, declared: Mapping[str, Any]) -> str:
+def _line(w: WantedParameter, v: Variable) -> str:
     wanted = w.connector.unit
     fields, said = [f'name = "{v.name}"'], [w.connector.meaning]
     if v.unit:
         said.append(f"in {v.unit}, as the FMU declares")
-        if n := _per_g(v.unit, wanted, declared):
-            fields.append(f"factor = {units.G0**n!r}")
-            said.append("per g0 here")
     elif wanted not in ("", "1"):
         fields.append(f'unit = "{wanted}"')
         others = [u for u in units.fitting(wanted)[1:] if u != wanted]
@@ -105,32 +87,29 @@ def _line(w: WantedParameter, v: Variable, declared: Mapping[str, Any]) -> str:
 
 
 def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list[str]:
-    """Return the lines of [parameters]; none where nothing is proposed or needed."""
+    """Return the lines of [parameters]; none where nothing is proposed or needed.
+
+    Where the FMU has a parameter of the wanted name, that is the one, and it stands for no other.  A unit per
+    acceleration fits no coefficient, which is per g0 to a power that only its name tells.
+    """
     declared = {u.name: u for u in description.unitDefinitions}
-    own = variables(description)
-    free = [v for v in own.values() if v.causality == "parameter" and v.kind == "Real" and not v.size]
-    offers = []
-    for (order, w), v in itertools.product(enumerate(wanted), free):
-        if w.connector.name in own and own[w.connector.name].causality == "parameter":
-            continue  # it has the name already
-        score = likeness(w.connector, [v], declared)
-        if v.unit and _per_g(v.unit, w.connector.unit, declared):
-            score += 3.0 * SAME_DIMENSION  # of which the wrong dimension took two
-        offers.append(((w.needed, score, -order), w, v))
+    own = {n: v for n, v in variables(description).items() if v.causality == "parameter"}
+    lacking = [w for w in wanted if w.connector.name not in own]
+    names = {w.connector.name for w in wanted}
+    free = [v for n, v in own.items() if v.kind == "Real" and not v.size and n not in names]
+    offers = [
+        ((w.needed, likeness(w.connector, [v], declared), -order), w, v)
+        for (order, w), v in itertools.product(enumerate(lacking), free)
+        if w.connector.unit != "1" or v.unit in ("", "1")  # an angle is no ratio
+    ]
     taken: dict[str, Variable] = {}
     for (_, score, _), w, v in sorted(offers, key=lambda o: o[0], reverse=True):
         enough = ENOUGH if w.needed else ENOUGH + (SAME_DIMENSION if v.unit else 1.0)
         if score >= enough and w.connector.name not in taken and v not in taken.values():
             taken[w.connector.name] = v
-    lines = [_line(w, taken[w.connector.name], declared) for w in wanted if w.connector.name in taken]
-    lines += [_left_open(w) for w in _missing(wanted, taken, own)]
+    lines = [_line(w, taken[w.connector.name]) for w in lacking if w.connector.name in taken]
+    lines += [_left_open(w) for w in lacking if w.needed and w.connector.name not in taken]
     return ["[parameters]", *lines] if lines else []
-
-
-def _missing(
-    wanted: Iterable[WantedParameter], taken: Mapping[str, Variable], own: Mapping[str, Variable]
-) -> list[WantedParameter]:
-    return [w for w in wanted if w.needed and w.connector.name not in taken and w.connector.name not in own]
 
 
 def _left_open(w: WantedParameter) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,10 +14,11 @@ import pytest
 from archives import LAG, write_archive
 from fmpy import platform, platform_tuple
 
+from gyrobench.commands.fit_mapping import write_mapping
 from gyrobench.engine.session import Session, run
 from gyrobench.packaging.validate import validate
 from gyrobench.system.binding import SocketMismatchError
-from gyrobench.system.system import InvalidConfigurationError, Slot, System
+from gyrobench.system.system import InvalidConfigurationError, Slot, System, load_system
 from gyrobench.system.wiring import WiringError
 
 Foreign = Callable[..., Path]
@@ -173,7 +176,7 @@ def test_units(small: System, change: Change) -> None:
     assert "omega[1]: unit 'dph' of W_IA is not known and has no BaseUnit; give unit = " in said
 
 
-def test_fit_proposes_the_only_output_and_the_parameters(change: Change, command: Command) -> None:
+def test_fit_proposes_the_only_output_and_the_parameters(change: Change, tmp_path: Path, command: Command) -> None:
     """One output, whose name says nothing; of the parameters k, which the test reads, and a bias by its unit."""
     part = change("vendor_gyro", ("V_PICKOFF", "OUT7"))
     code, text, err = command("fit", part, "--slot", "servo_polar.gyro")
@@ -184,11 +187,25 @@ def test_fit_proposes_the_only_output_and_the_parameters(change: Change, command
     assert any(x.startswith('D_F = { name = "BIAS" }  # ') and "in dph, as the FMU declares" in x for x in parameters)
     (left,) = [x for x in parameters if x.startswith("# H = ")]
     assert left.startswith('# H = { value = 0.2, unit = "N.m.s" }  # spin angular momentum: the test needs it')
-    # per g: the bench's coefficient is per g0 = 9.80665 m/s2
-    g = '<Unit name="dphg"><BaseUnit rad="1" s="1" m="-1" factor="4.943724931649e-7"/></Unit></UnitDefinitions>'
-    plain = 'name="MU_I" valueReference="13" causality="parameter" variability="fixed"><Real '
-    for name, line in (("D_I", ""), ("DI", 'D_I = { name = "DI", factor = 9.80665 }')):  # the one has the name already
-        named = plain.replace("MU_I", name) + 'unit="dphg" '
-        part = change("vendor_gyro", ("</UnitDefinitions>", g), (plain, named))
-        text = command("fit", part, "--slot", "fixed_position.gyro")[1]
-        assert line in text if line else "D_I = " not in text
+    whole = tmp_path / "whole.toml"  # with the values of the bench's part for what the FMU has not
+    whole.write_text(re.sub(r"^# (\w+ = \{)", r"\1", text, flags=re.M))
+    with Session(load_system("servo_polar"), {"gyro": part}, {"gyro": whole}) as session:
+        values = session.prepare()[2].parameters
+    assert (values["gyro.H"], values["gyro.k"], values["gyro.K_sg"]) == (0.2, 20.0, 1e4)
+
+
+@pytest.mark.parametrize("name", ["D_I", "DI"])
+def test_fit_proposes_nothing_per_acceleration(change: Change, name: str) -> None:
+    """In deg/h/g: D_I by its own name, no other coefficient, whose power of g0 its unit does not tell."""
+    factor = math.radians(1.0) / 3600.0 / 9.80665
+    g = f'<Unit name="dphg"><BaseUnit rad="1" s="1" m="-1" factor="{factor!r}"/></Unit></UnitDefinitions>'
+    plain = 'name="MU_I" valueReference="13" causality="parameter" variability="fixed"><Real start="0"'
+    named = plain.replace("MU_I", name).replace('start="0"', 'unit="dphg" start="2"')
+    part = change("vendor_gyro", ("</UnitDefinitions>", g), (plain, named))
+    text, _ = write_mapping(part, "fixed_position.gyro", None)
+    assert 'D_F = { name = "BIAS" }' in text and f'"{name}"' not in text
+
+
+def test_fit_takes_no_angle_for_a_ratio(foreign: Foreign) -> None:
+    text, _ = write_mapping(foreign("vendor_platform"), "platform_single_axis.platform", None)
+    assert "START_ROLL" not in text and "# k_t = { value = 1.0" in text
