@@ -37,7 +37,7 @@ def _described(file: Path) -> Any:
 
 @dataclass(frozen=True)
 class Feed:
-    """What a connector gets: value = factor * (value of ``source``) + offset; unit: of the result."""
+    """Source of a connector's value: value = factor * (value of ``source``) + offset; unit: of the result."""
 
     source: Node
     factor: float
