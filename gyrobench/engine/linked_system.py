@@ -117,7 +117,7 @@ def obstacle(program: Program, parts: Mapping[str, str], guids: Mapping[str, str
     if rounded := [p.slot for p in program.parts for g in p.sets if not (g.doubles or whole.issuperset(g.source))]:
         return f"{', '.join(rounded)}: a wire from a real to a whole number, whose range is checked in calls only"
     if program.delays or program.constants or any(g.shifted for p in program.parts for g in p.sets):
-        return "a mapping file states an offset, a constant or a delay"
+        return "a wire has an offset, a constant or a delay"
     changed = [s for s, name in parts.items() if guids[s] != native_guid(name, load_part(name, bench))]
     return f"{', '.join(changed)}: the files of the part have changed since its FMU was built" if changed else ""
 

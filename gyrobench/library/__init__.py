@@ -66,16 +66,21 @@ def load(
     *,
     parts: Mapping[str, File] | None = None,
     maps: Mapping[str, File] | None = None,
+    coupling: str = "sequential",
     **options: Any,
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
-    mapping file of a third-party FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
+    mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
+    before.  Raises errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
         raise UsageError(f"{name} is a suite of tests: gyrobench.load_suite('{name}')")
+    if coupling not in ("sequential", "parallel"):
+        raise UsageError(f"coupling = '{coupling}': one of sequential, parallel")
+    test.coupling = "parallel" if coupling == "parallel" else ""
     experiment = Experiment(test, parts or {}, maps or {})
     for key, value in {**(values or {}), **options}.items():
         experiment.set(key, value)

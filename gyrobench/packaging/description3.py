@@ -125,7 +125,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
             "canHandleVariableCommunicationStepSize": "true",
         },
     )
-    units(root, cls, extra=("s",))
+    root.append(units(cls.layout, "s"))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))

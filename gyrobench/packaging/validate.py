@@ -112,10 +112,12 @@ def _described(path: Path) -> tuple[Any, list[str]]:
 
 
 def _units(description: Any) -> list[str]:
+    """Return the units that are neither known nor defined by the FMU itself."""
     problems: dict[str, str] = {}
+    defined = {u.name for u in description.unitDefinitions if u.baseUnit is not None}
     for v in description.modelVariables:
         name = v.unit or (v.declaredType.unit if v.declaredType is not None else None)
-        if name and name not in problems:
+        if name and name not in problems and name not in defined:
             try:
                 unit(name)
             except UnitError as error:

@@ -219,6 +219,7 @@ class RunDocument(Document):
     order: list[str] = Field(default_factory=list, description="slots in the order of execution")
     cuts: list[str] = Field(default_factory=list, description="connections that carry the value of the step before")
     delays: dict[str, float] = Field(default_factory=dict, description="connection -> delay, s")
+    coupling: str = Field(default="", description="parallel: every connection carries the value of the step before")
     parts: dict[str, PartInfo] = Field(default_factory=dict, description="slot -> FMU")
     parameters: dict[str, Value] = Field(default_factory=dict, description="slot.parameter -> value, SI")
     changed: list[str] = Field(default_factory=list, description="options, parameters and slots that were set")

@@ -147,6 +147,7 @@ class System(Configurable):
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
     step: float = 1e-3  # s, communication step
+    coupling: str = ""  # "parallel": every wire carries the value of the communication step before (Jacobi)
     stop: float | None = None  # s, or a property; None: only `done` ends the run
 
     def __init__(self) -> None:
