@@ -15,6 +15,7 @@ from printed import checks, declared, pages
 from printed.pages import ROOT, Step
 
 from gyrobench.bench import Bench
+from gyrobench.campaign.execution.axes import parse_axis
 from gyrobench.commands import cli
 from gyrobench.commands.arguments import load_with_values, parse_settings
 from gyrobench.packaging import load_part
@@ -35,17 +36,10 @@ def test_every_entry_of_the_lists_fits_a_printed_command(name: str) -> None:
     assert [p for p in LISTS[name] if not any(re.search(p, t) for t in texts)] == []
 
 
-@pytest.mark.parametrize("marks", [declared.PRELUDES, declared.PARTS, checks.NAMES], ids=["PRELUDES", "PARTS", "NAMES"])
+@pytest.mark.parametrize("marks", [declared.PRELUDES, checks.NAMES], ids=["PRELUDES", "NAMES"])
 def test_every_mark_is_in_a_printed_block(marks: dict[str, object]) -> None:
     texts = [s.text for s in ALL if s.kind in ("python", "file", "notebook")] + ["CELLS = "]
     assert [m for m in marks if not any(m in t for t in texts)] == []
-
-
-def test_commands_after_a_part_are_those_of_the_text() -> None:
-    for _, _, commands in declared.PARTS.values():
-        for command in commands:
-            (step,) = (s for s in COMMANDS if s.text == command)
-            assert f"`{command}`" in (ROOT / step.page).read_text(encoding="utf-8")
 
 
 # ------------------------------------------------------------------ what the benchmark alone runs
@@ -58,17 +52,22 @@ ELSEWHERE = [
 GROUP = typer.main.get_command(cli.app)
 
 
-@pytest.mark.parametrize("step", ELSEWHERE, ids=lambda s: s.place)
+@pytest.mark.parametrize(
+    "step", ELSEWHERE + [s for page in pages.pages() for s in pages.inline(page)], ids=lambda s: s.place
+)
 def test_what_a_command_names_exists(step: Step) -> None:
     """Command, options, system with its values, parts and their parameters, specification."""
     words = shlex.split(step.text, comments=True)
-    if words[0] == "python":
-        assert (ROOT / words[1]).is_file()
+    for path in (w.partition("::")[0] for w in words if w.startswith(("tests/", "docs/", "reports/spec", "systems/"))):
+        assert (ROOT / path).exists(), path
+    if words[0].endswith("python"):
         return
     assert words[0].endswith("gyrobench")
     name, words = words[1], words[2 : words.index(">") if ">" in words else None]
     with GROUP.commands[name].make_context(name, words) as context:  # type: ignore[attr-defined]
         given = context.params
+    for axis in given.get("over") or []:
+        parse_axis(*axis.split("=", 1))
     if given.get("spec"):
         find_specification(given["spec"])
     if "system" not in given or given["system"].endswith(".ssp"):

@@ -21,29 +21,18 @@ TESTS = Path(__file__).parents[1]
 
 #: pattern -> why commands that it fits are not run
 NOT_RUN = {
-    r"^make (demo|test)": "make test runs this test; .ci/run and readers run make demo",
-    r"^python3 -m venv|pip install": "installs from a package index: the wheel is installed before",
+    r"^make ": "make test runs this test; make check and make docs are parts of it",
+    r"^python3 -m venv|pip install|pre-commit": "installs from a package index: the wheel is installed before",
     r"^gyrobench sweep \.\.\.": "stands for any sweep",
     r"; \.\.\.'$": "the shortened end of an output: checks.shown_output",
     r"^dask |tcp://HOST": "a cluster; tests/campaign runs one on this machine",
 }
 
 #: pattern -> exit code, and why it is not 0
-EXIT_CODES = {
-    r" --strict": (1, "inconclusive: type B is neither stated nor declared absent"),
-}
+EXIT_CODES: dict[str, tuple[int, str]] = {}
 
 #: pattern -> seconds of CPU time that one takes; they run in tests/benchmarks/readme_commands.py alone
 LONG: dict[str, float] = {}
-
-#: first line of a block of code -> file that the text tells to put it in, what stands before it, commands that follow
-PARTS = {
-    "class TiltedLag(Component):": (
-        "components/tilted_lag/model.py",
-        "from gyrobench.component import Component, Input, Output, Parameter, Rotation, State\n\n\n",
-        ("gyrobench build tilted_lag", "gyrobench validate fmus/tilted_lag.fmu"),
-    )
-}
 
 #: what a block of Python has -> what the text around it takes for granted
 PRELUDES = {
@@ -175,13 +164,6 @@ def _laws(reader: Reader, name: str, step: Step) -> None:
     _short_runs(reader, [reader.here / name], "platform_four_gimbal", law=name.lower())
 
 
-def _candidates(reader: Reader, name: str, step: Step) -> None:
-    """Two candidates of three seeds each: A/1 ... B/3, the second with a larger fixed drift rate."""
-    candidate = name.partition("/")[0]
-    test = {"gyro.D_F": "0.2deg/h"} if candidate == "B" else {}
-    _short_runs(reader, [reader.here / candidate / str(k) for k in (1, 2, 3)], "fixed_position", **test)
-
-
 def _vendor_slot(step: Step) -> str:
     """Return the slot that the vendor's FMU is put into."""
     slot = re.search(r'--part (\w+)=vendor|parts=\{"(\w+)": "vendor', step.text)
@@ -244,13 +226,6 @@ def _other_tool(reader: Reader, name: str, step: Step) -> None:
     assert reader.run("bash", "-c", " ".join(simulate)).code == 0
 
 
-def _archive(reader: Reader, name: str, step: Step) -> None:
-    """Export the system with the values of the page's other export."""
-    values = next((re.findall(r"--set \S+", s.text) for s in reader.steps if s.text.startswith("gyrobench export")), [])
-    words = [w for v in values for w in v.split()]
-    reader.gyrobench("export", name.removesuffix(".ssp"), *words, "--to", "ssp", "--out", name)
-
-
 def _repository(reader: Reader, name: str, step: Step) -> None:
     """Let a folder of the repository be where the reader stands."""
     (reader.here / name).symlink_to(reader.installed.bench / name)
@@ -266,7 +241,6 @@ PREPARED = [
     Preparation(r"\bdays\.csv\b", lambda r, n, s: (_records if "servo" in s.text else _runs_of_days)(r, n, s)),
     Preparation(r"reports/out/\w+/[0-9][0-9a-f]{7}\b", _saved_run),
     Preparation(r"\bRUN\d\b", _named_runs),
-    Preparation(r"\b[AB]/\d\b", _candidates),
     Preparation(r"\b(?:SECANT|CONSTANT|SIGN)\b", _laws),
     Preparation(r"\bvendor\.fmu\b", _vendor_fmu),
     Preparation(r"\bvendor\.toml\b", _vendor_map),
@@ -276,7 +250,6 @@ PREPARED = [
     Preparation(r"\bCAMPAIGN\b", _campaign),
     Preparation(r"\blot(?=/\*\.csv)", _lot),
     Preparation(r"(?<=--from )run\.csv\b", _other_tool),
-    Preparation(r"\b\w+\.ssp(?= --from)", _archive),
     Preparation(r"(?<=python )systems\b", _repository),
     Preparation(r"^\.venv\b", _environment),
 ]

@@ -13,8 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from printed import declared
-
 ROOT = Path(__file__).parents[2]
 PATTERNS = (
     "README.md", "CONTRIBUTING.md", "docs/**/*.md", "docs/**/*.ipynb", "reports/README.md", "fmus/README.md",
@@ -27,6 +25,8 @@ PROGRAMS = {
 SHELLS = ("", "sh", "bash", "shell", "console")
 LOOKED_AT = ("yaml", "nginx", "json", "xml", "c", "text", "html", "mermaid", "math")
 CELL = "# %%\n"  # before each cell of a notebook
+INLINE = re.compile(r"(?<!`)`(gyrobench [^`]+)`")
+STANDS_FOR = re.compile(r"\b[A-Z]{3,}\b|\.\.\.|\[")  # a word that is no value, in a command in a text
 FENCE = re.compile(r"^```(\S*)(?: +(\S+))?$")
 NAMED = re.compile(r"^# ([\w./-]+\.(?:toml|py|csv)):")
 
@@ -86,10 +86,6 @@ def _fenced(page: str, line: int, language: str, name: str, lines: list[str]) ->
         yield from _commands(page, line, lines)
     elif name or named:
         yield Step(page, line, "file", text, name or (named[1] if named else ""))
-    elif lines[0] in declared.PARTS:
-        file, before, commands = declared.PARTS[lines[0]]
-        yield Step(page, line, "file", before + text, file)
-        yield from (Step(page, line, "command", c) for c in commands)
     elif language == "python":
         yield Step(page, line, "python", text)
     else:
@@ -140,9 +136,21 @@ def _cells(notebook: str) -> list[str]:
     return ["".join(c["source"]) for c in code]
 
 
+def inline(page: str) -> list[Step]:
+    """Return the whole commands in the text of a page: those with an argument, and no word that stands for a value."""
+    if page.endswith(".ipynb"):
+        return []
+    text = (ROOT / page).read_text(encoding="utf-8")
+    found = ((m, " ".join(m[1].split())) for m in INLINE.finditer(text))
+    lines = ((text[: m.start()].count("\n") + 1, c) for m, c in found if not STANDS_FOR.search(c) and c.count(" ") > 1)
+    return [Step(page, line, "inline", command) for line, command in lines]
+
+
+#: pages that are read in a copy of the repository, with its environment
+FROM_ROOT = ("CONTRIBUTING.md",)
 #: pages whose commands `make test` runs, but for declared.LONG
 READ_FIRST = [
     page
     for page in pages()
-    if not page.startswith(("systems/", "components/")) and any(s.kind != "shown" for s in read(page))
+    if not page.startswith(("systems/", "components/", *FROM_ROOT)) and any(s.kind != "shown" for s in read(page))
 ]
