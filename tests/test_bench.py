@@ -403,3 +403,5 @@ def test_files_of_tests_are_tests() -> None:
         for file in folder.glob("*.py"):
             assert file.name == "conftest.py" or file.name.startswith("test_"), f"{file}: to tests/support"
             assert "sys.path.insert" not in file.read_text(encoding="utf-8"), file
+    names = [f.name for f in tests.rglob("test_*.py")]  # the rooms are no packages: pytest imports them by these names
+    assert len(names) == len(set(names)), f"twice: {sorted({n for n in names if names.count(n) > 1})}"
