@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import resource
-import shutil
 import subprocess
 import sys
 import sysconfig
@@ -17,7 +16,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 from printed import checks, declared
-from printed.pages import CELL, FROM_ROOT, ROOT, Step, read
+from printed.pages import CELL, ROOT, Step, read
 
 OTHERS = ("fmpy", "pythonfmu")  # packages whose commands the guides print
 LIMIT = 3600.0  # s of one command
@@ -113,13 +112,6 @@ class Reader:
     def __post_init__(self) -> None:
         self.here, self.path = self.folder, ROOT / self.page
         self.folder.mkdir()
-        if self.page in FROM_ROOT:
-            files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-            for name in files.splitlines():
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(ROOT / name, self.folder / name)
-            (self.folder / ".venv").symlink_to(sys.prefix)
-            self.installed = Installed(Path(sys.executable), {**self.installed.environment, "PATH": os.environ["PATH"]})
         self.steps = read(self.page)
 
     def run(self, *words: str, step: Step | None = None) -> Done:
@@ -170,8 +162,7 @@ class Reader:
         else:
             done = self.python(step)
             assert done.code == 0, f"{step.place}: {done.err[-3000:]}"
-        if self.page not in FROM_ROOT:
-            assert str(ROOT) not in done.out + done.err, f"{step.place}: the checkout is in use"
+        assert str(ROOT) not in done.out + done.err, f"{step.place}: the checkout is in use"
         self.done.append(done)
         return done
 
@@ -179,9 +170,11 @@ class Reader:
         """Run a block of Python, or the cells of a notebook, in a process, and what is checked of its names there."""
         code = f"{declared.prelude(step)}{step.text}"
         if step.kind == "notebook":
-            code = f"CELLS = {step.text.split(CELL)[1:]!r}\n" + (ROOT / "tests/printed/notebook.py").read_text("utf-8")
+            code = f"CELLS = {step.text.split(CELL)[1:]!r}\n" + Path(__file__).with_name("notebook.py").read_text(
+                "utf-8"
+            )
         for check in (f for mark, f in checks.NAMES.items() if mark in code):
-            code += CHECKS.format(tests=str(ROOT / "tests"), check=check.__name__, page=str(self.path))
+            code += CHECKS.format(tests=str(Path(__file__).parents[1]), check=check.__name__, page=str(self.path))
         file = self.folder.with_name(f"{self.folder.name}-{step.line}.py")
         file.write_text(code, encoding="utf-8")
         return self.run(str(self.installed.python), str(file), step=step)

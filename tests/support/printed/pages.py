@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PATTERNS = (
     "README.md", "CONTRIBUTING.md", "docs/**/*.md", "docs/**/*.ipynb", "reports/README.md", "fmus/README.md",
     "systems/*/README.md", "components/*/README.md",
@@ -25,7 +25,7 @@ PROGRAMS = {
 SHELLS = ("", "sh", "bash", "shell", "console")
 LOOKED_AT = ("yaml", "nginx", "json", "xml", "c", "text", "html", "mermaid", "math")
 CELL = "# %%\n"  # before each cell of a notebook
-INLINE = re.compile(r"(?<!`)`(gyrobench [^`]+)`")
+INLINE = re.compile(r"(?<!`)`((?:gyrobench|python) [^`]+)`")
 STANDS_FOR = re.compile(r"\b[A-Z]{3,}\b|\.\.\.|\[")  # a word that is no value, in a command in a text
 FENCE = re.compile(r"^```(\S*)(?: +(\S+))?$")
 NAMED = re.compile(r"^# ([\w./-]+\.(?:toml|py|csv)):")
@@ -146,11 +146,11 @@ def inline(page: str) -> list[Step]:
     return [Step(page, line, "inline", command) for line, command in lines]
 
 
-#: pages that are read in a copy of the repository, with its environment
-FROM_ROOT = ("CONTRIBUTING.md",)
+#: pages whose commands change the repository: what they name is held against what there is, nothing is run
+NOT_FOLLOWED = ("CONTRIBUTING.md",)
 #: pages whose commands `make test` runs, but for declared.LONG
 READ_FIRST = [
     page
     for page in pages()
-    if not page.startswith(("systems/", "components/", *FROM_ROOT)) and any(s.kind != "shown" for s in read(page))
+    if not page.startswith(("systems/", "components/", *NOT_FOLLOWED)) and any(s.kind != "shown" for s in read(page))
 ]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printed.pages import Step
     from printed.reader import Reader
 
-TESTS = Path(__file__).parents[1]
+TESTS = Path(__file__).parents[2]
 
 #: pattern -> why commands that it fits are not run
 NOT_RUN = {
@@ -172,8 +172,7 @@ def _vendor_slot(step: Step) -> str:
 
 def _vendor_fmu(reader: Reader, name: str, step: Step) -> None:
     """Build the vendor's FMU of the tests for the slot that it is put into; for a monitor the bench's own."""
-    sys.path.insert(0, str(TESTS))
-    from foreign.make import make
+    from foreign_fmus import make
 
     kind = _vendor_slot(step)
     if kind == "monitor":
@@ -212,10 +211,8 @@ def _campaign(reader: Reader, name: str, step: Step) -> None:
 
 
 def _lot(reader: Reader, name: str, step: Step) -> None:
-    """Write a lot of measured files: the first eight of tests/campaign/measured_lot.py."""
-    made = reader.run(
-        sys.executable, str(TESTS / "campaign" / "measured_lot.py"), str(reader.here / name), "--count", "8"
-    )
+    """Write a lot of measured files: the first eight of tests/support/measured_lot.py."""
+    made = reader.run(sys.executable, str(TESTS / "support" / "measured_lot.py"), name, "--count", "8")
     assert made.code == 0, made.err
 
 
