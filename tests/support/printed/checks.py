@@ -61,6 +61,7 @@ def drift_record(names: Names, page: str) -> None:
     assert {n: simulated[f"gyro.{n}"] for n in values} == values
     again = json.loads(Path("simulated/result.json").read_text(encoding="utf-8"))["coefficients"][0]
     assert math.isclose(again["truth"], N, rel_tol=0.02), "the noise of the record"
+    assert (Path(page).parent / "drift_record" / "gyro.csv").stat().st_size < 300_000
 
 
 def sweep(names: Names, page: str) -> None:

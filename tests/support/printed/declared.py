@@ -1,4 +1,4 @@
-"""What printed commands need beside the page, which are not run, and which run in the benchmark only: by pattern.
+"""What printed commands need beside the page, and which are not run: by pattern.
 
 test_printed_commands.py fails where a pattern fits no printed command.
 """
@@ -27,12 +27,6 @@ NOT_RUN = {
     r"; \.\.\.'$": "the shortened end of an output: checks.shown_output",
     r"^dask |tcp://HOST": "a cluster; tests/campaign runs one on this machine",
 }
-
-#: pattern -> exit code, and why it is not 0
-EXIT_CODES: dict[str, tuple[int, str]] = {}
-
-#: pattern -> seconds of CPU time that one takes; they run in tests/benchmarks/readme_commands.py alone
-LONG: dict[str, float] = {}
 
 #: what a block of Python has -> what the text around it takes for granted
 PRELUDES = {
@@ -68,10 +62,6 @@ def is_any(patterns: Iterable[str], text: str) -> bool:
 
 def prelude(step: Step) -> str:
     return "".join(text for mark, text in PRELUDES.items() if mark in step.text)
-
-
-def exit_code(text: str) -> tuple[int, str]:
-    return next((value for pattern, value in EXIT_CODES.items() if re.search(pattern, text)), (0, ""))
 
 
 # --------------------------------------------------------------------------------------- preparations
