@@ -25,7 +25,8 @@ from gyrobench.workflow.inputs import find_specification
 ALL = [step for page in pages.pages() for step in pages.read(page)]
 COMMANDS = [s for s in ALL if s.kind == "command"]
 LISTS = {
-    "NOT_RUN": declared.NOT_RUN, "AFTER": checks.AFTER, "PREPARED": [p.pattern for p in declared.PREPARED]
+    "NOT_RUN": declared.NOT_RUN, "LONG": declared.LONG, "AFTER": checks.AFTER,
+    "PREPARED": [p.pattern for p in declared.PREPARED],
 }  # fmt: skip
 
 
@@ -42,7 +43,12 @@ def test_every_mark_is_in_a_printed_block(marks: dict[str, object]) -> None:
 
 
 # ------------------------------------------------------------------ what the benchmark alone runs
-ELSEWHERE = [s for s in COMMANDS if s.page not in pages.READ_FIRST and not declared.is_any(declared.NOT_RUN, s.text)]
+ELSEWHERE = [
+    s
+    for s in COMMANDS
+    if (s.page not in pages.READ_FIRST or declared.is_any(declared.LONG, s.text))
+    and not declared.is_any(declared.NOT_RUN, s.text)
+]
 GROUP = typer.main.get_command(cli.app)
 
 

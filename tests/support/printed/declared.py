@@ -1,4 +1,4 @@
-"""What printed commands need beside the page, and which are not run: by pattern.
+"""What printed commands need beside the page, which are not run, and which run in the benchmark only: by pattern.
 
 test_printed_commands.py fails where a pattern fits no printed command.
 """
@@ -27,6 +27,9 @@ NOT_RUN = {
     r"; \.\.\.'$": "the shortened end of an output: checks.shown_output",
     r"^dask |tcp://HOST": "a cluster; tests/campaign runs one on this machine",
 }
+
+#: commands of many seconds; tests/benchmarks/readme_commands.py alone runs them, which the continuous integration calls
+LONG = (r"^gyrobench design ",)
 
 #: what a block of Python has -> what the text around it takes for granted
 PRELUDES = {

@@ -148,7 +148,7 @@ def inline(page: str) -> list[Step]:
 
 #: pages whose commands change the repository: what they name is held against what there is, nothing is run
 NOT_FOLLOWED = ("CONTRIBUTING.md",)
-#: pages whose commands `make test` runs
+#: pages whose commands `make test` runs, but for declared.LONG
 READ_FIRST = [
     page
     for page in pages()
